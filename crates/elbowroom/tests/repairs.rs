@@ -1,7 +1,11 @@
 //! The cheapest repairs of plans: against brute force, and on all plans of the benchmarks that do not
 //! work.
 
-#![allow(clippy::print_stdout, reason = "counts and times are worth seeing")]
+#![allow(
+    clippy::print_stdout,
+    clippy::disallowed_methods,
+    reason = "counts and times are worth seeing; nothing depends on them"
+)]
 
 #[path = "repairs/grid.rs"]
 mod grid;
@@ -128,11 +132,7 @@ fn a_plan_that_is_only_late_in_its_own_times_needs_no_change() {
     let late = "0: (drive rover depot shelf) [10] 0: (unlock office) [6]
         10.001: (pick rover parcel shelf) [2] 52.002: (drive rover shelf office) [15]
         67.003: (drop rover parcel office) [3]";
-    let request = case(
-        "delivery",
-        &|problem| problem,
-        &late.replace(") [", ") [").replace("] ", "]\n"),
-    );
+    let request = case("delivery", &|problem| problem, &late.replace("] ", "]\n"));
     assert_eq!(said(&request), "");
 }
 
@@ -257,7 +257,7 @@ fn works(request: &RepairRequest) -> Option<bool> {
 #[test]
 fn deliveries_with_deadlines_at_half_their_times_are_repaired() {
     let Some(data) = shared::data() else { return };
-    for instance in shared::instances::figure_4(&data) {
+    for instance in shared::instances::figure_4(&data).into_iter().step_by(4) {
         let task = shared::task(&instance.domain, &instance.problem).expect("a problem");
         let halved: Vec<Rational> = task
             .timed()

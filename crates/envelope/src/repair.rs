@@ -26,8 +26,7 @@ use std::ops::ControlFlow;
 use elbowroom_model::Task;
 use elbowroom_num::{Delta, Interval, Rational};
 use elbowroom_plan::{
-    DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Schedule, Side, Valuation,
-    network_node,
+    NodeId, ParameterId, ParametrizedPlan, Schedule, Side, Valuation, network_node,
 };
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 
@@ -272,12 +271,4 @@ fn take_cheapest(open: &mut Vec<Open>) -> Option<Open> {
     let cost = |case: &Open| -> Delta { case.solved.cost.clone() };
     let best = (0..open.len()).rev().min_by_key(|&at| cost(&open[at]))?;
     Some(open.remove(best))
-}
-
-/// The box that holds the values alone.
-impl Repair {
-    /// The values as a box, for the box check.
-    pub fn point(&self) -> DecoupledEnvelope {
-        DecoupledEnvelope::point(&self.values)
-    }
 }

@@ -139,16 +139,16 @@ fn holds_between(
     for inequality in case {
         let at =
             |node: NodeId| read_at(&inequality.expression, moment, node).value(schedule, values);
-        let (first, last) = (at(between[0]), at(between[1]));
-        let slope = (&last - &first) / (until - since);
+        let [begins, stops] = between.map(at);
+        let slope = (&stops - &begins) / (until - since);
         let is_strict = inequality.is_strict;
         if slope.is_zero() {
-            if first.is_positive() || (first.is_zero() && is_strict) {
+            if begins.is_positive() || (begins.is_zero() && is_strict) {
                 return false;
             }
             continue;
         }
-        let root = since - &(&first / &slope);
+        let root = since - &(&begins / &slope);
         if slope.is_positive() {
             if root < most.0 {
                 most = (root, is_strict);

@@ -102,13 +102,17 @@ impl Orders {
         decided: &BTreeSet<(NodeId, NodeId)>,
     ) -> Option<(NodeId, NodeId)> {
         let nodes: Vec<NodeId> = (0..self.footprints.len()).map(NodeId::from).collect();
-        let writes = |node: NodeId| {
+        let is_writer = |node: NodeId| {
             let footprint = &self.footprints[node.index()];
             let mut written = footprint.adds.iter().chain(&footprint.deletes);
             let shifts = !footprint.shifts.is_empty() || !footprint.assigns.is_empty();
             self.is_conditional || written.any(|fact| facts.contains(fact)) || (numbers && shifts)
         };
-        let writers: Vec<NodeId> = nodes.iter().copied().filter(|&node| writes(node)).collect();
+        let writers: Vec<NodeId> = nodes
+            .iter()
+            .copied()
+            .filter(|&node| is_writer(node))
+            .collect();
         // What a writer does may depend on numbers that it reads.
         let readers = if self.is_conditional || numbers {
             &nodes[..]

@@ -156,9 +156,9 @@ fn text(outcome: &RepairOutcome, look: Look) -> String {
             );
             section(&mut text, "Bounds to keep to", keeps, &[()], look);
             if let Some(why_not) = not_guaranteed {
-                let words =
+                let caution =
                     format!("The plan is valid at these times, but not guaranteed: {why_not}");
-                push_wrapped(&mut text, &words, 0, look.width);
+                push_wrapped(&mut text, &caution, 0, look.width);
             }
             if let Some((task, plan)) = &outcome.repaired {
                 // Writing to a string cannot fail.

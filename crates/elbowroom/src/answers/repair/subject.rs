@@ -257,11 +257,11 @@ impl Subject {
         values: &Valuation,
         schedule: &Schedule,
     ) -> (Task, TimeTriggeredPlan) {
-        let timed = 0..self.task.timed().len();
-        let times = timed.map(|index| schedule[self.plan.plan.timed(index)].clone());
+        let groups = 0..self.task.timed().len();
+        let moved = groups.map(|index| schedule[self.plan.plan.timed(index)].clone());
         let initial = self.plan.initial.iter();
         let initial = initial.map(|(fluent, id)| (*fluent, values[*id].clone()));
-        let task = self.task.with_numbers(&times.collect::<Vec<_>>(), initial);
+        let task = self.task.with_numbers(&moved.collect::<Vec<_>>(), initial);
         let mut plan = self.plan.plan.at(values);
         for own in &self.changeable {
             let ParameterKind::Duration(instance) = self.plan.parameter(own.parameter).kind else {
