@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
-use elbowroom_envelope::Guarantee;
 use elbowroom_envelope::obligations::Refusal;
+use elbowroom_envelope::{Guarantee, Objective};
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_plan::deorder::{DeorderError, Deordered, deorder};
@@ -25,6 +25,8 @@ pub struct Settings {
     pub guarantee: Guarantee,
     /// How to search.
     pub search: elbowroom_envelope::Settings,
+    /// What the box is to be the best of; without one, it is IRR's.
+    pub objective: Option<Objective>,
 }
 
 impl Default for Settings {
@@ -35,6 +37,7 @@ impl Default for Settings {
             vary: Vec::new(),
             guarantee: Guarantee::default(),
             search: Search::default().settings(),
+            objective: None,
         }
     }
 }

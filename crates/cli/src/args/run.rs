@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args, ValueEnum};
 use elbowroom::num::Rational;
 
-use super::envelope::{Guarantee, controllable};
+use super::envelope::{Guarantee, Objective, controllable};
 use super::number::{count, factor, positive, whole};
 use super::plan::EMBEDDED;
 use crate::serve::Address;
@@ -94,6 +94,10 @@ pub(crate) struct RunArgs {
     /// hundredth of each nominal value
     #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) precision: Option<Rational>,
+    /// What the envelopes are to be the best of, see `elbowroom help envelope`; without it, they are
+    /// those of IRR
+    #[arg(long, value_enum)]
+    pub(crate) objective: Option<Objective>,
     /// What happens to running actions when a new plan is made
     #[arg(long, value_enum, default_value_t = RunningChoice::Keep)]
     pub(crate) running: RunningChoice,
@@ -201,6 +205,7 @@ const IN_THE_TRACE: &[&str] = &[
     "controllable",
     "guarantee",
     "precision",
+    "objective",
     "running",
     "planning_time",
     "max_replans",

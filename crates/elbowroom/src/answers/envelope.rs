@@ -149,6 +149,10 @@ impl EnvelopeRequest {
         self.search.relative.clone_from(&settings.search.relative);
         self.search.growth = settings.search.growth;
         self.search.most_checks = settings.search.most_checks;
+        if let Some(objective) = settings.objective {
+            self.search.method = Method::Best;
+            self.search.best.objective = objective;
+        }
         self
     }
 }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_envelope::obligations::Refusal;
-use elbowroom_envelope::{Guarantee, Oracle, irr};
+use elbowroom_envelope::{BestSettings, Guarantee, Oracle, best, irr};
 use elbowroom_execution::{Forms, Need, PrepareError, Prepared, Preparer, Region};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_plan::deorder;
@@ -128,7 +128,17 @@ impl Analyst {
         let mut oracle = Oracle::new(task, plan, self.settings.guarantee).map_err(beyond)?;
         let search = &self.settings.search;
         let run = irr(&mut oracle, search, &mut |_| self.flow()).map_err(beyond)?;
-        run.envelope.map_err(|_| PrepareError::NoGuarantee)
+        let envelope = run.envelope.map_err(|_| PrepareError::NoGuarantee)?;
+        let Some(objective) = self.settings.objective else {
+            return Ok(envelope);
+        };
+        let wanted = BestSettings {
+            objective,
+            ..BestSettings::default()
+        };
+        let run = best(&mut oracle, &wanted, Some(&envelope), &mut |_| self.flow());
+        let best = run.map_err(beyond)?;
+        best.envelope.map_err(|_| PrepareError::NoGuarantee)
     }
 }
 

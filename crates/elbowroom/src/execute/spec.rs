@@ -5,7 +5,7 @@ mod wiring;
 
 use std::sync::Arc;
 
-use elbowroom_envelope::Guarantee;
+use elbowroom_envelope::{Guarantee, Objective};
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
 use elbowroom_model::{Problem, Task};
@@ -99,6 +99,9 @@ pub struct RunSpec {
     #[serde(default, with = "positive::option")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub precision: Option<Rational>,
+    /// What envelopes are to be the best of; left out where they are IRR's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub objective: Option<Objective>,
     /// The treatment of running actions when a new plan is made.
     #[serde(with = "as_text")]
     pub running: RunningRule,
@@ -179,6 +182,7 @@ impl RunSpec {
             vary: flow.vary,
             guarantee: flow.guarantee,
             precision: None,
+            objective: None,
             running: settings.running,
             planning_time: PlanningTime::Seconds(Rational::ZERO),
             realtime: None,
@@ -206,6 +210,7 @@ impl RunSpec {
         let mut flow = flow::Settings {
             vary: self.vary.clone(),
             guarantee: self.guarantee,
+            objective: self.objective,
             ..flow::Settings::default()
         };
         if let Some(precision) = &self.precision {

@@ -54,6 +54,7 @@ fn unusual() -> RunSpec {
         ],
         guarantee: elbowroom::envelope::Guarantee::Strong,
         precision: Some(Rational::new(1, 3)),
+        objective: Some(elbowroom::envelope::Objective::Volume),
         running: "await".parse().expect("a correct test"),
         planning_time: "measured".parse().expect("a correct test"),
         realtime: Some(Rational::from(10)),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::simplex::{Optimum, Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
-use elbowroom_plan::ParametrizedPlan;
+use elbowroom_plan::{ParametrizedPlan, Side};
 
 use super::{Source, Variables};
 use crate::cut::Cut;
@@ -151,12 +151,12 @@ impl Master {
         solved
     }
 
-    /// The best values in that case of those that are at most these; strict rows are kept with a
-    /// little to spare. `None` if there are none.
-    pub(super) fn below(
+    /// The best values in that case of those that are at most, or at least, these; strict rows are
+    /// kept with a little to spare. `None` if there are none.
+    pub(super) fn beside(
         &mut self,
         chosen: &[(usize, usize)],
-        most: &[Rational],
+        (side, limits): (Side, &[Rational]),
         worths: &[Rational],
     ) -> Option<Vec<Rational>> {
         // As a share of the bound.
@@ -167,9 +167,12 @@ impl Master {
         for &(cut, row) in chosen {
             is_possible &= self.assert(cut, row);
         }
-        for (id, most) in self.variables.iter().zip(most) {
-            self.simplex
-                .assert_upper(*id, Delta::from(most.clone()), self.sources.len());
+        for (id, limit) in self.variables.iter().zip(limits) {
+            let (limit, tag) = (Delta::from(limit.clone()), self.sources.len());
+            match side {
+                Side::Upper => self.simplex.assert_upper(*id, limit, tag),
+                Side::Lower => self.simplex.assert_lower(*id, limit, tag),
+            }
         }
         let strict: Vec<(VariableId, Rational)> = self
             .rows(chosen)

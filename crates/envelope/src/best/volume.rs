@@ -9,7 +9,7 @@
 //! [`barrier`]: super::barrier
 
 use elbowroom_num::{Rational, enclosed};
-use elbowroom_plan::ParametrizedPlan;
+use elbowroom_plan::{ParametrizedPlan, Side};
 
 use super::Variables;
 use super::barrier::{Concave, Polytope};
@@ -96,8 +96,14 @@ impl Volume {
         let guess = self.guess(master, variables, chosen, known);
         let guess = guess.unwrap_or_else(|| known.to_vec());
         let near = self.slopes(&guess);
-        let values = master.below(chosen, &guess, &self.worths(variables, &near));
-        let values = values.map(|values| self.tidied(values, master, variables, chosen));
+        let worths = self.worths(variables, &near);
+        let values = master.beside(chosen, (Side::Upper, &guess), &worths);
+        let values = values.map(|values| {
+            let values = self.tidied(values, master, variables, chosen);
+            // What is left by rounding, and where the objective is flat.
+            let filled = master.beside(chosen, (Side::Lower, &values), &worths);
+            filled.unwrap_or(values)
+        });
         let slopes = values.as_ref().map_or(near, |values| self.slopes(values));
         match master.solve(chosen, &self.worths(variables, &slopes)) {
             Solved::Impossible(proof) => Outcome::Impossible(proof),

@@ -2,6 +2,7 @@
 
 mod file;
 
+use elbowroom::envelope::Objective;
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{Patience, RunSettings};
 use elbowroom_num::Rational;
@@ -43,6 +44,8 @@ pub struct Experiment {
     pub settings: RunSettings,
     /// How close to its limit each end of an envelope should come.
     pub precision: Rational,
+    /// What envelopes are to be the best of; without one, they are IRR's.
+    pub objective: Option<Objective>,
     /// The planner.
     pub planner: Planning,
     /// How many states the planner looks at for one plan.
@@ -142,6 +145,7 @@ impl Experiment {
             seed,
             settings,
             precision,
+            objective,
             planner,
             planner_states,
             improve_states,
@@ -192,7 +196,11 @@ impl Experiment {
             planner_states,
             improve_states,
         ]);
-        // Nothing else depends on it, so results without it stay what they are.
+        // Nothing else depends on these, so results without them stay what they are.
+        let identity = match objective {
+            Some(objective) => json!([identity, "objective", objective.name()]),
+            None => identity,
+        };
         if *optimum {
             json!([identity, "optimum"])
         } else {
@@ -297,6 +305,7 @@ impl Experiment {
             seed: read.seed,
             settings,
             precision,
+            objective: read.objective,
             planner,
             planner_states: read.planner_states.unwrap_or(20_000),
             improve_states: read.improve_states.unwrap_or(20_000),

@@ -273,6 +273,7 @@ impl Setting<'_> {
             improve_states: experiment.improve_states,
             vary: column.vary.clone(),
             precision: Some(experiment.precision.clone()),
+            objective: experiment.objective,
             running: settings.running,
             planning_time: settings.planning_time.clone(),
             max_replans: settings.most_replans,
@@ -388,6 +389,7 @@ impl Setting<'_> {
     fn flow(&self, column: &Column) -> flow::Settings {
         let mut flow = flow::Settings {
             vary: column.vary.clone(),
+            objective: self.experiment.objective,
             ..flow::Settings::default()
         };
         flow.search.precision = self.experiment.precision.clone();

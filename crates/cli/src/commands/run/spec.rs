@@ -33,6 +33,7 @@ pub(in crate::commands) fn of(
         improve_states: arguments.improve_states,
         guarantee: arguments.guarantee.into(),
         precision: arguments.precision.clone(),
+        objective: arguments.objective.map(Into::into),
         running: match arguments.running {
             RunningChoice::Cancel => RunningRule::Cancel,
             RunningChoice::Await => RunningRule::Await,

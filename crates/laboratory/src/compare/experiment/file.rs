@@ -1,5 +1,6 @@
 //! Experiment files as they stand.
 
+use elbowroom::envelope::Objective;
 use elbowroom::execute::EMBEDDED;
 use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
 use elbowroom_num::Rational;
@@ -30,6 +31,7 @@ pub(super) struct File {
     pub(super) planning_time: Option<Spanned<toml::Value>>,
     pub(super) max_replans: Option<usize>,
     pub(super) precision: Option<Spanned<f64>>,
+    pub(super) objective: Option<Objective>,
     pub(super) planner: Option<Spanned<String>>,
     pub(super) planner_time: Option<Spanned<f64>>,
     pub(super) planner_states: Option<u64>,
