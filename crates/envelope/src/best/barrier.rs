@@ -4,6 +4,8 @@
 //! What is found here is nothing but a proposal: whoever uses it works out with exact numbers what
 //! it is good for.
 
+use std::ops::ControlFlow;
+
 /// All bounds are loosened by so much, so that something lies strictly inside of them.
 const LOOSE: f64 = 1e-10;
 /// The sum of what the barriers of all bounds cost in the end.
@@ -12,6 +14,9 @@ const GAP: f64 = 2e-8;
 const SHARPER: f64 = 20.0;
 /// The limit on Newton steps in all rounds together.
 const MOST_STEPS: usize = 600;
+
+/// After about so many multiplications somebody is asked whether to go on: some ten milliseconds.
+const ASKED_AFTER: usize = 10_000_000;
 
 /// A concave function that is a sum over few variables each.
 pub(super) trait Concave {
@@ -45,8 +50,13 @@ impl Polytope {
     }
 
     /// About the point where the function is greatest; from the best one of these points to begin
-    /// with. `None` if none of them is inside.
-    pub(super) fn maximize(&self, function: &dyn Concave, starts: &[Vec<f64>]) -> Option<Vec<f64>> {
+    /// with. `None` if none of them is inside, or if nobody wants to wait.
+    pub(super) fn maximize(
+        &self,
+        function: &dyn Concave,
+        starts: &[Vec<f64>],
+        flow: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Vec<f64>> {
         let inside = starts.iter().map(|start| (self.least_slack(start), start));
         let (slack, start) = inside.max_by(|one, other| one.0.total_cmp(&other.0))?;
         if !(slack > 0.0 && function.value(start).is_finite()) {
@@ -56,10 +66,19 @@ impl Polytope {
         let count = self.rows.len() + 2 * at.len();
         #[allow(clippy::cast_precision_loss, reason = "a count of bounds")]
         let last = count as f64 / GAP;
-        let (mut sharpness, mut steps) = (1.0_f64, 0);
+        let in_rows = self.rows.iter().map(|(factors, _)| factors.len().pow(2));
+        let work = at.len().pow(3) / 6 + in_rows.sum::<usize>();
+        let (mut sharpness, mut steps, mut worked) = (1.0_f64, 0, 0_usize);
         loop {
             while steps < MOST_STEPS && self.newton(function, sharpness, &mut at) {
                 steps += 1;
+                worked += work;
+                if worked > ASKED_AFTER {
+                    worked = 0;
+                    if flow().is_break() {
+                        return None;
+                    }
+                }
             }
             if sharpness >= last || steps >= MOST_STEPS {
                 return Some(at);
@@ -200,10 +219,26 @@ mod tests {
             rows: vec![(vec![(0, 1.0), (1, 2.0), (2, 4.0)], 12.0)],
             most: vec![100.0, 100.0, 0.5],
         };
-        let found = polytope.maximize(&Logarithms, &[vec![0.0; 3]]).unwrap();
+        let found = polytope
+            .maximize(&Logarithms, &[vec![0.0; 3]], &mut || ControlFlow::Continue(()))
+            .unwrap();
         for (found, known) in found.iter().zip([5.0, 2.5, 0.5]) {
             assert!((found - known).abs() < 1e-5, "{found} {known}");
         }
+    }
+
+    #[test]
+    fn who_does_not_want_to_wait_is_asked_in_time() {
+        let polytope = Polytope {
+            rows: vec![((0..500).map(|index| (index, 1.0)).collect(), 1.0)],
+            most: vec![9.0; 500],
+        };
+        let mut asked = 0;
+        let found = polytope.maximize(&Logarithms, &[vec![0.0; 500]], &mut || {
+            asked += 1;
+            ControlFlow::Break(())
+        });
+        assert_eq!((found, asked), (None, 1));
     }
 
     #[test]
@@ -212,7 +247,9 @@ mod tests {
             rows: vec![(vec![(0, 1.0)], 0.0), (vec![(1, 1.0), (2, 1.0)], 1.0)],
             most: vec![9.0; 3],
         };
-        let found = polytope.maximize(&Logarithms, &[vec![0.0; 3]]).unwrap();
+        let found = polytope
+            .maximize(&Logarithms, &[vec![0.0; 3]], &mut || ControlFlow::Continue(()))
+            .unwrap();
         for (found, known) in found.iter().zip([0.0, 0.5, 0.5]) {
             assert!((found - known).abs() < 1e-5, "{found} {known}");
         }

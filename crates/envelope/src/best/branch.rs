@@ -45,6 +45,8 @@ struct Search<'a> {
     leaves: Vec<Leaf>,
     best: (Rational, Vec<Rational>),
     shrunk: usize,
+    on_step: &'a mut dyn FnMut(&BestStep<'_>) -> ControlFlow<()>,
+    is_cancelled: bool,
 }
 
 /// The box that is best by a goal.
@@ -69,16 +71,17 @@ pub(super) fn branch(
         tree: Vec::new(),
         leaves: Vec::new(),
         shrunk: 0,
+        on_step,
+        is_cancelled: false,
     };
     if let Some(start) = start {
         search.take(search.values_in(start));
     }
-    search.open(Vec::new(), search.best.0.clone());
-    let mut is_cancelled = false;
+    search.open(Vec::new(), search.goal.most(variables));
     let mut steps = 0_u64;
     // What is left of cases in which nothing more could be told.
     let mut left: Option<Rational> = None;
-    while let Some(at) = search.most_promising() {
+    while let (false, Some(at)) = (search.is_cancelled, search.most_promising()) {
         if search.leaves[at].bound <= &search.best.0 + &tolerance {
             break;
         }
@@ -89,13 +92,7 @@ pub(super) fn branch(
         if search.split(at) {
             continue;
         }
-        let envelope = variables.envelope(plan, &search.best.1);
-        let step = BestStep {
-            envelope: &envelope,
-            checks: search.oracle.checks(),
-        };
-        if on_step(&step).is_break() {
-            is_cancelled = true;
+        if search.goes_on().is_break() {
             break;
         }
         steps += 1;
@@ -136,7 +133,7 @@ pub(super) fn branch(
         value: search.best.0,
         bound,
         checks: 0,
-        is_cancelled,
+        is_cancelled: search.is_cancelled,
         proof: BestProof {
             cuts: search.cuts,
             reasons: Reasons::Tree(search.tree),
@@ -146,6 +143,17 @@ pub(super) fn branch(
 }
 
 impl Search<'_> {
+    /// Tells the best box so far, and asks whether to go on.
+    fn goes_on(&mut self) -> ControlFlow<()> {
+        let step = BestStep {
+            envelope: &self.variables.envelope(self.plan, &self.best.1),
+            checks: self.oracle.checks(),
+        };
+        let flow = (self.on_step)(&step);
+        self.is_cancelled |= flow.is_break();
+        flow
+    }
+
     /// Takes the box with these values, which is inside the envelope, if it is better.
     fn take(&mut self, values: Vec<Rational>) {
         let worth = self.goal.worth(&values);
@@ -205,7 +213,14 @@ impl Search<'_> {
         let leaf = &mut self.leaves[at];
         let known = &self.best.1;
         let (master, variables) = (&mut self.master, self.variables);
-        match self.goal.solve(master, variables, &leaf.chosen, known) {
+        let envelope = variables.envelope(self.plan, known);
+        let step = BestStep {
+            envelope: &envelope,
+            checks: self.oracle.checks(),
+        };
+        let mut flow = || (self.on_step)(&step);
+        match self.goal.solve(master, variables, (&leaf.chosen, known), &mut flow) {
+            Outcome::Unknown => self.is_cancelled = true,
             Outcome::Best {
                 values,
                 bound,

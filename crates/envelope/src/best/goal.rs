@@ -1,5 +1,7 @@
 //! What a box is to be the greatest of, for the search by cases ([`branch`](super::branch)).
 
+use std::ops::ControlFlow;
+
 use elbowroom_num::Rational;
 use elbowroom_plan::ParametrizedPlan;
 
@@ -30,6 +32,8 @@ pub(super) enum Outcome {
     },
     /// There are none, because of this.
     Impossible(Vec<(Source, Rational)>),
+    /// Nobody wanted to wait for them.
+    Unknown,
 }
 
 impl Goal {
@@ -58,13 +62,21 @@ impl Goal {
         }
     }
 
+    /// What no box can be worth more than, whatever the cuts.
+    pub(super) fn most(&self, variables: &Variables) -> Rational {
+        match self {
+            Self::Sum(_) => self.worth(&variables.most),
+            Self::Volume(volume) => volume.most(&variables.most),
+        }
+    }
+
     /// The best values in a case; `known` are those of a box inside the envelope.
     pub(super) fn solve(
         &self,
         master: &mut Master,
         variables: &Variables,
-        chosen: &[(usize, usize)],
-        known: &[Rational],
+        (chosen, known): (&[(usize, usize)], &[Rational]),
+        flow: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Outcome {
         match self {
             Self::Sum(worths) => match master.solve(chosen, worths) {
@@ -80,7 +92,7 @@ impl Goal {
                     slopes: Vec::new(),
                 },
             },
-            Self::Volume(volume) => volume.solve(master, variables, chosen, known),
+            Self::Volume(volume) => volume.solve(master, variables, (chosen, known), flow),
         }
     }
 }

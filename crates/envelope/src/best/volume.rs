@@ -8,6 +8,8 @@
 //!
 //! [`barrier`]: super::barrier
 
+use std::ops::ControlFlow;
+
 use elbowroom_num::{Rational, enclosed};
 use elbowroom_plan::{ParametrizedPlan, Side};
 
@@ -76,24 +78,45 @@ impl Volume {
         })
     }
 
+    /// Between which two numbers lies what a box is worth.
+    fn enclosed(&self, values: &[Rational]) -> [Rational; 2] {
+        let mut sums = [Rational::ZERO, Rational::ZERO];
+        for (width, footed) in self.widths.iter().zip(self.footed(values)) {
+            let bounds = enclosed::ln(&footed).expect("a width that is not negative, and a foot");
+            for (sum, bound) in sums.iter_mut().zip(bounds) {
+                *sum += bound * &width.weight;
+            }
+        }
+        sums
+    }
+
     /// What a box is worth, rounded down to a billionth.
     pub(super) fn worth(&self, values: &[Rational]) -> Rational {
-        let terms = self.widths.iter().zip(self.footed(values));
-        let terms = terms.filter_map(|(width, footed)| {
-            let [below, _] = enclosed::ln(&footed)?;
-            Some(below * &width.weight)
-        });
-        enclosed::billionths_below(&terms.sum())
+        enclosed::billionths_below(&self.enclosed(values)[0])
+    }
+
+    /// The same, rounded up.
+    pub(super) fn most(&self, values: &[Rational]) -> Rational {
+        enclosed::billionths_above(&self.enclosed(values)[1])
     }
 
     pub(super) fn solve(
         &self,
         master: &mut Master,
         variables: &Variables,
-        chosen: &[(usize, usize)],
-        known: &[Rational],
+        (chosen, known): (&[(usize, usize)], &[Rational]),
+        flow: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Outcome {
-        let guess = self.guess(master, variables, chosen, known);
+        let mut is_over = false;
+        let mut goes_on = || {
+            let flow = flow();
+            is_over |= flow.is_break();
+            flow
+        };
+        let guess = self.guess(master, variables, (chosen, known), &mut goes_on);
+        if is_over {
+            return Outcome::Unknown;
+        }
         let guess = guess.unwrap_or_else(|| known.to_vec());
         let near = self.slopes(&guess);
         let worths = self.worths(variables, &near);
@@ -159,8 +182,8 @@ impl Volume {
         &self,
         master: &mut Master,
         variables: &Variables,
-        chosen: &[(usize, usize)],
-        known: &[Rational],
+        (chosen, known): (&[(usize, usize)], &[Rational]),
+        flow: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Vec<Rational>> {
         let scales: Vec<f64> = variables.scales.iter().map(Rational::to_f64).collect();
         let rows = master.rows(chosen).map(|row| {
@@ -193,7 +216,7 @@ impl Volume {
                 starts.push(in_scale(&values));
             }
         }
-        let found = polytope.maximize(&InScale(self), &starts)?;
+        let found = polytope.maximize(&InScale(self), &starts, flow)?;
         let rounded = found.iter().zip(&variables.scales).zip(&variables.most);
         let rounded = rounded.map(|((value, scale), most)| {
             let fine = Rational::new(1, 1_000_000_000_000);
