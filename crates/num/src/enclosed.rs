@@ -84,7 +84,7 @@ fn halved(number: &Rational) -> (Rational, i64) {
             power += i64::from(step);
         }
         while mantissa <= low {
-            mantissa = mantissa * &factor;
+            mantissa *= &factor;
             power -= i64::from(step);
         }
     }

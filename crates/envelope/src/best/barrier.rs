@@ -220,7 +220,9 @@ mod tests {
             most: vec![100.0, 100.0, 0.5],
         };
         let found = polytope
-            .maximize(&Logarithms, &[vec![0.0; 3]], &mut || ControlFlow::Continue(()))
+            .maximize(&Logarithms, &[vec![0.0; 3]], &mut || {
+                ControlFlow::Continue(())
+            })
             .unwrap();
         for (found, known) in found.iter().zip([5.0, 2.5, 0.5]) {
             assert!((found - known).abs() < 1e-5, "{found} {known}");
@@ -248,7 +250,9 @@ mod tests {
             most: vec![9.0; 3],
         };
         let found = polytope
-            .maximize(&Logarithms, &[vec![0.0; 3]], &mut || ControlFlow::Continue(()))
+            .maximize(&Logarithms, &[vec![0.0; 3]], &mut || {
+                ControlFlow::Continue(())
+            })
             .unwrap();
         for (found, known) in found.iter().zip([0.0, 0.5, 0.5]) {
             assert!((found - known).abs() < 1e-5, "{found} {known}");

@@ -219,7 +219,10 @@ impl Search<'_> {
             checks: self.oracle.checks(),
         };
         let mut flow = || (self.on_step)(&step);
-        match self.goal.solve(master, variables, (&leaf.chosen, known), &mut flow) {
+        match self
+            .goal
+            .solve(master, variables, (&leaf.chosen, known), &mut flow)
+        {
             Outcome::Unknown => self.is_cancelled = true,
             Outcome::Best {
                 values,

@@ -271,7 +271,7 @@ fn power_of_ten(number: &Rational) -> Rational {
         power = power / &ten;
     }
     while &power * &ten <= *number {
-        power = power * &ten;
+        power *= &ten;
     }
     power
 }
