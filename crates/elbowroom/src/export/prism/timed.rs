@@ -378,7 +378,7 @@ impl Process<'_> {
         let ends = format!("o_{}", self.acts[act]);
         let hazards: Vec<String> = self.chances.ends[act]
             .iter()
-            .map(|hazard| choice(&self.ends(&ends, *hazard, "true")))
+            .map(|hazard| choice(&ends_of(&ends, *hazard, "true")))
             .collect();
         for (from, to) in runs(&hazards) {
             let _ = writeln!(
@@ -388,30 +388,6 @@ impl Process<'_> {
                 hazards[from]
             );
         }
-    }
-
-    /// The ways in which an action under way may end, with `otherwise` for that it does not.
-    fn ends(
-        &self,
-        name: &str,
-        (well, badly): (f64, f64),
-        otherwise: &str,
-    ) -> [(Rational, String); 3] {
-        let (well, badly) = (exact(well), exact(badly));
-        let rest = &(&Rational::ONE - &well) - &badly;
-        // What rounding has left over goes to the likelier one.
-        let is_over = rest.to_f64() < 1e-12;
-        let one = Rational::ONE;
-        let (well, badly, rest) = match (is_over, well >= badly) {
-            (false, _) => (well, badly, rest),
-            (true, true) => (&one - &badly, badly, Rational::ZERO),
-            (true, false) => (well.clone(), &one - &well, Rational::ZERO),
-        };
-        [
-            (well, format!("({name}'=1)")),
-            (badly, format!("({name}'=2)")),
-            (rest, otherwise.to_owned()),
-        ]
     }
 
     /// What a happening changes about an action.
@@ -446,7 +422,7 @@ impl Process<'_> {
                     Bound::Lower => begins,
                     // It may end in the very cell.
                     Bound::Upper => {
-                        let ways = self.ends(&ends, self.chances.ends[act][0], "");
+                        let ways = ends_of(&ends, self.chances.ends[act][0], "");
                         let ways = ways.map(|(p, end)| match end.as_str() {
                             "" => (p, begins.clone()),
                             // Unless it breaks off at once.
@@ -611,6 +587,29 @@ impl Process<'_> {
             Needs::Fact(_) => Formula::TRUE,
         }
     }
+}
+
+/// The ways in which an action under way may end, with `otherwise` for that it does not.
+fn ends_of(
+    name: &str,
+    (well, badly): (f64, f64),
+    otherwise: &str,
+) -> [(Rational, String); 3] {
+    let (well, badly) = (exact(well), exact(badly));
+    let rest = &(&Rational::ONE - &well) - &badly;
+    // What rounding has left over goes to the likelier one.
+    let is_over = rest.to_f64() < 1e-12;
+    let one = Rational::ONE;
+    let (well, badly, rest) = match (is_over, well >= badly) {
+        (false, _) => (well, badly, rest),
+        (true, true) => (&one - &badly, badly, Rational::ZERO),
+        (true, false) => (well.clone(), &one - &well, Rational::ZERO),
+    };
+    [
+        (well, format!("({name}'=1)")),
+        (badly, format!("({name}'=2)")),
+        (rest, otherwise.to_owned()),
+    ]
 }
 
 /// The facts that a condition reads.

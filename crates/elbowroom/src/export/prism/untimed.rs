@@ -1,5 +1,6 @@
 //! The process without time: see [`untimed`].
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
@@ -149,7 +150,7 @@ impl<'p> Process<'p> {
                 let facts = facts.filter(|(place, _)| bits & (1 << place) != 0);
                 let state = State {
                     facts: facts.map(|(_, fact)| *fact).collect(),
-                    values: Default::default(),
+                    values: BTreeMap::new(),
                 };
                 process.is_dead_end_at(&state, &running)
             });
