@@ -16,8 +16,7 @@ use elbowroom::execute::{Embedded, Execution, WholeRegion};
 use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom_execution::run::Verdict;
 use elbowroom_execution::{
-    Decided, Executor, Mission, Moment, Need, Outlook, PlanAnswer, Planned, Planner, Reason,
-    StepId,
+    Decided, Executor, Mission, Moment, Need, Outlook, PlanAnswer, Planned, Planner, Reason, StepId,
 };
 use elbowroom_laboratory::timed::{Policy, Settings};
 use elbowroom_model::{Situation, Task};
@@ -31,9 +30,18 @@ fn main() {
     // As the harness of tests does: only those whose name contains the words are run.
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<_> = words.iter().filter(|word| !word.starts_with('-')).collect();
-    println!("| world | executor | table | median | p99 | worst | decisions | goal reached | optimum |");
+    println!(
+        "| world | executor | table | median | p99 | worst | decisions | goal reached | optimum |"
+    );
     println!("|---|---|---:|---:|---:|---:|---:|---:|---:|");
-    for world in ["weld", "rendezvous", "door", "machines", "detour", "counter"] {
+    for world in [
+        "weld",
+        "rendezvous",
+        "door",
+        "machines",
+        "detour",
+        "counter",
+    ] {
         if words.is_empty() || words.iter().any(|word| world.contains(word.as_str())) {
             rows(world);
         }
@@ -120,7 +128,10 @@ impl Executor for Timed {
         let begin = Instant::now();
         let decided = self.inner.decide(moment);
         let took = begin.elapsed();
-        self.times.lock().expect("no thread has panicked").push(took);
+        self.times
+            .lock()
+            .expect("no thread has panicked")
+            .push(took);
         decided
     }
 

@@ -590,11 +590,7 @@ impl Process<'_> {
 }
 
 /// The ways in which an action under way may end, with `otherwise` for that it does not.
-fn ends_of(
-    name: &str,
-    (well, badly): (f64, f64),
-    otherwise: &str,
-) -> [(Rational, String); 3] {
+fn ends_of(name: &str, (well, badly): (f64, f64), otherwise: &str) -> [(Rational, String); 3] {
     let (well, badly) = (exact(well), exact(badly));
     let rest = &(&Rational::ONE - &well) - &badly;
     // What rounding has left over goes to the likelier one.
