@@ -220,16 +220,25 @@ pub fn repair(
                 because: vec![format!("{why}; repairs do not heed this")],
             }
         }
-        RepairRun::Stopped { bound, .. } => RepairFinding::None {
-            reason: match halt {
-                Some(Halt::TimeLimit) => "the time limit was reached".to_owned(),
-                Some(Halt::Cancelled) => "it was cancelled".to_owned(),
-                None => "there are too many cases to tell apart".to_owned(),
-            },
-            bound,
-        },
+        RepairRun::Stopped { bound, .. } => stopped(halt, bound),
     };
     Ok(outcome(request, finding, repaired))
+}
+
+/// What is known when somebody could wait no longer for a single step: nothing.
+pub fn so_far(request: &RepairRequest, halt: Halt) -> RepairOutcome {
+    outcome(request, stopped(Some(halt), Rational::ZERO), None)
+}
+
+fn stopped(halt: Option<Halt>, bound: Rational) -> RepairFinding {
+    RepairFinding::None {
+        reason: match halt {
+            Some(Halt::TimeLimit) => "the time limit was reached".to_owned(),
+            Some(Halt::Cancelled) => "it was cancelled".to_owned(),
+            None => "there are too many cases to tell apart".to_owned(),
+        },
+        bound,
+    }
 }
 
 /// A valid plan needs no other times.

@@ -3,10 +3,14 @@
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
 use std::time::Duration;
 
-use elbowroom::answers::repair::{Change, RepairFinding, RepairOutcome, RepairRequest, repair};
-use elbowroom::answers::{Halt, RequestError, Watcher};
+use elbowroom::answers::repair::{
+    Change, RepairFinding, RepairOutcome, RepairRequest, repair, so_far,
+};
+use elbowroom::answers::{RequestError, Watcher};
 use elbowroom::num::Rational;
 use elbowroom::pddl::write_plan;
 
@@ -20,6 +24,12 @@ use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::{Stopwatch, duration};
 
+/// How often the clock is looked at.
+const TICK: Duration = Duration::from_millis(10);
+/// How long the library has for an answer when its time is up.
+const GRACE: Duration = Duration::from_millis(50);
+/// As much as the main thread has.
+const STACK: usize = 64 << 20;
 /// So many digits of numbers are printed; `--json` has all.
 const DIGITS: u32 = 6;
 /// So many of the reasons are printed; `--json` has all.
@@ -47,7 +57,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
             input::any_plan(&task, &arguments.plan, output)?,
         )
     };
-    let outcome = repair(&request, &mut Watch { stopwatch }).map_err(refused)?;
+    let outcome = answer(&Arc::new(request), stopwatch).map_err(refused)?;
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {
@@ -82,18 +92,33 @@ fn refused(error: RequestError) -> Failure {
     }
 }
 
-/// Obeys the clock and Ctrl-C.
-struct Watch {
-    stopwatch: Stopwatch,
-}
-
-impl Watcher for Watch {
-    fn elapsed(&mut self) -> Duration {
-        self.stopwatch.elapsed()
+/// The answer, or that there is none, when its time is up. A single step of the library can take
+/// long, so it works on a thread of its own.
+fn answer(
+    request: &Arc<RepairRequest>,
+    mut stopwatch: Stopwatch,
+) -> Result<RepairOutcome, RequestError> {
+    let (sender, receiver) = mpsc::channel();
+    let (theirs, mut listener) = (Arc::clone(request), stopwatch.clone());
+    let worker = thread::Builder::new().stack_size(STACK).spawn(move || {
+        // Nobody listens any more when there was no time left.
+        let _ = sender.send(repair(&theirs, &mut listener));
+    });
+    if worker.is_err() {
+        // A system without threads to spare: the limit is kept between the steps.
+        return repair(request, &mut stopwatch);
     }
-
-    fn flow(&mut self) -> ControlFlow<Halt> {
-        self.stopwatch.flow()
+    loop {
+        match receiver.recv_timeout(TICK) {
+            Ok(answer) => return answer,
+            // A thread that is gone without an answer has panicked, which has ended the program.
+            Err(RecvTimeoutError::Disconnected) => return repair(request, &mut stopwatch),
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        if let ControlFlow::Break(halt) = stopwatch.flow() {
+            let last = receiver.recv_timeout(GRACE);
+            return last.unwrap_or_else(|_| Ok(so_far(request, halt)));
+        }
     }
 }
 
