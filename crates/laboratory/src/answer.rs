@@ -9,7 +9,7 @@ use elbowroom_report::table::Table;
 use elbowroom_text::{Diagnostics, Source};
 use serde::{Deserialize, Serialize};
 
-use crate::compare::{self, Experiment, ExperimentError, Part, Results, TrialId};
+use crate::compare::{self, Experiment, ExperimentError, Failures, Part, Results, TrialId};
 use crate::perturbed::{self, PerturbedError, PerturbedExperiment, PerturbedResults};
 use crate::record::TrialRecords;
 
@@ -41,7 +41,8 @@ pub enum CompareAnswer {
     Untimed(PerturbedResults),
 }
 
-/// Row, column, and the position of a kind of failure in that cell's most frequent ones.
+/// Row, column, and the position of a kind of failure in that cell's most frequent ones. In worlds
+/// without time, case, world and executor make the row, and the column is 0.
 pub type FailurePlace = (usize, usize, usize);
 
 /// A failed trial that stands for others.
@@ -104,7 +105,8 @@ impl AnyExperiment {
         }
     }
 
-    /// Makes a trial once more, for its trace (`docs/formats/trace.md`).
+    /// Makes a trial once more, for its trace (`docs/formats/trace.md`) or, in a world without time,
+    /// its course (`docs/formats/course.md`).
     ///
     /// # Errors
     /// When there is no such trial.
@@ -112,9 +114,7 @@ impl AnyExperiment {
         let (row, column, _) = failed.place;
         match self {
             Self::Timed(experiment) => Ok(compare::trace(experiment, (row, column), failed.id)?),
-            Self::Untimed(_) => Err(CompareError::Other(
-                "trials in worlds without time have no trace".to_owned(),
-            )),
+            Self::Untimed(experiment) => Ok(perturbed::course(experiment, row, failed.id.trial)?),
         }
     }
 
@@ -225,19 +225,28 @@ impl CompareAnswer {
     }
 
     /// The first trial of the most frequent kinds of failure: so many of each cell at most, and so many
-    /// of all, the most frequent first; none of worlds without time, whose runs have no trace.
+    /// of all, the most frequent first.
     pub fn failed_trials(&self, of_a_cell: usize, most: usize) -> Vec<FailedTrial> {
-        let Self::Timed(results) = self else {
-            return Vec::new();
-        };
         let mut found = Vec::new();
-        for (row, cells) in results.cells.iter().enumerate() {
-            for (column, cell) in cells.iter().enumerate() {
-                let kinds = cell.failures.kinds().into_iter().take(of_a_cell);
-                for (kind, failure) in kinds.enumerate() {
-                    let place = (row, column, kind);
-                    let id = failure.first;
-                    found.push((std::cmp::Reverse(failure.runs), FailedTrial { place, id }));
+        let mut look = |row: usize, column: usize, failures: &Failures| {
+            let kinds = failures.kinds().into_iter().take(of_a_cell);
+            for (kind, failure) in kinds.enumerate() {
+                let place = (row, column, kind);
+                let id = failure.first;
+                found.push((std::cmp::Reverse(failure.runs), FailedTrial { place, id }));
+            }
+        };
+        match self {
+            Self::Timed(results) => {
+                for (row, cells) in results.cells.iter().enumerate() {
+                    for (column, cell) in cells.iter().enumerate() {
+                        look(row, column, &cell.failures);
+                    }
+                }
+            }
+            Self::Untimed(results) => {
+                for (row, own) in results.rows.iter().enumerate() {
+                    look(row, 0, &own.failures);
                 }
             }
         }

@@ -5,6 +5,7 @@
 //! trial depend on the experiment's seed, the case and the trial's number only, so results do not
 //! depend on how many trials run at once.
 
+mod course;
 mod experiment;
 mod planner;
 mod results;
@@ -15,8 +16,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::untimed::{
-    ActionName, ExecutorName, Foresighted, Game, Limits, Means, NoForesight, Plans, Shortest,
-    Trial, UntimedExecutor, UntimedWorld, all_actions, trial,
+    ActionName, Course, ExecutorName, Foresighted, Game, Limits, Means, NoForesight, Plans,
+    Shortest, Trial, UntimedExecutor, UntimedWorld, all_actions, trial,
 };
 use crate::worlds::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
 use elbowroom_model::ground::Action;
@@ -26,6 +27,7 @@ use elbowroom_probability::Likelihoods;
 use elbowroom_probability::optimum::{self, DeadEnds};
 use rayon::prelude::*;
 
+pub use course::{StoredCourse, StoredPlan, StoredStep};
 pub use experiment::{
     Case, OptimumRules, PerturbedError, PerturbedExperiment, PlannerKind, Published, WorldKind,
 };
@@ -93,19 +95,11 @@ pub fn run_recorded(
         },
         records,
     };
-    let cases = (0..).zip(&experiment.cases);
-    let settings: Vec<Setting<'_>> = cases
-        .map(|(number, case)| Setting::new(experiment, case, number))
+    let settings: Vec<Setting<'_>> = (0..experiment.cases.len())
+        .map(|number| Setting::new(experiment, number))
         .collect::<Result<_, _>>()?;
-    let rows: Vec<_> = settings
-        .iter()
-        .flat_map(|setting| {
-            let worlds = experiment.worlds.iter();
-            worlds.flat_map(move |world| {
-                let executors = experiment.executors.iter();
-                executors.map(move |executor| (setting, *world, *executor))
-            })
-        })
+    let rows: Vec<_> = rows(experiment)
+        .map(|(case, world, executor)| (&settings[case], (world, executor)))
         .collect();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(part.jobs)
@@ -113,7 +107,7 @@ pub fn run_recorded(
         .map_err(|error| PerturbedError::other(format!("cannot start threads: {error}")))?;
     let rows: Result<Vec<Row>, _> = pool.install(|| {
         rows.par_iter()
-            .map(|(setting, world, executor)| setting.row(*world, *executor, part, &watch))
+            .map(|(setting, row)| setting.row(*row, part.numbers(), &watch, None))
             .collect()
     });
     let rows = rows?;
@@ -125,12 +119,47 @@ pub fn run_recorded(
     Ok(results)
 }
 
+/// The rows of the results, in order: case, world and executor.
+fn rows(
+    experiment: &PerturbedExperiment,
+) -> impl Iterator<Item = (usize, WorldKind, ExecutorName)> + '_ {
+    let cases = 0..experiment.cases.len();
+    cases.flat_map(move |case| {
+        experiment.worlds.iter().flat_map(move |world| {
+            let executors = experiment.executors.iter();
+            executors.map(move |executor| (case, *world, *executor))
+        })
+    })
+}
+
+/// Makes a trial once more, and writes down what is done in it: `docs/formats/course.md`. `row` is its
+/// row in the results.
+///
+/// # Errors
+/// When there is no such row; as for [`run`] otherwise.
+pub fn course(
+    experiment: &PerturbedExperiment,
+    row: usize,
+    trial: u64,
+) -> Result<String, PerturbedError> {
+    let (case, world, executor) = rows(experiment)
+        .nth(row)
+        .ok_or_else(|| PerturbedError::other("there is no such row"))?;
+    let setting = Setting::new(experiment, case)?;
+    let mut course = Course::default();
+    let watch = Watch {
+        goes_on: &|| true,
+        tell: &|| {},
+        records: None,
+    };
+    setting.row((world, executor), trial..=trial, &watch, Some(&mut course))?;
+    let stored = StoredCourse::new(&setting, (world, executor), trial, &course);
+    Ok(stored.text())
+}
+
 impl<'e> Setting<'e> {
-    fn new(
-        experiment: &'e PerturbedExperiment,
-        case: &'e Case,
-        number: u64,
-    ) -> Result<Self, PerturbedError> {
+    fn new(experiment: &'e PerturbedExperiment, number: usize) -> Result<Self, PerturbedError> {
+        let case = &experiment.cases[number];
         let domain = Source::new("domain", case.domain.as_str());
         let problem = Source::new("problem", case.problem.as_str());
         let (problem, _) = read_problem(&domain, &problem).map_err(PerturbedError::Text)?;
@@ -155,7 +184,7 @@ impl<'e> Setting<'e> {
         Ok(Self {
             experiment,
             case,
-            number,
+            number: number as u64,
             task: Arc::new(task),
             actions,
             likelihoods: Arc::new(likelihoods),
@@ -239,6 +268,13 @@ impl<'e> Setting<'e> {
         }
     }
 
+    /// The seed of a trial.
+    fn seed(&self, trial: u64) -> u64 {
+        (self.experiment.seed.wrapping_mul(1_000_003))
+            .wrapping_add(self.number.wrapping_mul(1_000_000_007))
+            .wrapping_add(trial)
+    }
+
     fn record(
         &self,
         world: WorldKind,
@@ -249,7 +285,7 @@ impl<'e> Setting<'e> {
         let place = |of: Option<usize>| of.unwrap_or_default();
         let mut worlds = self.experiment.worlds.iter();
         let mut executors = self.experiment.executors.iter();
-        let verdict = if made.is_success {
+        let verdict = if made.is_success() {
             "goal-reached"
         } else {
             "failed"
@@ -271,12 +307,21 @@ impl<'e> Setting<'e> {
         }
     }
 
+    /// The name of an action.
+    fn name(&self, (schema, arguments): &ActionName) -> String {
+        let mut actions = self.actions.iter();
+        let own = actions.find(|it| it.schema == *schema && it.arguments == *arguments);
+        own.map(|action| action.name.clone()).unwrap_or_default()
+    }
+
+    /// The trials of these numbers; what is done in the last of them is written down where somebody
+    /// wants to read it.
     fn row(
         &self,
-        world: WorldKind,
-        kind: ExecutorName,
-        part: Part,
+        (world, kind): (WorldKind, ExecutorName),
+        numbers: impl Iterator<Item = u64>,
         watch: &Watch<'_>,
+        course: Option<&mut Course>,
     ) -> Result<Row, PerturbedError> {
         if !(watch.goes_on)() {
             return Ok(Row::new(self.case, world, kind, None));
@@ -300,18 +345,17 @@ impl<'e> Setting<'e> {
                 rounds: self.experiment.rounds,
                 ..Limits::default()
             },
+            course,
         };
         let mut row = Row::new(self.case, world, kind, foresight.map(Foresighted::value));
         if world == WorldKind::Sound {
             row.other_optima = self.other_optima().clone()?;
         }
-        let first_seed = (self.experiment.seed.wrapping_mul(1_000_003))
-            .wrapping_add(self.number.wrapping_mul(1_000_000_007));
-        for number in part.numbers() {
+        for number in numbers {
             if !(watch.goes_on)() {
                 break;
             }
-            let seed = first_seed.wrapping_add(number);
+            let seed = self.seed(number);
             let mut sound;
             let mut published;
             let world: &mut dyn UntimedWorld =
@@ -326,7 +370,7 @@ impl<'e> Setting<'e> {
             if let Some(records) = watch.records {
                 records.add(self.record(kind_of_world, kind, (number, seed), &made));
             }
-            row.add(made);
+            row.add(number, &made, &|action| self.name(action));
             (watch.tell)();
         }
         Ok(row)

@@ -20,6 +20,7 @@
 //! [`Executor`](elbowroom_execution::Executor): there is nothing to wait for.
 
 mod adaptable;
+mod course;
 mod esterel;
 mod lookahead;
 mod published;
@@ -33,6 +34,7 @@ use elbowroom_model::problem::{ObjectId, SchemaId};
 use elbowroom_model::{State, Task, TimeTriggeredPlan};
 
 pub use adaptable::Adaptable;
+pub use course::{Course, Entry, StepKind};
 pub use elbowroom_probability::{Unsupported, all_actions};
 pub use esterel::Esterel;
 pub use lookahead::{Foresighted, NoForesight};
@@ -105,6 +107,8 @@ pub struct Game<'g> {
     pub dead_ends: Option<&'g DeadEndWatch<'g>>,
     /// When it is over in any case.
     pub limits: Limits,
+    /// Where the steps of the next trial are written down, if somebody wants to read them.
+    pub course: Option<&'g mut Course>,
 }
 
 /// Counts of the steps in a trial.
@@ -130,16 +134,57 @@ impl Tally {
     }
 }
 
+/// How a trial ended that did not succeed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Ending {
+    /// The planner found no plan.
+    NoPlan,
+    /// All rounds were used up by plans that did not lead to the goal.
+    RoundsUsedUp,
+    /// The last round was used up by a step that ended in a dead end.
+    DeadEnd,
+    /// All steps were used up.
+    StepsUsedUp,
+}
+
+impl Ending {
+    /// The word in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoPlan => "no-plan",
+            Self::RoundsUsedUp => "rounds-used-up",
+            Self::DeadEnd => "dead-end",
+            Self::StepsUsedUp => "steps-used-up",
+        }
+    }
+}
+
+/// How a trial failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Lost {
+    /// How it ended.
+    pub ending: Ending,
+    /// Its last step; `None` if there was none.
+    pub last: Option<(StepKind, ActionName)>,
+}
+
 /// The result of a trial.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trial {
-    /// Whether the goal held when an execution ended.
-    pub is_success: bool,
+    /// How it failed; `None` if the goal held when an execution ended.
+    pub lost: Option<Lost>,
     /// Executions without success: 0 if the first plan led to the goal. Where the trial has failed,
     /// all rounds.
     pub replans: usize,
     /// The work done.
     pub tally: Tally,
+}
+
+impl Trial {
+    /// Whether the goal held when an execution ended.
+    pub fn is_success(&self) -> bool {
+        self.lost.is_none()
+    }
 }
 
 /// A world as an executor is given it: it counts what is done.
@@ -155,6 +200,9 @@ pub struct Stage<'w> {
     rounds_left: usize,
     is_dead_end: bool,
     is_lost: bool,
+    last: Option<(StepKind, ActionName)>,
+    /// What is written down, and the state before the step that is being made.
+    course: Option<(&'w mut Course, State)>,
 }
 
 impl Stage<'_> {
@@ -201,7 +249,12 @@ impl Stage<'_> {
         if self.dead_ends.is_some() && has_started && action.durative().is_some() {
             self.running.push(name_of(action));
         }
-        self.look_out();
+        let kind = if has_started {
+            StepKind::Started
+        } else {
+            StepKind::NotStarted
+        };
+        self.done(kind, action);
         has_started
     }
 
@@ -213,13 +266,29 @@ impl Stage<'_> {
             let name = name_of(action);
             self.running.retain(|other| *other != name);
         }
-        self.look_out();
+        self.done(StepKind::Ended, action);
     }
 
     /// Lets an action go that has started: it will not be ended. That is no step.
     pub fn let_go(&mut self, action: &Action) {
         let name = name_of(action);
         self.running.retain(|other| *other != name);
+    }
+
+    /// After a step.
+    fn done(&mut self, kind: StepKind, action: &Action) {
+        self.look_out();
+        // In place: there are very many steps, and few of them are the last.
+        let (last_kind, (schema, arguments)) = self
+            .last
+            .get_or_insert_with(|| (kind, (action.schema, Vec::new())));
+        (*last_kind, *schema) = (kind, action.schema);
+        arguments.clone_from(&action.arguments);
+        if let Some((course, before)) = &mut self.course {
+            let after = self.world.state();
+            course.step(kind, action, (before, after), self.is_dead_end);
+            before.clone_from(after);
+        }
     }
 
     /// Asks whether the step has ended in a dead end, and what that costs.
@@ -246,6 +315,10 @@ pub fn trial(
     executor: &mut dyn UntimedExecutor,
 ) -> Trial {
     executor.begin();
+    if let Some(course) = game.course.as_deref_mut() {
+        *course = Course::default();
+    }
+    let before = game.course.as_ref().map(|_| world.state().clone());
     let mut stage = Stage {
         task: game.task,
         world,
@@ -256,27 +329,47 @@ pub fn trial(
         rounds_left: game.limits.rounds,
         is_dead_end: false,
         is_lost: false,
+        last: None,
+        course: game.course.as_deref_mut().zip(before),
     };
     let mut executions = 0;
-    while stage.rounds_left > 0 && !stage.is_over() {
+    let ending = loop {
+        if stage.is_lost {
+            break Ending::DeadEnd;
+        }
+        if stage.is_over() {
+            break Ending::StepsUsedUp;
+        }
+        if stage.rounds_left == 0 {
+            break Ending::RoundsUsedUp;
+        }
         let Some(plan) = (game.plans)(stage.state()) else {
-            break;
+            break Ending::NoPlan;
         };
+        if let Some((course, _)) = &mut stage.course {
+            course.plan(&plan);
+        }
         stage.rounds_left -= 1;
         stage.running.clear();
         stage.is_dead_end = false;
         executor.execute(&plan, &mut stage);
         if stage.is_goal() {
             return Trial {
-                is_success: true,
+                lost: None,
                 replans: executions,
                 tally: stage.tally,
             };
         }
         executions += 1;
+    };
+    if let Some((course, _)) = &mut stage.course {
+        course.ending = Some(ending);
     }
     Trial {
-        is_success: false,
+        lost: Some(Lost {
+            ending,
+            last: stage.last,
+        }),
         replans: game.limits.rounds,
         tally: stage.tally,
     }

@@ -6,8 +6,10 @@ use std::path::Path;
 
 use elbowroom_laboratory::compare::Part;
 use elbowroom_laboratory::perturbed::{
-    self, OptimumRules, PerturbedExperiment, PerturbedResults, PlannerKind, Row, WorldKind,
+    self, OptimumRules, PerturbedExperiment, PerturbedResults, PlannerKind, Row, StoredCourse,
+    WorldKind,
 };
+use elbowroom_laboratory::record::TrialRecords;
 
 /// Without optima by other rules, which take long.
 fn experiment(name: &str) -> PerturbedExperiment {
@@ -228,4 +230,71 @@ fn with_plans_of_the_embedded_planner_nobody_succeeds_more_often_than_can_be() {
             assert!(share > 0.05, "{row:?}");
         }
     }
+}
+
+#[test]
+fn failures_are_counted_by_kind_and_the_first_trial_of_each_can_be_made_once_more() {
+    let mut experiment = experiment("olisipo_sf3.toml");
+    experiment.cases.truncate(2);
+    let records = TrialRecords::default();
+    let made =
+        perturbed::run_recorded(&experiment, part(60, 0), Some(&records), &|_| true).unwrap();
+    let mut endings = std::collections::BTreeSet::new();
+    for (place, row) in made.rows.iter().enumerate() {
+        let kinds = row.failures.kinds();
+        let failed: u64 = kinds.iter().map(|kind| kind.runs).sum();
+        assert_eq!(failed, row.success.count - row.success.successes);
+        for kind in kinds {
+            let trial = kind.first.trial;
+            let text = perturbed::course(&experiment, place, trial).unwrap();
+            let course = StoredCourse::read(&text).unwrap();
+            assert_eq!(course.text(), text);
+            assert_eq!((&course.ended, course.trial), (&kind.verdict, trial));
+            assert_eq!((&course.case, course.world), (&row.case, row.world));
+            assert_eq!(course.executor, row.executor);
+            let last = course.plans.iter().flat_map(|plan| &plan.steps).last();
+            assert_eq!(last.map(|step| &step.action), kind.action.as_ref());
+            let cause = last.map(|step| match step.step.as_str() {
+                "started" => "after-start",
+                "not-started" => "start-failed",
+                _ => "after-end",
+            });
+            assert_eq!(cause, kind.cause.as_deref());
+            endings.insert(course.ended);
+        }
+    }
+    assert!(endings.len() > 1, "{endings:?}");
+    // Trials that reached the goal do so again.
+    let table = records.table().csv();
+    assert!(table.contains("goal-reached"));
+    let row = &made.rows[0];
+    let failed: Vec<u64> = (0..60)
+        .filter(|trial| {
+            let text = perturbed::course(&experiment, 0, *trial).unwrap();
+            StoredCourse::read(&text).unwrap().ended != "goal-reached"
+        })
+        .collect();
+    assert_eq!(
+        failed.len() as u64,
+        row.success.count - row.success.successes
+    );
+    assert!(perturbed::course(&experiment, made.rows.len(), 0).is_err());
+}
+
+#[test]
+fn kinds_of_failure_are_the_same_whether_an_experiment_is_made_at_once_or_in_parts() {
+    let mut experiment = experiment("olisipo_af3.toml");
+    experiment.cases.truncate(1);
+    let whole = perturbed::run(&experiment, part(40, 0), &|_| true).unwrap();
+    let parts: Vec<PerturbedResults> = (0..3)
+        .map(|shard| {
+            let part = Part {
+                shard,
+                shards: 3,
+                ..part(40, 1)
+            };
+            perturbed::run(&experiment, part, &|_| true).unwrap()
+        })
+        .collect();
+    assert_eq!(PerturbedResults::merged(&parts).unwrap(), whole);
 }

@@ -345,10 +345,8 @@ pub struct Slider {
     pub quantity: String,
     /// The value as planned.
     pub nominal: String,
-    /// The lower end of its interval in the envelope, in words.
-    pub lower: String,
-    /// The upper end.
-    pub upper: String,
+    /// From where to where it may go, in words.
+    pub room: String,
     /// Where the slider begins.
     pub from: String,
     /// Where it ends.

@@ -1,17 +1,19 @@
-//! An experiment: rates with intervals, paired comparisons, and how trials fail.
+//! An experiment on a clock: rates with intervals, paired comparisons, and how trials fail.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom::report::statistics::{Mean, Proportion, mcnemar};
 use elbowroom_laboratory::answer::FailurePlace;
 use elbowroom_laboratory::compare::{Cell, Results};
-use elbowroom_laboratory::perturbed::PerturbedResults;
 
 use crate::document::{Document, Rate, RateGroup, Rates, Section, Table, Text, Tone, Verdict};
-use crate::plan::word;
 
 /// The meaning of the intervals.
-const INTERVALS: &str = "The share of runs that reached the goal, with Wilson's 95 % interval.";
+pub(crate) const INTERVALS: &str =
+    "The share of runs that reached the goal, with Wilson's 95 % interval.";
+
+/// What buttons in a table of failures do.
+pub(crate) const BUTTON: &str = " The button of a row shows the first such trial.";
 
 /// The pages of some failed trials, by row, column and kind of failure.
 pub(crate) type Trials = BTreeMap<FailurePlace, Document>;
@@ -97,16 +99,16 @@ fn failures(results: &Results, mut trials: Trials) -> (Option<Section>, Vec<Docu
             }
         }
     }
-    let note = if more.is_empty() {
+    let mut note =
         "Failed runs, by what the last plan was given up for, and the action that this was about."
-    } else {
-        "Failed runs, by what the last plan was given up for, and the action that this was about. The \
-         button of a row shows the first such trial."
-    };
+            .to_owned();
+    if !more.is_empty() {
+        note.push_str(BUTTON);
+    }
     let section = (!rows.is_empty()).then(|| {
         Section::Table(Table {
             heading: "Where runs fail".to_owned(),
-            note: note.to_owned(),
+            note,
             columns: columns
                 .map(|(name, is_number)| (name.to_owned(), is_number))
                 .to_vec(),
@@ -118,78 +120,7 @@ fn failures(results: &Results, mut trials: Trials) -> (Option<Section>, Vec<Docu
     (section, more)
 }
 
-/// The page about an experiment in worlds without time.
-pub(crate) fn untimed(results: &PerturbedResults) -> Document {
-    let mut groups: Vec<RateGroup> = Vec::new();
-    let mut rows: Vec<Vec<Text>> = Vec::new();
-    for row in &results.rows {
-        let name = format!("{}, {}", row.case, word(&row.world));
-        let published = row.published.and_then(Proportion::share);
-        let rate = rate(word(&row.executor), row.success, published.or(row.optimum));
-        rows.push(vec![
-            row.case.as_str().into(),
-            word(&row.world).into(),
-            rate.name.as_str().into(),
-            rate.words.as_str().into(),
-            row.published
-                .and_then(Proportion::share)
-                .map(percent)
-                .unwrap_or_default()
-                .into(),
-            row.optimum.map(percent).unwrap_or_default().into(),
-            mean(row.replans).into(),
-        ]);
-        match groups.last_mut().filter(|group| group.name == name) {
-            Some(group) => group.rates.push(rate),
-            None => groups.push(RateGroup {
-                name,
-                rates: vec![rate],
-            }),
-        }
-    }
-    let columns = [
-        ("case", false),
-        ("world", false),
-        ("executor", false),
-        ("success", true),
-        ("published", true),
-        ("optimum", true),
-        ("new plans", true),
-    ];
-    let sections = vec![
-        Section::Rates(Rates {
-            heading: "Trials that succeeded".to_owned(),
-            note: format!(
-                "{INTERVALS} The line marks the published share or, where there is none, the \
-                 greatest possible one, as far as they are known."
-            ),
-            groups,
-        }),
-        Section::Table(Table {
-            heading: "All rows".to_owned(),
-            columns: columns
-                .map(|(name, is_number)| (name.to_owned(), is_number))
-                .to_vec(),
-            rows,
-            ..Table::default()
-        }),
-    ];
-    let trials = results
-        .rows
-        .iter()
-        .map(|row| row.success.count)
-        .sum::<u64>();
-    let facts = facts(
-        results.trials,
-        results.shards,
-        &results.parts,
-        &results.fingerprint,
-    );
-    let made = made(trials, "trials", results.is_interrupted);
-    document(&results.title, made, facts, sections)
-}
-
-fn document(
+pub(crate) fn document(
     title: &str,
     made: String,
     facts: Vec<(String, String)>,
@@ -210,14 +141,19 @@ fn document(
 }
 
 /// How many were made.
-fn made(count: u64, what: &str, is_interrupted: bool) -> String {
+pub(crate) fn made(count: u64, what: &str, is_interrupted: bool) -> String {
     if is_interrupted {
         return format!("{count} {what}; the experiment was interrupted before all were made.");
     }
     format!("{count} {what}.")
 }
 
-fn facts(trials: u64, shards: u64, parts: &[u64], fingerprint: &str) -> Vec<(String, String)> {
+pub(crate) fn facts(
+    trials: u64,
+    shards: u64,
+    parts: &[u64],
+    fingerprint: &str,
+) -> Vec<(String, String)> {
     let mut facts = vec![
         ("trials of each".to_owned(), trials.to_string()),
         ("fingerprint".to_owned(), fingerprint.to_owned()),
@@ -261,7 +197,7 @@ fn group(results: &Results, column: usize) -> RateGroup {
     }
 }
 
-fn rate(name: String, success: Proportion, mark: Option<f64>) -> Rate {
+pub(crate) fn rate(name: String, success: Proportion, mark: Option<f64>) -> Rate {
     let share = success.share().zip(success.wilson());
     Rate {
         name,
@@ -281,11 +217,11 @@ fn rate(name: String, success: Proportion, mark: Option<f64>) -> Rate {
     }
 }
 
-fn percent(share: f64) -> String {
+pub(crate) fn percent(share: f64) -> String {
     format!("{:.1} %", share * 100.0)
 }
 
-fn mean(mean: Mean) -> String {
+pub(crate) fn mean(mean: Mean) -> String {
     mean.value()
         .map_or_else(|| "-".to_owned(), |mean| format!("{mean:.2}"))
 }

@@ -11,7 +11,7 @@
 //! shows them as text.
 //!
 //! - [`document`](mod@document): what a page shows, as data.
-//! - `plan`, `region`, `run`, `experiment`: from answers, traces and results to documents.
+//! - `plan`, `region`, `run`, `experiment`, `perturbed`: from answers, traces and results to documents.
 //! - `lanes`: on which lane of a chart an action belongs.
 //! - `html`: the document as a file.
 //! - `perfetto`, `mcap`: a run for other viewers.
@@ -39,6 +39,7 @@ mod html;
 mod lanes;
 mod mcap;
 mod perfetto;
+mod perturbed;
 mod plan;
 mod region;
 mod run;
@@ -48,7 +49,7 @@ use elbowroom::execute::RunSpec;
 use elbowroom::report::trace::Stored;
 use elbowroom_laboratory::answer::FailurePlace;
 use elbowroom_laboratory::compare::Results;
-use elbowroom_laboratory::perturbed::PerturbedResults;
+use elbowroom_laboratory::perturbed::{PerturbedResults, StoredCourse};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
@@ -110,12 +111,21 @@ pub fn experiment_page(
     text: &str,
     traces: &[(FailurePlace, String, String)],
 ) -> Result<String, PageError> {
-    let results = Results::read(text).map_err(|error| damaged(name, &error))?;
     let mut trials = experiment::Trials::new();
     for (place, name, text) in traces {
         trials.insert(*place, document(name, text)?);
     }
-    Ok(html::html(&experiment::timed(&results, trials)))
+    let page = if format(text).as_deref() == Some(PERTURBED) {
+        perturbed::untimed(&perturbed_results(name, text)?, trials)
+    } else {
+        let results = Results::read(text).map_err(|error| damaged(name, &error))?;
+        experiment::timed(&results, trials)
+    };
+    Ok(html::html(&page))
+}
+
+fn perturbed_results(name: &str, text: &str) -> Result<PerturbedResults, PageError> {
+    PerturbedResults::read(text).map_err(|error| damaged(name, &error))
 }
 
 /// The page about a run that goes on, from its trace so far. It follows the run by what its server
@@ -141,6 +151,7 @@ pub fn live_document(name: &str, text: &str) -> Result<Document, PageError> {
 }
 
 const TRACE: &str = "elbowroom-trace";
+const PERTURBED: &str = "elbowroom-perturbed-results";
 
 fn of_trace(name: &str, text: &str, record: run::Record) -> Result<Document, PageError> {
     let stored = Stored::read(text).map_err(|error| damaged(name, &error))?;
@@ -190,10 +201,13 @@ pub fn document(name: &str, text: &str) -> Result<Document, PageError> {
             let results = Results::read(text).map_err(|error| damaged(name, &error))?;
             Ok(experiment::timed(&results, experiment::Trials::new()))
         }
-        Some("elbowroom-perturbed-results") => {
-            let results = PerturbedResults::read(text);
-            let results = results.map_err(|error| damaged(name, &error))?;
-            Ok(experiment::untimed(&results))
+        Some(PERTURBED) => {
+            let results = perturbed_results(name, text)?;
+            Ok(perturbed::untimed(&results, experiment::Trials::new()))
+        }
+        Some("elbowroom-course") => {
+            let course = StoredCourse::read(text).map_err(|error| damaged(name, &error))?;
+            Ok(perturbed::course(&course))
         }
         Some(format) => Err(PageError::OtherFormat {
             name: name.to_owned(),

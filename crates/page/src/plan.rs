@@ -17,10 +17,10 @@ use crate::document::{
     Bar, Chart, Document, Mark, Prose, Section, Table, Text, Texts, Tone, Verdict,
 };
 use crate::lanes::{Lanes, Occupant, lanes};
-use sliders::sliders;
-use tables::{ends, ranges, rooms, times};
+use tables::{ends, ranges, rooms};
 
-pub(crate) use tables::quantities;
+pub(crate) use sliders::{Reach, sliders};
+pub(crate) use tables::{quantities, times};
 
 /// The page about an envelope.
 pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
@@ -45,13 +45,19 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
             facts.push(("boxes checked".to_owned(), checks.to_string()));
             if let Some(timeline) = timeline {
                 sections.push(Section::Chart(chart(timeline, parameters, &mut texts)));
+                let reaches: Vec<Reach<'_>> =
+                    parameters.iter().map(|it| Reach::of(&it.range)).collect();
                 let sliders = inequalities
                     .as_ref()
-                    .and_then(|it| sliders(timeline, parameters, it));
+                    .and_then(|it| sliders(timeline, &reaches, it));
                 sections.extend(sliders.map(Section::Sliders));
             }
             sections.push(Section::Table(rooms(parameters, &mut texts)));
-            sections.extend(timeline.as_ref().map(|it| Section::Table(times(it))));
+            sections.extend(
+                timeline
+                    .as_ref()
+                    .map(|it| Section::Table(times(it, "in the envelope"))),
+            );
             good(match stop {
                 Stop::Converged => {
                     "The plan works as long as each quantity stays inside its interval, whatever the others do in theirs."
@@ -130,7 +136,7 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
                 ("", step.action.as_str(), step.start.clone(), end)
             }));
             sections.push(Section::Chart(chart(&timeline, &[], &mut texts)));
-            sections.push(Section::Table(times(&timeline)));
+            sections.push(Section::Table(times(&timeline, "")));
             if let Some(repaired) = repaired {
                 let heading = "What was wrong with the planner's own times";
                 sections.push(prose(heading, vec![repaired.clone()]));
@@ -211,7 +217,7 @@ fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
 }
 
 /// The plan as a chart.
-fn chart(timeline: &Timeline, rooms: &[Room], texts: &mut Texts) -> Chart {
+pub(crate) fn chart(timeline: &Timeline, rooms: &[Room], texts: &mut Texts) -> Chart {
     let by_name: BTreeMap<&str, &Room> = rooms
         .iter()
         .map(|room| (room.range.quantity.name.as_str(), room))

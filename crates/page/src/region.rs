@@ -1,7 +1,10 @@
 //! All values for which a plan works.
 
+mod alone;
+
+use elbowroom::answers::envelope::Quantity;
 use elbowroom::answers::region::{
-    BoxAnswer, Measure, PieceAnswer, RegionAnswer, RegionFinding, Share,
+    BoxAnswer, Measure, PieceAnswer, RegionAnswer, RegionFinding, RowAnswer, Share,
 };
 use elbowroom::num::{End, Rational};
 use elbowroom::report::short::nearest;
@@ -10,7 +13,8 @@ use std::collections::BTreeMap;
 use crate::document::{
     Document, Plane, PlaneBox, PlaneQuantity, PlaneRow, Section, Table, Texts, Tone, Verdict,
 };
-use crate::plan::{bad, good, name_of, prose, quantities};
+use crate::plan::{Reach, bad, chart, good, name_of, prose, quantities, sliders, times};
+use alone::{Alone, reach};
 
 /// More quantities than anybody would look through.
 const MOST: usize = 100;
@@ -32,16 +36,34 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
             missing,
             boxes,
             measure,
+            timeline,
+            inequalities,
         } => {
+            if let Some(timeline) = timeline {
+                sections.push(Section::Chart(chart(timeline, &[], &mut texts)));
+                let alone: Vec<Alone> = (0..parameters.len())
+                    .map(|place| Alone::of(parameters, pieces, place))
+                    .collect();
+                let reaches: Vec<Reach<'_>> = alone.iter().zip(parameters).map(reach).collect();
+                let sliders = inequalities
+                    .as_ref()
+                    .and_then(|it| sliders(timeline, &reaches, it));
+                sections.extend(sliders.map(Section::Sliders));
+            }
+            if !parameters.is_empty() && parameters.len() <= MOST && !pieces.is_empty() {
+                sections.push(Section::Plane(plane(parameters, pieces, boxes)));
+            }
             if let Some(measure) = measure {
                 facts.push(("volume".to_owned(), volume(measure)));
                 sections.extend(shares(boxes));
             }
-            if !parameters.is_empty() && parameters.len() <= MOST && !pieces.is_empty() {
-                sections.insert(0, Section::Plane(plane(parameters, pieces, boxes)));
-            }
-            sections.push(Section::Table(inequalities(pieces, &mut texts)));
+            sections.push(Section::Table(rows(pieces, &mut texts)));
             sections.push(Section::Table(quantities(parameters)));
+            sections.extend(
+                timeline
+                    .as_ref()
+                    .map(|it| Section::Table(times(it, "with which the plan works"))),
+            );
             match (&pieces[..], missing) {
                 ([], _) => bad("The plan works with no values."),
                 (_, Some(missing)) => good(&format!(
@@ -77,18 +99,14 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
     }
 }
 
-fn plane(
-    parameters: &[elbowroom::answers::envelope::Quantity],
-    pieces: &[PieceAnswer],
-    boxes: &[BoxAnswer],
-) -> Plane {
+fn plane(parameters: &[Quantity], pieces: &[PieceAnswer], boxes: &[BoxAnswer]) -> Plane {
     let places: BTreeMap<&str, usize> = parameters
         .iter()
         .enumerate()
         .map(|(place, it)| (it.name.as_str(), place))
         .collect();
     let piece = |piece: &PieceAnswer| {
-        let row = |row: &elbowroom::answers::region::RowAnswer| PlaneRow {
+        let row = |row: &RowAnswer| PlaneRow {
             factors: row
                 .factors
                 .iter()
@@ -112,7 +130,7 @@ fn plane(
     let boxes: Vec<PlaneBox> = boxes.iter().map(drawn).collect();
     let pieces: Vec<Vec<PlaneRow>> = pieces.iter().map(piece).collect();
     let all: Vec<f64> = parameters.iter().map(|it| it.nominal.to_f64()).collect();
-    let quantity = |(place, parameter): (usize, &elbowroom::answers::envelope::Quantity)| {
+    let quantity = |(place, parameter): (usize, &Quantity)| {
         let nominal = parameter.nominal.to_f64();
         let size = nominal.abs().max(1.0);
         // As far as the boxes reach, and as the plan works with the others as planned, if that is
@@ -167,7 +185,7 @@ fn box_name(name: &str) -> &str {
     }
 }
 
-fn inequalities(pieces: &[PieceAnswer], texts: &mut Texts) -> Table {
+fn rows(pieces: &[PieceAnswer], texts: &mut Texts) -> Table {
     let several = pieces.len() > 1;
     let mut rows = Vec::new();
     for (index, piece) in pieces.iter().enumerate() {

@@ -234,6 +234,8 @@ fn what_is_no_document_is_refused_with_one_sentence() {
         "run",
         "results",
         "perturbed-results",
+        "course",
+        "region",
         "trace",
     ] {
         let text = format!("{{\"format\": \"elbowroom-{format}\", \"version\": 1}}");

@@ -14,7 +14,7 @@ use elbowroom_plan::{DecoupledEnvelope, ParameterKind, ParametrizedPlan, Side};
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::envelope::{self, Quantity, quantities};
+use super::envelope::{self, Inequalities, Quantity, Timeline, quantities};
 use super::{EnvelopeRequest, Exact, RequestError, Version, ViolationAnswer, Watcher, exact};
 use crate::explain::Explainer;
 use crate::flow::FlowError;
@@ -89,6 +89,13 @@ pub enum RegionFinding {
         /// The volume, if it was asked for and there is one.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         measure: Option<Measure>,
+        /// The plan in time, as planned, with the times for all values in the ranges of the
+        /// parameters. `None` in documents of earlier versions of this program.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        timeline: Option<Timeline>,
+        /// What every schedule satisfies; `None` if that is too much to write out.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        inequalities: Option<Inequalities>,
     },
     /// The judge rejects the plan as it stands.
     Invalid {
@@ -211,6 +218,8 @@ pub fn region(
                 missing: found.missing.as_ref().map(ToString::to_string),
                 boxes,
                 measure,
+                timeline: Timeline::of(task, &plan, &ranges),
+                inequalities: Inequalities::of(&explainer),
             }
         }
         Err(ExactError::NotLinear {

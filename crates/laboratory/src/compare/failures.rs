@@ -44,7 +44,7 @@ impl Failures {
         kinds
     }
 
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
@@ -64,14 +64,14 @@ impl Failures {
         });
     }
 
-    pub(super) fn merge(&mut self, other: &Self) {
+    pub(crate) fn merge(&mut self, other: &Self) {
         for failure in &other.0 {
             self.add(failure);
         }
     }
 
     /// Kinds are kept in order, so that the same runs give the same list whoever counts them.
-    fn add(&mut self, failure: &Failure) {
+    pub(crate) fn add(&mut self, failure: &Failure) {
         match self.0.binary_search_by(|own| own.key().cmp(&failure.key())) {
             Ok(place) => {
                 let own = &mut self.0[place];

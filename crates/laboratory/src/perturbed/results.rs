@@ -7,9 +7,9 @@ use elbowroom_report::statistics::{Mean, Proportion};
 use serde::{Deserialize, Serialize};
 
 use super::{Case, OptimumRules, PerturbedError, PerturbedExperiment, WorldKind};
-use crate::compare::Part;
 use crate::compare::parts::{self, Partial, fingerprint};
-use crate::untimed::ExecutorName;
+use crate::compare::{Failure, Failures, Part, TrialId};
+use crate::untimed::{ActionName, ExecutorName, StepKind};
 
 /// Counts by case, world and executor. Everything is a sum, so parts add up exactly, in any order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -137,11 +137,23 @@ pub struct Row {
     /// The same by other rules, if the experiment asks for it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub other_optima: BTreeMap<OptimumRules, f64>,
+    /// The trials that failed: how they ended, and their last step.
+    #[serde(default, skip_serializing_if = "Failures::is_empty")]
+    pub failures: Failures,
 }
 
 /// Rounded to as many digits as are read back as they were written.
 pub(super) fn rounded(probability: f64) -> f64 {
     (probability * 1e12).round() / 1e12
+}
+
+/// What the last step was, as the cause of a failure.
+fn after(step: StepKind) -> &'static str {
+    match step {
+        StepKind::Started => "after-start",
+        StepKind::NotStarted => "start-failed",
+        StepKind::Ended => "after-end",
+    }
 }
 
 /// Means of what was done.
@@ -182,12 +194,27 @@ impl Row {
             published,
             optimum: optimum.map(rounded),
             other_optima: BTreeMap::new(),
+            failures: Failures::default(),
         }
     }
 
-    pub(super) fn add(&mut self, trial: Trial) {
-        self.success.add(trial.is_success);
-        let work = if trial.is_success {
+    /// The trial of that number; `name` gives the name of an action.
+    pub(super) fn add(&mut self, number: u64, trial: &Trial, name: &dyn Fn(&ActionName) -> String) {
+        if let Some(lost) = &trial.lost {
+            let last = lost.last.as_ref();
+            self.failures.add(&Failure {
+                verdict: lost.ending.name().to_owned(),
+                cause: last.map(|(kind, _)| after(*kind).to_owned()),
+                action: last.map(|(_, action)| name(action)),
+                runs: 1,
+                first: TrialId {
+                    problem: 0,
+                    trial: number,
+                },
+            });
+        }
+        self.success.add(trial.is_success());
+        let work = if trial.is_success() {
             self.replans.add(trial.replans as u64);
             &mut self.succeeded
         } else {
@@ -205,6 +232,7 @@ impl Row {
     fn merge(&mut self, other: &Self) {
         self.success.merge(other.success);
         self.replans.merge(other.replans);
+        self.failures.merge(&other.failures);
         for (mine, theirs) in [
             (&mut self.succeeded, &other.succeeded),
             (&mut self.failed, &other.failed),

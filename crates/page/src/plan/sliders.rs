@@ -1,9 +1,9 @@
-//! Quantities to change on the page of an envelope.
+//! Quantities to change on the page of an envelope, or of a region.
 
 use std::collections::BTreeMap;
 
 use elbowroom::answers::envelope::timeline::Timeline;
-use elbowroom::answers::envelope::{Inequalities, Room};
+use elbowroom::answers::envelope::{Inequalities, Quantity, Range};
 use elbowroom::num::Rational;
 
 use super::tables::ends;
@@ -12,13 +12,34 @@ use crate::document::{Slider, Sliders};
 /// More sliders than anybody would look through.
 const MOST: usize = 100;
 
+/// A quantity, as far as it may go, and that in words. An interval without ends has no words.
+pub(crate) struct Reach<'a> {
+    pub(crate) quantity: &'a Quantity,
+    pub(crate) lower: Option<&'a Rational>,
+    pub(crate) upper: Option<&'a Rational>,
+    pub(crate) words: String,
+}
+
+impl<'a> Reach<'a> {
+    /// Its interval in the envelope.
+    pub(super) fn of(range: &'a Range) -> Self {
+        let (lower, upper) = ends(range);
+        Self {
+            quantity: &range.quantity,
+            lower: range.lower.value(),
+            upper: range.upper.value(),
+            words: format!("in the envelope: {lower} to {upper}"),
+        }
+    }
+}
+
 /// Sliders for the quantities of a plan; `None` if there are none, or too many.
-pub(super) fn sliders(
+pub(crate) fn sliders(
     timeline: &Timeline,
-    rooms: &[Room],
+    reaches: &[Reach<'_>],
     inequalities: &Inequalities,
 ) -> Option<Sliders> {
-    if rooms.is_empty() || rooms.len() > MOST {
+    if reaches.is_empty() || reaches.len() > MOST {
         return None;
     }
     let labels = inequalities.times.iter().enumerate();
@@ -37,7 +58,7 @@ pub(super) fn sliders(
         note: "Move a slider: the page works out exactly whether the plan still works when each quantity \
                takes the value chosen here, and draws the plan at these values above."
             .to_owned(),
-        sliders: rooms.iter().map(slider).collect(),
+        sliders: reaches.iter().map(slider).collect(),
         bars: bars.collect::<Option<_>>()?,
         names: timeline
             .actions
@@ -50,8 +71,8 @@ pub(super) fn sliders(
 
 /// From half to five times the nominal value or, if the envelope reaches further, a bit further
 /// than that.
-fn slider(room: &Room) -> Slider {
-    let nominal = &room.range.quantity.nominal;
+fn slider(reach: &Reach<'_>) -> Slider {
+    let nominal = &reach.quantity.nominal;
     let half = Rational::new(1, 2);
     let size = nominal.abs();
     let size = if size.is_zero() { Rational::ONE } else { size };
@@ -62,7 +83,7 @@ fn slider(room: &Room) -> Slider {
         Some(end + &margin * side)
     };
     let from = nominal - &size * &half;
-    let from = match wider(room.range.lower.value(), Rational::from(-1)) {
+    let from = match wider(reach.lower, Rational::from(-1)) {
         Some(end) if end < from => end,
         _ => from,
     };
@@ -72,20 +93,18 @@ fn slider(room: &Room) -> Slider {
         Rational::ZERO
     };
     let to = nominal + &size * &Rational::from(4);
-    let to = match wider(room.range.upper.value(), Rational::ONE) {
+    let to = match wider(reach.upper, Rational::ONE) {
         Some(end) if end > to => end,
         _ => to,
     };
     let step = step(&((&to - &from) * Rational::new(1, 500)));
     // Whole steps from zero, so that what is read is what is checked.
     let down = |value: &Rational| (value / &step).floor() * &step;
-    let (lower, upper) = ends(&room.range);
     Slider {
-        name: room.range.quantity.name.clone(),
-        quantity: room.range.quantity.quantity.clone(),
+        name: reach.quantity.name.clone(),
+        quantity: reach.quantity.quantity.clone(),
         nominal: nominal.to_string(),
-        lower,
-        upper,
+        room: reach.words.clone(),
         from: decimal(&down(&from)),
         to: decimal(&(down(&to) + &step)),
         step: decimal(&step),

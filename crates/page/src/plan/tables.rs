@@ -106,8 +106,8 @@ pub(crate) fn quantities(quantities: &[Quantity]) -> Table {
     }
 }
 
-/// The actions with their times.
-pub(super) fn times(timeline: &Timeline) -> Table {
+/// The actions with their times; `values` says for which values the windows hold.
+pub(crate) fn times(timeline: &Timeline, values: &str) -> Table {
     let has_windows = timeline
         .actions
         .iter()
@@ -142,9 +142,10 @@ pub(super) fn times(timeline: &Timeline) -> Table {
     Table {
         heading: "Actions".to_owned(),
         note: if has_windows {
-            "Start and end as planned, everything as early as possible; and the times possible \
-             for all values in the envelope."
-                .to_owned()
+            format!(
+                "Start and end as planned, everything as early as possible; and the times possible \
+                 for all values {values}."
+            )
         } else {
             String::new()
         },

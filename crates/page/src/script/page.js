@@ -41,7 +41,7 @@ function show() {
   verdict.textContent = data.verdict.words;
   facts.replaceChildren(...data.facts.map(([name, value]) => element("div", {}, element("dt", {}, name), element("dd", {}, words(value)))));
 
-  let firstChart = null;
+  let firstChart = null, plane = null, hasSliders = false;
   const tables = [], moving = [], charts = [];
   const add = (heading, view) => {
     parts.push(view.node);
@@ -69,9 +69,12 @@ function show() {
       const view = add(section.heading, seriesView(section));
       moving.push(view.at);
     } else if (section.type === "sliders") {
-      parts.push(slidersView(section, textOf, (spans) => firstChart?.view.move(spans)).node);
+      hasSliders = true;
+      parts.push(slidersView(section, textOf, (spans) => firstChart?.view.move(spans), (values) => plane?.set(values)).node);
     } else if (section.type === "plane") {
-      parts.push(planeView(section).node);
+      // Both are about the same quantities.
+      plane = planeView(section, hasSliders);
+      parts.push(plane.node);
     } else {
       parts.push(proseView(section));
     }

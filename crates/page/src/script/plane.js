@@ -4,7 +4,8 @@
 const BOX_DASHES = ["", "9 4", "3 3", "11 3 2 3"];
 const PLANE = { left: 58, top: 8, side: 360, below: 46 };
 
-function planeView(section) {
+// `isDriven`: the values come from other sliders, by `set`.
+function planeView(section, isDriven) {
   const own = section.quantities;
   const values = own.map((it) => it.nominal);
   let axes = own.length > 1 ? [0, 1] : [0, 0];
@@ -141,7 +142,7 @@ function planeView(section) {
   const reset = element("button", { type: "button", onclick: () => { own.forEach((it, index) => { values[index] = it.nominal; }); draw(); } }, "as planned");
   draw();
   const node = element("section", { id: "plane" }, element("h2", {}, section.heading), element("p", { class: "note" }, section.note),
-    element("div", { class: "controls" }, ...choices.map((it) => it.node), reset), svg, legend, told,
+    element("div", { class: "controls" }, ...choices.map((it) => it.node), isDriven ? null : reset), svg, legend, told, isDriven ? null :
     element("details", {}, element("summary", {}, "Choose the values of all quantities"), element("div", { class: "sliders" }, ...rows.map((it) => it.row))));
-  return { node };
+  return { node, set(chosen) { chosen.forEach((value, index) => { values[index] = value; }); draw(); } };
 }

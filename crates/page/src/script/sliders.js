@@ -1,6 +1,6 @@
 // A slider for each quantity that may deviate: whether the plan still works, what moves, what breaks first.
 
-function slidersView(section, textOf, onTimes) {
+function slidersView(section, textOf, onTimes, onValues) {
   const system = readSystem(section.system);
   const own = section.sliders;
   const nominal = own.map((it) => parsed(it.nominal));
@@ -18,7 +18,7 @@ function slidersView(section, textOf, onTimes) {
     const input = element("input", { type: "range", id: `slider-${index}`, min: it.from, max: it.to, step: it.step, "data-slider": it.name,
       oninput: () => set(index, parsed(rounded(Number(input.value), 1e-6))) });
     const output = element("output", { for: `slider-${index}` });
-    const room = element("span", { class: "note" }, `in the envelope: ${it.lower} to ${it.upper}`);
+    const room = element("span", { class: "note" }, it.room);
     const row = element("div", { class: "slider" }, element("label", { for: `slider-${index}` }, words(it.quantity)), output, input, room);
     return { input, output, row };
   });
@@ -48,6 +48,7 @@ function slidersView(section, textOf, onTimes) {
       ends: start === end ? null : [found.earliest[end], found.latest[end]],
     })) : null;
     onTimes(spans);
+    onValues(values.map(toNumber));
     describeMoves(found);
     clearTimeout(timer);
     limits.textContent = "";

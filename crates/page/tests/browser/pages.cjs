@@ -213,10 +213,48 @@ world = "world.toml"
   await close(tab);
 });
 
+test("trials in a world without time fail by what ended them, and the first of each kind can be read step by step", async () => {
+  const own = (name) => JSON.stringify(path.join(cases, "../experiments/olisipo", name));
+  fs.writeFileSync(file("untimed.toml"), `format = "elbowroom-perturbed-experiment"
+version = 1
+title = "Machines that break"
+domain = ${own("sf3-domain.pddl")}
+problem = ${own("sf3-problem.pddl")}
+trials = 60
+seed = 1
+worlds = ["sound"]
+executors = ["esterel", "adaptable"]
+[optimum]
+most_running = 3
+[[case]]
+name = "first"
+likelihoods = ${own("sf3-p1.toml")}
+`);
+  run("compare", file("untimed.toml"), "-o", file("untimed"));
+  const { rows } = JSON.parse(fs.readFileSync(file("untimed/results.json"), "utf8"));
+  const tab = await open(page("untimed.html", file("untimed")));
+  const failures = rowsOf(tab, "Where trials fail");
+  const cells = await cellsOf(failures);
+  const counted = rows.map((row) => row.failures.reduce((sum, it) => sum + it.runs, 0));
+  assert.deepEqual(counted, rows.map((row) => row.success.count - row.success.successes));
+  assert.equal(cells.reduce((sum, row) => sum + Number(row[6]), 0), counted[0] + counted[1]);
+  await failures.first().getByRole("button", { name: "show" }).click();
+  const [, , executor, why, last, came, , first] = cells[0];
+  assert.equal(await tab.locator("h1").textContent(), `Trial ${first.replace("show", "").trim()} of first, ${executor}`);
+  assert.equal((await tab.locator("#verdict").textContent()).toLowerCase(), `${why}.`);
+  const steps = await cellsOf(rowsOf(tab, "Step by step"));
+  assert.equal(steps.at(-1)[2], last);
+  assert.ok(steps.at(-1)[3].startsWith(came), `${steps.at(-1)}, not ${came}`);
+  await accessible(tab, "a trial without time");
+  await tab.getByRole("button", { name: "Back to the experiment" }).click();
+  assert.equal(await failures.count(), cells.length);
+  await close(tab);
+});
+
 test("the page of a region says how far two quantities may go, whatever the others are", async () => {
   const text = run("envelope", ...delivery, plan, "--method", "exact", "--volume", "--json");
   fs.writeFileSync(file("region.json"), text);
-  const { parameters, pieces, boxes } = JSON.parse(text);
+  const { parameters, pieces, boxes, timeline } = JSON.parse(text);
   const tab = await open(page("region.html", file("region.json")));
   const values = Object.fromEntries(parameters.map((it) => [it.name, it.nominal.decimal]));
   // From where to where one quantity satisfies all rows, the others being what they are.
@@ -242,13 +280,29 @@ test("the page of a region says how far two quantities may go, whatever the othe
   await compare("dur_0", "dur_1");
   await tab.locator("[data-axis='0']").selectOption("3");
   await compare("dur_3", "dur_1");
-  await tab.getByText("Choose the values of all quantities").click();
-  const slider = tab.locator("[data-plane='dur_4']");
+  // The chart of the plan, and its sliders: they are those of the picture, too.
+  assert.equal(await tab.locator("svg rect[data-bar]").count(), timeline.actions.length);
+  const slider = tab.locator("[data-slider='dur_4']");
   await slider.focus();
   for (let step = 0; step < 5; step++) await tab.keyboard.press("ArrowRight");
   values.dur_4 = Number(await slider.inputValue());
   assert.ok(values.dur_4 > 3);
   await compare("dur_3", "dur_1");
+  const works = pieces[0].rows.every(({ factors, bound, strict }) => {
+    const sum = Object.entries(factors).reduce((sum, [name, factor]) => sum + factor.decimal * values[name], 0);
+    return strict ? sum < bound.decimal : sum <= bound.decimal;
+  });
+  assert.equal(await tab.locator("#point").getAttribute("data-works"), String(works));
+  const rooms = await tab.locator("#sliders .slider .note").allTextContents();
+  for (const [index, { name, nominal }] of parameters.entries()) {
+    const chosen = values.dur_4;
+    values.dur_4 = parameters[4].nominal.decimal;
+    const [low, high] = alone(name);
+    values.dur_4 = chosen;
+    assert.ok(low <= nominal.decimal && nominal.decimal <= high);
+    const [, from, to] = rooms[index].match(/planned: (-?[0-9.]+) to (-?[0-9.]+)$/);
+    assert.ok(Math.abs(from - low) < 0.002 && Math.abs(to - high) < 0.002, `${name}: ${rooms[index]}, not ${low} to ${high}`);
+  }
   assert.equal(await tab.locator("polygon.works").count(), 1);
   const shares = await cellsOf(rowsOf(tab, "How much of it is in a box"));
   assert.deepEqual(shares.map(([, share]) => share), boxes.map((it) => `${(100 * it.share.decimal).toFixed(2)} %`));
@@ -285,7 +339,7 @@ test("hostile names and texts are shown as text", async () => {
 });
 
 test("no page is wider than a telephone, and none has what axe objects to", async () => {
-  for (const name of ["envelope", "region", "run", "battery", "experiment", "hostile"]) {
+  for (const name of ["envelope", "region", "run", "battery", "experiment", "untimed", "hostile"]) {
     for (const width of [1280, 400]) {
       for (const colorScheme of ["light", "dark"]) {
         const tab = await open(file(`${name}.html`), { viewport: { width, height: 900 }, colorScheme, bypassCSP: true });

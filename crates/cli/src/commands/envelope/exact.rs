@@ -163,6 +163,8 @@ fn text(outcome: &RegionOutcome, look: Look) -> String {
             missing,
             boxes,
             measure,
+            timeline: _,
+            inequalities: _,
         } => {
             if parameters.is_empty() {
                 say(&format!("{file}: there is nothing that may vary."), 0);

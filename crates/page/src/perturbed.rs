@@ -1,0 +1,253 @@
+//! An experiment in worlds without time, and a trial of one.
+
+use elbowroom::report::statistics::Proportion;
+use elbowroom_laboratory::perturbed::{PerturbedResults, StoredCourse, StoredStep};
+
+use crate::document::{Document, RateGroup, Rates, Section, Table, Text, Tone, Verdict};
+use crate::experiment::{BUTTON, INTERVALS, Trials, document, facts, made, mean, percent, rate};
+use crate::plan::word;
+
+/// The page about an experiment in worlds without time.
+pub(crate) fn untimed(results: &PerturbedResults, trials: Trials) -> Document {
+    let mut groups: Vec<RateGroup> = Vec::new();
+    let mut rows: Vec<Vec<Text>> = Vec::new();
+    for row in &results.rows {
+        let name = format!("{}, {}", row.case, word(&row.world));
+        let published = row.published.and_then(Proportion::share);
+        let rate = rate(word(&row.executor), row.success, published.or(row.optimum));
+        rows.push(vec![
+            row.case.as_str().into(),
+            word(&row.world).into(),
+            rate.name.as_str().into(),
+            rate.words.as_str().into(),
+            row.published
+                .and_then(Proportion::share)
+                .map(percent)
+                .unwrap_or_default()
+                .into(),
+            row.optimum.map(percent).unwrap_or_default().into(),
+            mean(row.replans).into(),
+        ]);
+        match groups.last_mut().filter(|group| group.name == name) {
+            Some(group) => group.rates.push(rate),
+            None => groups.push(RateGroup {
+                name,
+                rates: vec![rate],
+            }),
+        }
+    }
+    let columns = [
+        ("case", false),
+        ("world", false),
+        ("executor", false),
+        ("success", true),
+        ("published", true),
+        ("optimum", true),
+        ("new plans", true),
+    ];
+    let mut sections = vec![
+        Section::Rates(Rates {
+            heading: "Trials that succeeded".to_owned(),
+            note: format!(
+                "{INTERVALS} The line marks the published share or, where there is none, the \
+                 greatest possible one, as far as they are known."
+            ),
+            groups,
+        }),
+        Section::Table(Table {
+            heading: "All rows".to_owned(),
+            columns: named(&columns),
+            rows,
+            ..Table::default()
+        }),
+    ];
+    let (failures, more) = failures(results, trials);
+    sections.extend(failures);
+    let trials = results
+        .rows
+        .iter()
+        .map(|row| row.success.count)
+        .sum::<u64>();
+    let facts = facts(
+        results.trials,
+        results.shards,
+        &results.parts,
+        &results.fingerprint,
+    );
+    let made = made(trials, "trials", results.is_interrupted);
+    Document {
+        more,
+        ..document(&results.title, made, facts, sections)
+    }
+}
+
+/// The kinds of failure, each with a trial to look at if there is one; and the pages of these.
+fn failures(results: &PerturbedResults, mut trials: Trials) -> (Option<Section>, Vec<Document>) {
+    let (mut rows, mut opens, mut more) = (Vec::new(), Vec::new(), Vec::new());
+    for (place, row) in results.rows.iter().enumerate() {
+        for (kind, failure) in row.failures.kinds().into_iter().enumerate() {
+            let last = failure.cause.as_deref().map_or("there was none", after);
+            rows.push(vec![
+                row.case.as_str().into(),
+                word(&row.world).into(),
+                word(&row.executor).into(),
+                ending(&failure.verdict).into(),
+                failure.action.clone().unwrap_or_default().into(),
+                last.into(),
+                failure.runs.to_string().into(),
+                failure.first.trial.to_string().into(),
+            ]);
+            opens.push(trials.remove(&(place, 0, kind)).map(|page| {
+                more.push(page);
+                more.len() - 1
+            }));
+        }
+    }
+    let columns = [
+        ("case", false),
+        ("world", false),
+        ("executor", false),
+        ("why it failed", false),
+        ("last step", false),
+        ("what came of it", false),
+        ("trials", true),
+        ("first", true),
+    ];
+    let mut note = "Failed trials, by what ended them and by their last step.".to_owned();
+    if !more.is_empty() {
+        note.push_str(BUTTON);
+    }
+    let section = (!rows.is_empty()).then(|| {
+        Section::Table(Table {
+            heading: "Where trials fail".to_owned(),
+            note,
+            columns: named(&columns),
+            rows,
+            opens: if more.is_empty() { Vec::new() } else { opens },
+            ..Table::default()
+        })
+    });
+    (section, more)
+}
+
+/// The page about a trial.
+pub(crate) fn course(course: &StoredCourse) -> Document {
+    let facts = [
+        ("experiment", course.title.clone()),
+        ("case", course.case.clone()),
+        ("world", word(&course.world)),
+        ("executor", word(&course.executor)),
+        ("trial", course.trial.to_string()),
+        ("seed", course.seed.to_string()),
+    ];
+    let is_success = course.ended == "goal-reached";
+    let mut steps: Vec<Vec<Text>> = Vec::new();
+    let mut plans: Vec<Vec<Text>> = Vec::new();
+    for (round, plan) in (1..).zip(&course.plans) {
+        plans.push(vec![
+            round.to_string().into(),
+            plan.actions.join(", ").into(),
+        ]);
+        for step in &plan.steps {
+            steps.push(vec![
+                (steps.len() + 1).to_string().into(),
+                round.to_string().into(),
+                step.action.as_str().into(),
+                came(step).into(),
+                step.became_true.join(", ").into(),
+                step.became_false.join(", ").into(),
+            ]);
+        }
+    }
+    let columns = [
+        ("step", true),
+        ("plan", true),
+        ("action", false),
+        ("what came of it", false),
+        ("became true", false),
+        ("became false", false),
+    ];
+    let tables = [
+        Table {
+            heading: "Step by step".to_owned(),
+            note: "What was done, and which facts it changed; some may have changed by themselves."
+                .to_owned(),
+            columns: named(&columns),
+            rows: steps,
+            ..Table::default()
+        },
+        Table {
+            heading: "Plans".to_owned(),
+            note: "A new one is made when the one before does not work any more.".to_owned(),
+            columns: named(&[("plan", true), ("actions", false)]),
+            rows: plans,
+            ..Table::default()
+        },
+    ];
+    let title = format!(
+        "Trial {} of {}, {}",
+        course.trial,
+        course.case,
+        word(&course.executor)
+    );
+    let facts = facts.map(|(name, value)| (name.to_owned(), value));
+    let sections = tables.map(Section::Table);
+    let page = document(&title, String::new(), facts.to_vec(), sections.to_vec());
+    let words = format!("{}.", ending(&course.ended));
+    Document {
+        verdict: Verdict {
+            tone: if is_success { Tone::Good } else { Tone::Bad },
+            words: capital(&words),
+        },
+        ..page
+    }
+}
+
+/// How a trial ended, in words.
+fn ending(name: &str) -> &str {
+    match name {
+        "goal-reached" => "the goal was reached",
+        "no-plan" => "there was no plan any more",
+        "rounds-used-up" => "no plan that was made led to the goal",
+        "dead-end" => "too many steps ended where there is no plan",
+        "steps-used-up" => "the trial took too many steps",
+        other => other,
+    }
+}
+
+/// What came of the last step, in words.
+fn after(cause: &str) -> &str {
+    match cause {
+        "after-start" => "it started",
+        "start-failed" => "its start failed",
+        "after-end" => "it ended",
+        other => other,
+    }
+}
+
+fn came(step: &StoredStep) -> String {
+    let words = match step.step.as_str() {
+        "started" => "it started",
+        "not-started" => "its start failed",
+        "ended" => "it ended",
+        other => other,
+    };
+    if step.is_dead_end {
+        format!("{words}, and there was no plan any more")
+    } else {
+        words.to_owned()
+    }
+}
+
+fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|first| first.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
+}
+
+fn named(columns: &[(&str, bool)]) -> Vec<(String, bool)> {
+    let named = columns
+        .iter()
+        .map(|(name, is_number)| ((*name).to_owned(), *is_number));
+    named.collect()
+}
