@@ -156,8 +156,8 @@ fn plane(parameters: &[Quantity], pieces: &[PieceAnswer], boxes: &[BoxAnswer]) -
     let quantities = parameters.iter().enumerate().map(quantity).collect();
     Plane {
         heading: "Two quantities at a time".to_owned(),
-        note: "Where the plan works, by two quantities; the others have their nominal values or those \
-               chosen below."
+        note: "Where the plan works, by two quantities; the others have the values that are chosen with \
+               sliders."
             .to_owned(),
         quantities,
         pieces,
