@@ -127,6 +127,15 @@ impl Feasibility {
         })
     }
 
+    /// Whether some values have no schedule in every box with this end so far out, wherever its other
+    /// ends are. `None` is infinitely far.
+    pub(crate) fn is_too_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
+        match reach {
+            None => !self.goes_on_for_ever(end),
+            Some(reach) => self.own_limits.get(&end).is_some_and(|limit| reach > limit),
+        }
+    }
+
     /// A corner without a schedule.
     fn branching(
         &self,

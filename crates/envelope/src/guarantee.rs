@@ -3,6 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
+use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 use elbowroom_stn::branching::TooManyBranches;
 
@@ -131,6 +132,19 @@ impl Controllability {
         }
     }
 
+    /// Whether some values have no schedule in every box with this end so far out; `None` is
+    /// infinitely far. Only what can be told from the end alone.
+    pub(crate) fn is_too_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
+        self.feasibility().is_too_far(end, reach)
+    }
+
+    fn feasibility(&self) -> &Feasibility {
+        let (Self::Weak(feasibility)
+        | Self::Dynamic(Control { feasibility, .. }, _)
+        | Self::Strong(Control { feasibility, .. })) = self;
+        feasibility
+    }
+
     /// What stands against the box, in terms of other boxes.
     ///
     /// # Errors
@@ -159,9 +173,7 @@ impl Controllability {
         envelope: &DecoupledEnvelope,
         found: Uncontrollable,
     ) -> Objection {
-        let (Self::Weak(feasibility)
-        | Self::Dynamic(Control { feasibility, .. }, _)
-        | Self::Strong(Control { feasibility, .. })) = self;
+        let feasibility = self.feasibility();
         match found {
             Uncontrollable::Weak(found) => {
                 Objection::NoSchedule(feasibility.values(envelope, found))

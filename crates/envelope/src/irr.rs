@@ -1,15 +1,18 @@
 //! Incremental Rectangular Robustification.
 
+mod ahead;
+
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::obligations::Refusal;
-use elbowroom_num::{End, Interval, Rational};
+use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParameterId, ParametrizedPlan, Side};
 
 use crate::frontier::{Frontier, Growth};
 use crate::objection::Objection;
 use crate::oracle::Oracle;
+use ahead::Ahead;
 
 /// Settings of IRR.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -134,6 +137,10 @@ pub struct IrrRun {
 /// grown, and once more at every refusal with `None`, so that it can end the search at any moment.
 /// What was found stays found: a wider box of which nothing can be told is treated as refused.
 ///
+/// The steps, their outcomes and their number are those of one check after the other, but where
+/// something is known about a box beforehand, it is not checked: many boxes are found inside by
+/// checking the last of them, and many are refused for a reason that refused another one before.
+///
 /// # Errors
 /// When nothing can be told of the start point.
 #[doc(alias = "Incremental Rectangular-Robustification")]
@@ -144,7 +151,7 @@ pub fn irr(
 ) -> Result<IrrRun, Refusal> {
     let plan = Arc::clone(oracle.plan());
     let already = oracle.checks();
-    let mut envelope = DecoupledEnvelope::point(&plan.nominal());
+    let envelope = DecoupledEnvelope::point(&plan.nominal());
     if let Some(objection) = oracle.start(&envelope)? {
         return Ok(IrrRun {
             envelope: Err(objection),
@@ -153,7 +160,7 @@ pub fn irr(
             stop: StopReason::Converged,
         });
     }
-    let mut frontier = Frontier::new(
+    let frontier = Frontier::new(
         &plan,
         settings.precisions(&plan),
         settings
@@ -163,80 +170,20 @@ pub fn irr(
             .as_deref(),
         settings.growth,
     );
+    let mut search = Ahead::new(oracle, settings, frontier, envelope);
     let mut widenings = 0;
-    let mut undecided = 0;
-    let stop = loop {
-        if undecided >= MOST_UNDECIDED {
-            break StopReason::Undecided;
-        }
-        let Some((end, step)) = frontier.next_end() else {
-            break match undecided {
-                0 => StopReason::Converged,
-                _ => StopReason::Undecided,
-            };
-        };
-        let checks = oracle.checks() - already;
-        if settings.most_checks.is_some_and(|most| checks >= most) {
-            break StopReason::CheckLimit;
-        }
-        let range = &plan.parameter(end.parameter).range;
-        let mut told = |answer: Result<bool, Refusal>| {
-            undecided += usize::from(answer.is_err());
-            answer.unwrap_or(false)
-        };
-        let flow = if told(widen(oracle, &envelope, range, end, &step)) {
-            frontier.accept(end);
-            let is_endless =
-                matches!(end.side.of(range), End::Infinite) && told(oracle.try_reach(end, None));
-            // Of a fixed schedule, any limit on a duration may be asked, but not none.
-            let reach = oracle.accepted().and_then(|accepted| end.reach(accepted));
-            let farthest = farthest(plan.parameter(end.parameter));
-            if is_endless || reach.is_some_and(|reach| reach > farthest) {
-                frontier.finish(end);
-            }
-            if let Some(accepted) = oracle.accepted() {
-                envelope.clone_from(accepted);
-            }
-            widenings += 1;
-            on_step(Some(&Widening {
-                envelope: &envelope,
-                end,
-                checks: oracle.checks() - already,
-            }))
-        } else {
-            frontier.reject(end);
-            on_step(None)
-        };
-        if flow.is_break() {
-            break StopReason::Cancelled;
-        }
-    };
+    let stop = search.run(&mut |widening| {
+        widenings += usize::from(widening.is_some());
+        on_step(widening)
+    });
+    let (checks, envelope) = (search.checks(), search.finish());
+    oracle.count_checks(already + checks);
     Ok(IrrRun {
         envelope: Ok(envelope),
         widenings,
-        checks: oracle.checks() - already,
+        checks,
         stop,
     })
-}
-
-/// Moves one end of the accepted box, `envelope`, out by a step; whether it could be, within the
-/// parameter's range.
-fn widen(
-    oracle: &mut Oracle,
-    envelope: &DecoupledEnvelope,
-    range: &Interval,
-    end: BoxEnd,
-    step: &Rational,
-) -> Result<bool, Refusal> {
-    let Some(reach) = end.reach(envelope) else {
-        return Ok(false);
-    };
-    let reach = reach + step;
-    let value = match end.side {
-        Side::Lower => -&reach,
-        Side::Upper => reach.clone(),
-    };
-    Ok(range.contains(&value) && oracle.try_reach(end, Some(reach))?)
 }
 
 /// What keeps each end of a box where it is: lower and upper, parameter by parameter. An end that
@@ -282,10 +229,9 @@ fn limit(
     }
     let target = &reach + step;
     let target = border.map_or(target.clone(), |border| border.min(target));
-    let refused = end.with_reach(envelope, Some(target));
-    match oracle.objection(&refused) {
+    match oracle.objection_beside(envelope, end, Some(target)) {
         Ok(None) => None,
-        Ok(Some(objection)) => Some(Limit::Objection { refused, objection }),
+        Ok(Some((refused, objection))) => Some(Limit::Objection { refused, objection }),
         Err(_) => Some(Limit::Undecided),
     }
 }

@@ -127,9 +127,13 @@ pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledE
     let Ok(network) = plan.uncertain_network(envelope) else {
         return Learnt::Unknown;
     };
-    let Err(StrongConflict { grounds, .. }) = network.network.strong() else {
+    let Err(StrongConflict { grounds, total }) = network.network.strong() else {
         return Learnt::Nothing;
     };
+    if total.is_none() {
+        // An infinite end, whatever the others are: nothing adds up.
+        return Learnt::Unknown;
+    }
     let reader = Reader {
         plan,
         network: &network,

@@ -68,6 +68,7 @@ mod feasibility;
 mod frontier;
 mod guarantee;
 mod irr;
+mod known;
 mod learn;
 pub mod linear;
 mod method;

@@ -9,6 +9,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan, Valuation};
 
 use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
+use crate::known::Known;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::reduction::Reduction;
@@ -54,6 +55,8 @@ pub struct Oracle {
     proofs_hold_in_last: bool,
     checks: usize,
     without_schedule: usize,
+    /// What the last search has found out.
+    known: Known,
 }
 
 /// An [`Objection`] before the values are worked out.
@@ -94,6 +97,7 @@ impl Oracle {
             proofs_hold_in_last: true,
             checks: 0,
             without_schedule: 0,
+            known: Known::default(),
         })
     }
 

@@ -57,6 +57,17 @@ impl DecoupledEnvelope {
         self
     }
 
+    /// Moves an end so that it reaches that far ([`BoxEnd::reach`]); `None` is infinitely far.
+    pub fn set_reach(&mut self, end: BoxEnd, reach: Option<Rational>) {
+        let interval = &mut self.intervals[end.parameter.index()];
+        match end.side {
+            Side::Lower => {
+                interval.lower = reach.map_or(End::Infinite, |reach| End::Closed(-reach));
+            }
+            Side::Upper => interval.upper = reach.map_or(End::Infinite, End::Closed),
+        }
+    }
+
     /// Whether the valuation lies in the box.
     pub fn contains(&self, valuation: &Valuation) -> bool {
         self.intervals
@@ -132,13 +143,7 @@ impl BoxEnd {
         reach: Option<Rational>,
     ) -> DecoupledEnvelope {
         let mut moved = envelope.clone();
-        let interval = &mut moved.intervals[self.parameter.index()];
-        match self.side {
-            Side::Lower => {
-                interval.lower = reach.map_or(End::Infinite, |reach| End::Closed(-reach));
-            }
-            Side::Upper => interval.upper = reach.map_or(End::Infinite, End::Closed),
-        }
+        moved.set_reach(self, reach);
         moved
     }
 }

@@ -1,10 +1,13 @@
 //! What a refused box says about others.
 
-use elbowroom_plan::DecoupledEnvelope;
+use elbowroom_num::Rational;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 
 use super::Oracle;
 use crate::cut::{Cut, Ground};
+use crate::known::Known;
 use crate::learn::Learnt;
+use crate::objection::Objection;
 use crate::obligations::Refusal;
 
 impl Oracle {
@@ -43,5 +46,120 @@ impl Oracle {
                 ground: Ground::Condition(broken),
             })
         }))
+    }
+
+    /// Takes a box that includes the accepted one for the accepted one, if it is inside the envelope;
+    /// if not, what that says about others. That is not counted as a check.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub(crate) fn accept_or_learn(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+    ) -> Result<Learnt, Refusal> {
+        let checks = self.checks;
+        let learnt = self.widen_or_learn(envelope);
+        self.checks = checks;
+        learnt
+    }
+
+    fn widen_or_learn(&mut self, envelope: &DecoupledEnvelope) -> Result<Learnt, Refusal> {
+        // What is remembered of the accepted box makes it cheap to move one end.
+        if self.remembers_accepted
+            && let Some(end) = self.only_end(envelope)
+            && self.widen(end, end.reach(envelope))?.is_none()
+        {
+            return Ok(Learnt::Nothing);
+        }
+        let learnt = self.learn(envelope)?;
+        if learnt == Learnt::Nothing {
+            self.accepted = Some(envelope.clone());
+            self.remembers_accepted = true;
+        }
+        Ok(learnt)
+    }
+
+    /// The end in which a box differs from the accepted one, if it is one.
+    fn only_end(&self, envelope: &DecoupledEnvelope) -> Option<BoxEnd> {
+        let accepted = self.accepted.as_ref()?;
+        let count = envelope.intervals().len();
+        let mut ends = BoxEnd::all(count).filter(|end| {
+            let (old, new) = (
+                accepted.interval(end.parameter),
+                envelope.interval(end.parameter),
+            );
+            end.side.of(old) != end.side.of(new)
+        });
+        let end = ends.next()?;
+        ends.next().is_none().then_some(end)
+    }
+
+    /// Whether every box with this end so far out is outside the envelope, as far as that can be
+    /// told without looking at the other ends. `None` is infinitely far.
+    pub(crate) fn is_too_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
+        self.controllability.is_too_far(end, reach)
+    }
+
+    /// Takes a box inside the accepted one for the accepted one.
+    pub(crate) fn narrow(&mut self, envelope: &DecoupledEnvelope) {
+        self.remembers_accepted &= self.accepted.as_ref() == Some(envelope);
+        self.accepted = Some(envelope.clone());
+    }
+
+    /// Counts boxes as checked about which something was known already.
+    pub(crate) fn count_checks(&mut self, checks: usize) {
+        self.checks = checks;
+    }
+
+    /// Keeps what a search has found out about boxes.
+    pub(crate) fn remember(&mut self, known: Known) {
+        self.known = known;
+    }
+
+    /// Like [`objection`](Self::objection), of a box with one end moved, which is in the answer, too.
+    /// Where a search has come across a reason that refuses that box as well, it is not looked for
+    /// again.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub fn objection_beside(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        end: BoxEnd,
+        reach: Option<Rational>,
+    ) -> Result<Option<(DecoupledEnvelope, Objection)>, Refusal> {
+        let farther = end.with_reach(envelope, reach.clone());
+        if envelope.contains(&self.around)
+            && let (Some(from), Some(to)) = (end.reach(envelope), reach)
+        {
+            self.known.look_at(envelope);
+            let cut = self.known.against(end, &from, Some(&to));
+            if let Some(objection) = cut.and_then(|cut| self.objection_by(cut, &farther)) {
+                self.checks += 1;
+                return Ok(Some((farther, objection)));
+            }
+        }
+        let objection = self.objection(&farther)?;
+        Ok(objection.map(|objection| (farther, objection)))
+    }
+
+    /// The objection that a cut is to a box; `None` if it has to be worked out.
+    fn objection_by(&self, cut: &Cut, envelope: &DecoupledEnvelope) -> Option<Objection> {
+        let [row] = &cut.rows[..] else {
+            return None;
+        };
+        match &cut.ground {
+            Ground::Condition(broken) => Some(Objection::Broken(broken.clone())),
+            // One end of each parameter counts, and at these ends there is no schedule.
+            Ground::Cycle(_) | Ground::Semireducible(_) => {
+                let mut values = envelope.nearest(&self.plan.nominal());
+                for end in row.factors.keys() {
+                    let interval = envelope.interval(end.parameter);
+                    values[end.parameter] = end.side.of(interval).value()?.clone();
+                }
+                Some(Objection::NoSchedule(values))
+            }
+            Ground::Fixed(_) | Ground::Box(_) => None,
+        }
     }
 }

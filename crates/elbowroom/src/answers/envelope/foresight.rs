@@ -90,10 +90,10 @@ fn unknown(
             // An end that has room for one step may still be stopped by the next larger one.
             let mut distance = step.clone();
             for _ in 0..=FARTHER {
-                let farther = end.with_reach(envelope, Some(&reach + &distance));
-                match oracle.objection(&farther).map_err(FlowError::Refused)? {
+                let farther = oracle.objection_beside(envelope, end, Some(&reach + &distance));
+                match farther.map_err(FlowError::Refused)? {
                     None => distance = &distance + &distance,
-                    Some(Objection::Uncontrollable(conflict)) => {
+                    Some((_, Objection::Uncontrollable(conflict))) => {
                         unknown.extend(conflict.ends().iter().map(|end| end.parameter));
                         break;
                     }

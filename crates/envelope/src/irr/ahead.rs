@@ -1,0 +1,316 @@
+//! The steps of the search, several at a time: [`Ahead`].
+//!
+//! A box inside the envelope has all boxes inside it there, too. So a sequence of widenings that
+//! were all taken to be right is right if the last box is, and one check does for all of them.
+//! A box that is refused is refused for a reason that says something about others
+//! ([`Cut`](crate::Cut)): steps against which something is known need no check either. The steps are
+//! those that one check after the other leads to.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom_num::{End, Interval, Rational};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan, Side};
+
+use super::{MOST_UNDECIDED, Settings, StopReason, Widening, farthest};
+use crate::frontier::Frontier;
+use crate::known::Known;
+use crate::learn::Learnt;
+use crate::obligations::Refusal;
+use crate::oracle::Oracle;
+
+/// A search in progress.
+pub(super) struct Ahead<'a> {
+    oracle: &'a mut Oracle,
+    plan: Arc<ParametrizedPlan>,
+    settings: &'a Settings,
+    frontier: Frontier,
+    /// Known to be inside the envelope.
+    envelope: DecoupledEnvelope,
+    known: Known,
+    /// The number of boxes decided about, the first one included.
+    checks: usize,
+    /// The number of boxes of which nothing can be told.
+    undecided: usize,
+    /// How many steps to take before the next check.
+    length: usize,
+}
+
+/// A step that was taken.
+struct Step {
+    /// How far the end reaches now, if it was moved: `Some(None)` if it is infinite.
+    reach: Option<(BoxEnd, Option<Rational>)>,
+    /// The number of boxes decided about by then.
+    checks: usize,
+}
+
+/// Steps that were taken without a check.
+struct Leap {
+    frontier: Frontier,
+    envelope: DecoupledEnvelope,
+    steps: Vec<Step>,
+    checks: usize,
+    /// Why there are no more steps.
+    end: Option<StopReason>,
+}
+
+impl<'a> Ahead<'a> {
+    /// From a box that the oracle has accepted.
+    pub(super) fn new(
+        oracle: &'a mut Oracle,
+        settings: &'a Settings,
+        frontier: Frontier,
+        envelope: DecoupledEnvelope,
+    ) -> Self {
+        Self {
+            plan: Arc::clone(oracle.plan()),
+            oracle,
+            settings,
+            frontier,
+            envelope,
+            known: Known::default(),
+            checks: 1,
+            undecided: 0,
+            length: 1,
+        }
+    }
+
+    /// The number of boxes decided about.
+    pub(super) fn checks(&self) -> usize {
+        self.checks
+    }
+
+    /// The box. What was found out about others is left with the oracle.
+    pub(super) fn finish(self) -> DecoupledEnvelope {
+        self.oracle.remember(self.known);
+        self.envelope
+    }
+
+    /// Searches until nothing can be gained, or somebody wants no more.
+    pub(super) fn run(
+        &mut self,
+        on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
+    ) -> StopReason {
+        loop {
+            if self.undecided >= MOST_UNDECIDED {
+                return StopReason::Undecided;
+            }
+            let leap = self.leap();
+            let is_one = leap.steps.len() == 1;
+            let mut end = leap.end;
+            let flow = match self.confirmed(&leap) {
+                Confirmed::Yes => {
+                    self.length = self.length.saturating_mul(2);
+                    self.frontier = leap.frontier.clone();
+                    self.tell(&leap, on_step)
+                }
+                Confirmed::No(cut) => {
+                    end = None;
+                    self.length = (leap.steps.len() / 2).max(1);
+                    self.known.reset(&self.envelope);
+                    match cut {
+                        Some(cut) => {
+                            self.known.add(cut, &self.envelope);
+                            ControlFlow::Continue(())
+                        }
+                        None if is_one => self.step(on_step),
+                        None => ControlFlow::Continue(()),
+                    }
+                }
+            };
+            if flow.is_break() {
+                return StopReason::Cancelled;
+            }
+            match end {
+                Some(StopReason::Converged) if self.undecided > 0 => return StopReason::Undecided,
+                Some(reason) => return reason,
+                None => {}
+            }
+        }
+    }
+
+    /// Takes steps, each of which is right as far as anything is known.
+    fn leap(&mut self) -> Leap {
+        let plan = Arc::clone(&self.plan);
+        let mut leap = Leap {
+            frontier: self.frontier.clone(),
+            envelope: self.envelope.clone(),
+            steps: Vec::new(),
+            checks: self.checks,
+            end: None,
+        };
+        while leap.steps.len() < self.length {
+            let Some((end, step)) = leap.frontier.next_end() else {
+                leap.end = Some(StopReason::Converged);
+                break;
+            };
+            if self.is_enough(leap.checks) {
+                leap.end = Some(StopReason::CheckLimit);
+                break;
+            }
+            let reach = self.reach(&mut leap, end, &plan.parameter(end.parameter).range, &step);
+            match &reach {
+                Some(reach) => {
+                    leap.frontier.accept(end);
+                    if self.is_far(end, reach.as_ref()) {
+                        leap.frontier.finish(end);
+                    }
+                    leap.envelope.set_reach(end, reach.clone());
+                }
+                None => leap.frontier.reject(end),
+            }
+            leap.steps.push(Step {
+                reach: reach.map(|reach| (end, reach)),
+                checks: leap.checks,
+            });
+        }
+        leap
+    }
+
+    /// How far an end reaches after a step; `None` if it cannot be moved.
+    fn reach(
+        &mut self,
+        leap: &mut Leap,
+        end: BoxEnd,
+        range: &Interval,
+        step: &Rational,
+    ) -> Option<Option<Rational>> {
+        let from = end.reach(&leap.envelope)?;
+        let reach = wanted(&from, end, range, step)?;
+        leap.checks += 1;
+        if self.is_refused(end, &from, Some(&reach)) {
+            return None;
+        }
+        self.known.moved(end, &from, Some(&reach));
+        if matches!(end.side.of(range), End::Infinite) {
+            leap.checks += 1;
+            if !self.is_refused(end, &reach, None) {
+                self.known.moved(end, &reach, None);
+                return Some(None);
+            }
+        }
+        Some(Some(reach))
+    }
+
+    /// Whether the box with that end moved is known not to be inside.
+    fn is_refused(&self, end: BoxEnd, from: &Rational, to: Option<&Rational>) -> bool {
+        self.oracle.is_too_far(end, to) || self.known.refuses(end, from, to)
+    }
+
+    /// Whether the box after these steps is inside the envelope; if not, what that says about
+    /// others.
+    fn confirmed(&mut self, leap: &Leap) -> Confirmed {
+        let moved = leap.steps.iter().filter(|step| step.reach.is_some());
+        let answer = match moved.count() {
+            0 => return Confirmed::Yes,
+            _ => self.oracle.accept_or_learn(&leap.envelope),
+        };
+        match answer {
+            Ok(Learnt::Nothing) => Confirmed::Yes,
+            Ok(Learnt::Cut(cut)) => Confirmed::No(Some(cut)),
+            Ok(Learnt::Unknown) | Err(_) => Confirmed::No(None),
+        }
+    }
+
+    /// Tells of the steps, which have been found right, one by one.
+    fn tell(
+        &mut self,
+        leap: &Leap,
+        on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        for step in &leap.steps {
+            self.checks = step.checks;
+            let flow = match &step.reach {
+                Some((end, reach)) => {
+                    self.envelope.set_reach(*end, reach.clone());
+                    on_step(Some(&Widening {
+                        envelope: &self.envelope,
+                        end: *end,
+                        checks: self.checks,
+                    }))
+                }
+                None => on_step(None),
+            };
+            if flow.is_break() {
+                // What comes after is not wanted any more.
+                self.oracle.narrow(&self.envelope);
+                return flow;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// One step by one check.
+    fn step(
+        &mut self,
+        on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let Some((end, step)) = self.frontier.next_end() else {
+            return ControlFlow::Continue(());
+        };
+        let range = self.plan.parameter(end.parameter).range.clone();
+        let from = end.reach(&self.envelope);
+        let reach = from.and_then(|from| Some((wanted(&from, end, &range, &step)?, from)));
+        let is_wider = match &reach {
+            Some((reach, _)) => self.is_inside(end, Some(reach.clone())),
+            None => false,
+        };
+        let (Some((reach, from)), true) = (reach, is_wider) else {
+            self.frontier.reject(end);
+            return on_step(None);
+        };
+        self.frontier.accept(end);
+        let is_endless = matches!(end.side.of(&range), End::Infinite) && self.is_inside(end, None);
+        if !is_endless {
+            self.known.set_finite(end);
+        }
+        let reach = (!is_endless).then_some(reach);
+        if self.is_far(end, reach.as_ref()) {
+            self.frontier.finish(end);
+        }
+        self.known.moved(end, &from, reach.as_ref());
+        self.envelope.set_reach(end, reach);
+        on_step(Some(&Widening {
+            envelope: &self.envelope,
+            end,
+            checks: self.checks,
+        }))
+    }
+
+    /// Whether the box with an end moved out is inside the envelope; if nothing can be told, it
+    /// counts as refused.
+    fn is_inside(&mut self, end: BoxEnd, reach: Option<Rational>) -> bool {
+        self.checks += 1;
+        let answer: Result<bool, Refusal> = self.oracle.try_reach(end, reach);
+        self.undecided += usize::from(answer.is_err());
+        answer.unwrap_or(false)
+    }
+
+    /// Whether there have been as many checks as were wanted.
+    fn is_enough(&self, checks: usize) -> bool {
+        self.settings.most_checks.is_some_and(|most| checks >= most)
+    }
+
+    /// Whether an end is so far out that it need not go further. Of a fixed schedule, any limit on a
+    /// duration may be asked, but not none.
+    fn is_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
+        reach.is_none_or(|reach| *reach > farthest(self.plan.parameter(end.parameter)))
+    }
+}
+
+/// The outcome of a check of several steps.
+enum Confirmed {
+    Yes,
+    /// What is known now about other boxes, if anything.
+    No(Option<crate::cut::Cut>),
+}
+
+/// How far an end would reach after a step; `None` if that is outside its parameter's range.
+fn wanted(from: &Rational, end: BoxEnd, range: &Interval, step: &Rational) -> Option<Rational> {
+    let reach = from + step;
+    let value = match end.side {
+        Side::Lower => -&reach,
+        Side::Upper => reach.clone(),
+    };
+    range.contains(&value).then_some(reach)
+}

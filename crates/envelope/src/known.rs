@@ -1,0 +1,117 @@
+//! What is known to stand against wider boxes: [`Known`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
+
+use crate::cut::Cut;
+
+/// The cuts that a search has come across, and how much room each leaves to a box inside the
+/// envelope, the present one.
+///
+/// Only wider boxes are asked about, so a cut that stands against a box with one end moved has that
+/// end in one of its rows: an index by end, and the room left in each row, make the question cheap
+/// however many parameters a cut is about.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Known {
+    cuts: Vec<Cut>,
+    /// For each cut, the room that each of its rows leaves; `None` if the row does not hold because
+    /// an infinite end counts.
+    room: Vec<Vec<Option<Rational>>>,
+    /// By end: the cuts that mention it, each with its rows and the end's factors there.
+    mentions: BTreeMap<BoxEnd, Vec<(usize, Vec<(usize, Rational)>)>>,
+    /// Ends that cannot be infinite.
+    finite: BTreeSet<BoxEnd>,
+    /// The present box, if it is known.
+    looked_at: Option<DecoupledEnvelope>,
+}
+
+impl Known {
+    /// One more cut.
+    pub(crate) fn add(&mut self, cut: Cut, envelope: &DecoupledEnvelope) {
+        self.looked_at = None;
+        let index = self.cuts.len();
+        let mut rows: BTreeMap<BoxEnd, Vec<(usize, Rational)>> = BTreeMap::new();
+        for (place, row) in cut.rows.iter().enumerate() {
+            for (end, factor) in &row.factors {
+                rows.entry(*end).or_default().push((place, factor.clone()));
+            }
+        }
+        for (end, rows) in rows {
+            self.mentions.entry(end).or_default().push((index, rows));
+        }
+        self.room.push(room(&cut, envelope));
+        self.cuts.push(cut);
+    }
+
+    /// The end was refused to be infinite, and will be in all wider boxes.
+    pub(crate) fn set_finite(&mut self, end: BoxEnd) {
+        self.finite.insert(end);
+    }
+
+    /// The present box is this one, if it was another.
+    pub(crate) fn look_at(&mut self, envelope: &DecoupledEnvelope) {
+        if self.looked_at.as_ref() != Some(envelope) {
+            self.reset(envelope);
+            self.looked_at = Some(envelope.clone());
+        }
+    }
+
+    /// The present box is this one.
+    pub(crate) fn reset(&mut self, envelope: &DecoupledEnvelope) {
+        self.looked_at = None;
+        for (cut, left) in self.cuts.iter().zip(&mut self.room) {
+            *left = room(cut, envelope);
+        }
+    }
+
+    /// Whether the present box with an end moved out from `from` to `to` is known not to be inside
+    /// the envelope. `None` is infinitely far.
+    pub(crate) fn refuses(&self, end: BoxEnd, from: &Rational, to: Option<&Rational>) -> bool {
+        to.is_none() && self.finite.contains(&end) || self.against(end, from, to).is_some()
+    }
+
+    /// A cut that stands against that box.
+    pub(crate) fn against(
+        &self,
+        end: BoxEnd,
+        from: &Rational,
+        to: Option<&Rational>,
+    ) -> Option<&Cut> {
+        let mut mentions = self.mentions.get(&end)?.iter();
+        let found = mentions.find(|(index, moved)| {
+            let cut = &self.cuts[*index];
+            let mut rows = cut.rows.iter().zip(&self.room[*index]).enumerate();
+            !rows.any(|(place, (row, room))| {
+                let factor = moved.iter().find(|(own, _)| *own == place);
+                let left = match (room, factor, to) {
+                    (None, ..) | (_, Some(_), None) => return false,
+                    (Some(room), None, _) => room.clone(),
+                    (Some(room), Some((_, factor)), Some(to)) => room - &(factor * &(to - from)),
+                };
+                left.is_positive() || left.is_zero() && !row.is_strict
+            })
+        });
+        found.map(|(index, _)| &self.cuts[*index])
+    }
+
+    /// The present box is the one with this end moved out.
+    pub(crate) fn moved(&mut self, end: BoxEnd, from: &Rational, to: Option<&Rational>) {
+        self.looked_at = None;
+        for (index, rows) in self.mentions.get(&end).into_iter().flatten() {
+            for (place, factor) in rows {
+                let room = &mut self.room[*index][*place];
+                *room = match (room.take(), to) {
+                    (Some(room), Some(to)) => Some(room - factor * &(to - from)),
+                    _ => None,
+                };
+            }
+        }
+    }
+}
+
+fn room(cut: &Cut, envelope: &DecoupledEnvelope) -> Vec<Option<Rational>> {
+    let room = |row: &crate::row::Row| Some(&row.bound - &row.value(envelope)?);
+    cut.rows.iter().map(room).collect()
+}

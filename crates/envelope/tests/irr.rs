@@ -1,0 +1,297 @@
+//! The search against the algorithm as it is written: one check of one box after the other.
+
+mod given;
+
+use std::fmt::Write as _;
+use std::ops::ControlFlow;
+
+use elbowroom_envelope::{Growth, Guarantee, Objection, Oracle, Settings, StopReason, irr};
+use elbowroom_num::{End, Rational};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
+
+use given::Given;
+
+/// A sequence of numbers that look like chance.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, bound: usize) -> usize {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        let drawn = (self.0 >> 33) % bound as u64;
+        usize::try_from(drawn).expect("below the bound")
+    }
+}
+
+const DOMAIN: &str = "
+    (:durative-action run :parameters () :duration (>= ?duration 0) :condition () :effect (and))
+    (:durative-action burn :parameters () :duration (>= ?duration 0)
+      :condition (at end (>= (x) ?duration)) :effect (at end (decrease (x) ?duration)))";
+
+/// Actions one after the other or side by side, some of which use up something, with bounds
+/// between their starts and ends and ranges of their durations.
+fn plan_text(dice: &mut Dice) -> String {
+    let count = 2 + dice.below(4);
+    let mut text = String::new();
+    for action in 0..count {
+        let range = [
+            "lb 0 ub inf",
+            "lb 0 ub 6",
+            "lb 1 ub inf",
+            "lb -inf ub inf",
+            "lb 2 ub 2",
+        ][dice.below(5)];
+        let name = ["run", "burn"][usize::from(dice.below(4) == 0)];
+        let _ = write!(
+            text,
+            "parameter p{action} default 2 {range}; durative-action instance a{action} : ({name}); \
+             c: a{action}.end - a{action}.start in [p{action}, p{action}]; "
+        );
+        if action > 0 && dice.below(3) > 0 {
+            let before = dice.below(action);
+            let _ = write!(text, "c: a{action}.start - a{before}.end in [1/4, inf]; ");
+        }
+    }
+    for _ in 0..dice.below(6) {
+        let point = |dice: &mut Dice| {
+            let side = ["start", "end"][dice.below(2)];
+            format!("a{}.{side}", dice.below(count))
+        };
+        let (from, to) = (point(dice), point(dice));
+        if from == to {
+            continue;
+        }
+        let least = dice.below(3);
+        let bound = match dice.below(3) {
+            0 => format!("[{least}, inf]"),
+            1 => format!("[-inf, {}]", 2 + dice.below(30)),
+            _ => format!("[{least}, {}]", least + dice.below(20)),
+        };
+        let _ = write!(text, "c: {to} - {from} in {bound}; ");
+    }
+    text
+}
+
+/// What a search came to: the steps with the box after each and the number of checks by then, and
+/// how it ended.
+#[derive(Debug, PartialEq)]
+struct Told {
+    steps: Vec<Option<(DecoupledEnvelope, BoxEnd, usize)>>,
+    envelope: Option<DecoupledEnvelope>,
+    checks: usize,
+    stop: StopReason,
+}
+
+struct Progress {
+    step: Rational,
+    is_open: [bool; 2],
+    is_done: [bool; 2],
+    has_halved: bool,
+}
+
+impl Progress {
+    fn close(&mut self) {
+        if (0..2).all(|side| !self.is_open[side] || self.is_done[side]) {
+            self.step = &self.step * &Rational::new(1, 2);
+            self.is_open = [true; 2];
+            self.has_halved = true;
+        }
+    }
+}
+
+/// Algorithm 1, box by box. `most` is the number of steps after which it is ended.
+fn one_by_one(
+    oracle: &mut Oracle,
+    plan: &ParametrizedPlan,
+    settings: &Settings,
+    most: usize,
+) -> Told {
+    let mut told = Told {
+        steps: Vec::new(),
+        envelope: None,
+        checks: 1,
+        stop: StopReason::Converged,
+    };
+    let mut envelope = DecoupledEnvelope::point(&plan.nominal());
+    if oracle.start(&envelope).expect("few cases").is_some() {
+        return told;
+    }
+    let precision = &settings.precision;
+    let mut all: Vec<Progress> = plan
+        .parameters
+        .iter()
+        .map(|own| Progress {
+            step: own.nominal.abs().max(Rational::ONE).max(precision.clone()),
+            is_open: [true; 2],
+            is_done: [false; 2],
+            has_halved: false,
+        })
+        .collect();
+    let mut next = 0;
+    loop {
+        let is_left = |it: &Progress| it.is_done != [true; 2] && it.step >= *precision;
+        let order = (0..all.len()).map(|offset| (next + offset) % all.len());
+        let open = order.flat_map(|index| [(index, 1), (index, 0)]);
+        let mut open = open.filter(|(index, side)| {
+            let it = &all[*index];
+            &it.step + &it.step >= *precision && it.is_open[*side] && !it.is_done[*side]
+        });
+        let chosen = all.iter().any(is_left).then(|| open.next()).flatten();
+        let Some((index, side)) = chosen else {
+            break;
+        };
+        next = index + 1;
+        if settings.most_checks.is_some_and(|most| told.checks >= most) {
+            told.stop = StopReason::CheckLimit;
+            break;
+        }
+        let end = BoxEnd {
+            parameter: ParameterId::from(index),
+            side: Side::BOTH[side],
+        };
+        let range = &plan.parameters[index].range;
+        let reach = end.reach(&envelope).expect("an end that can move") + &all[index].step;
+        let value = if side == 0 { -&reach } else { reach.clone() };
+        let mut try_reach = |reach| {
+            told.checks += 1;
+            oracle.try_reach(end, reach).expect("few cases")
+        };
+        if range.contains(&value) && try_reach(Some(reach.clone())) {
+            let is_endless = matches!(end.side.of(range), End::Infinite) && try_reach(None);
+            let it = &mut all[index];
+            if settings.growth == Growth::Doubling && !it.has_halved {
+                it.step = &it.step + &it.step;
+            }
+            let farthest = &Rational::from(1_000_000_000)
+                * &plan.parameters[index].nominal.abs().max(Rational::ONE);
+            if is_endless || reach > farthest {
+                it.is_done[side] = true;
+                it.close();
+            }
+            envelope = end.with_reach(&envelope, (!is_endless).then_some(reach));
+            told.steps.push(Some((envelope.clone(), end, told.checks)));
+        } else {
+            all[index].is_open[side] = false;
+            all[index].close();
+            told.steps.push(None);
+        }
+        if told.steps.len() == most {
+            told.stop = StopReason::Cancelled;
+            break;
+        }
+    }
+    told.envelope = Some(envelope);
+    told
+}
+
+fn as_built(oracle: &mut Oracle, settings: &Settings, most: usize) -> Told {
+    let mut steps = Vec::new();
+    let run = irr(oracle, settings, &mut |widening| {
+        steps.push(widening.map(|it| (it.envelope.clone(), it.end, it.checks)));
+        if steps.len() == most {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })
+    .expect("few cases");
+    let widened = steps.iter().flatten().count();
+    assert_eq!(run.widenings, widened);
+    Told {
+        steps,
+        envelope: run.envelope.ok(),
+        checks: run.checks,
+        stop: run.stop,
+    }
+}
+
+/// Compares what stands against boxes with one end further out, as the search remembers it, with what
+/// an oracle says that remembers nothing. The number of objections.
+fn objections(
+    own: &mut Oracle,
+    fresh: &mut Oracle,
+    plan: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+) -> usize {
+    let mut count = 0;
+    for end in BoxEnd::all(plan.parameters.len()) {
+        for distance in [Rational::new(1, 100), Rational::ONE, Rational::from(20)] {
+            let Some(reach) = end.reach(envelope) else {
+                continue;
+            };
+            let reach = reach + distance;
+            let farther = end.with_reach(envelope, Some(reach.clone()));
+            let found = own.objection_beside(envelope, end, Some(reach));
+            let found = found.expect("few cases");
+            let expected = fresh.objection(&farther).expect("few cases");
+            assert_eq!(found.is_some(), expected.is_some(), "{end:?} {envelope:?}");
+            let Some((refused, objection)) = found else {
+                continue;
+            };
+            assert_eq!(refused, farther);
+            count += 1;
+            match objection {
+                Objection::NoSchedule(values) => {
+                    assert!(farther.contains(&values), "{end:?} {envelope:?}");
+                    let (network, _) = plan.plan.network_with_origins(&values);
+                    assert!(network.consistency().is_err(), "{end:?} {envelope:?}");
+                }
+                Objection::Broken(broken) => {
+                    let shown = fresh.counterexample(&farther, &broken);
+                    assert!(shown.is_some(), "{broken:?} {end:?} {envelope:?}");
+                }
+                _ => {}
+            }
+        }
+    }
+    count
+}
+
+#[test]
+fn the_search_takes_the_steps_of_one_check_after_the_other() {
+    let mut dice = Dice(3);
+    let (mut long, mut limited, mut cancelled, mut without, mut objected) = (0, 0, 0, 0, 0);
+    for _ in 0..600 {
+        let text = plan_text(&mut dice);
+        let given = Given {
+            domain: DOMAIN,
+            init: "",
+            plan: &text,
+            ..Given::default()
+        };
+        let (task, plan) = given.task_and_plan();
+        for guarantee in Guarantee::ALL {
+            let Ok(oracle) = Oracle::new(&task, &plan, guarantee) else {
+                without += 1;
+                continue;
+            };
+            let settings = Settings {
+                precision: Rational::new(1, [1, 4, 16][dice.below(3)]),
+                growth: [Growth::Doubling, Growth::Constant][usize::from(dice.below(4) == 0)],
+                most_checks: (dice.below(3) == 0).then(|| 1 + dice.below(40)),
+                ..Settings::default()
+            };
+            let most = [1_000, 1 + dice.below(30)][dice.below(2)];
+            let expected = one_by_one(&mut oracle.clone(), &plan, &settings, most);
+            let mut own = oracle.clone();
+            let found = as_built(&mut own, &settings, most);
+            assert_eq!(found, expected, "{guarantee} {settings:?} {most} {text}");
+            if let Some(envelope) = &found.envelope {
+                // What is told is what the oracle goes on from, and it is inside.
+                assert_eq!(own.accepted(), Some(envelope), "{guarantee} {text}");
+                assert_eq!(own.checks(), found.checks);
+                assert_eq!(oracle.clone().objection(envelope), Ok(None));
+                objected += objections(&mut own, &mut oracle.clone(), &plan, envelope);
+            }
+            long += usize::from(found.steps.len() > 60);
+            limited += usize::from(found.stop == StopReason::CheckLimit);
+            cancelled += usize::from(found.stop == StopReason::Cancelled);
+        }
+    }
+    assert!(
+        objected > 1_000 && long > 60 && limited > 60 && cancelled > 60 && without < 600,
+        "{long} {limited} {cancelled} {without} {objected}"
+    );
+}
