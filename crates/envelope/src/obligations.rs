@@ -14,6 +14,7 @@ mod compile;
 mod dnf;
 mod goal;
 mod over_all;
+mod precedence;
 mod separation;
 mod timeline;
 

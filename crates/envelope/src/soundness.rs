@@ -44,6 +44,8 @@ pub(crate) struct Soundness {
     obligations: Obligations,
     direct: Vec<DirectCase>,
     over_all: Vec<Option<Proof>>,
+    /// Whether these proofs are about boxes within the ranges of the parameters.
+    is_in_ranges: bool,
     /// The numbers in all bounds but the ends of boxes; `None` if they are large.
     numbers: Option<Numbers>,
     /// The case that broke last: the likeliest to break next.
@@ -166,6 +168,7 @@ impl Soundness {
             obligations,
             direct,
             over_all,
+            is_in_ranges: true,
             numbers,
             suspect: 0,
             refutations: 0,
@@ -203,6 +206,7 @@ impl Soundness {
             obligations,
             direct,
             over_all,
+            is_in_ranges,
             numbers,
             suspect,
             refutations,
@@ -245,6 +249,11 @@ impl Soundness {
         if found.is_some() {
             return Ok(found);
         }
+        let is_within = DecoupledEnvelope::ranges(plan).includes(envelope);
+        if is_within != *is_in_ranges {
+            *is_in_ranges = is_within;
+            over_all.fill(None);
+        }
         for (over_all, proof) in obligations.over_all.iter().zip(over_all) {
             if proof
                 .as_ref()
@@ -256,7 +265,7 @@ impl Soundness {
                 return Ok(None);
             };
             *refutations += 1;
-            match schedules.prove(task, plan, over_all, proof.as_ref(), moved)? {
+            match schedules.prove(task, plan, over_all, is_within, (proof.as_ref(), moved))? {
                 Ok(found) => *proof = Some(found),
                 Err(case) => {
                     return Ok(Some(Broken {

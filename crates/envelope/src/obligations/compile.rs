@@ -16,6 +16,7 @@ use guards::{GuardId, GuardPart, effects};
 use super::dnf::{Alternatives, Wanted, compared};
 use super::goal::goal_cases;
 use super::over_all::literal_cases;
+use super::precedence::Precedence;
 use super::separation::separations;
 use super::timeline::{FluentChange, Reading, Timeline};
 use super::{
@@ -255,6 +256,7 @@ impl Compiler<'_> {
     fn finish(&self, run: Run, obligations: &mut Obligations) -> Result<(), Refusal> {
         let timeline = Arc::new(run.timeline);
         let plan = &self.plan.plan;
+        let precedence = Precedence::of(self.plan);
         for (index, instance) in plan.instances.iter().enumerate() {
             let id = InstanceId::from(index);
             let Some(body) = instance.action.durative() else {
@@ -285,7 +287,7 @@ impl Compiler<'_> {
                         plan,
                         id,
                         condition,
-                        &self.order,
+                        (&self.order, &precedence),
                         &timeline,
                         &self.substitution,
                     )),

@@ -1,13 +1,14 @@
 //! Over-all conditions: what must hold at every moment of an action's open interval.
 
 use std::cell::OnceCell;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Condition, FactId};
 
 use super::dnf::{Alternatives, Wanted};
+use super::precedence::Precedence;
 use super::timeline::{Reading, Timeline};
 use super::{BadCase, Difference, Inequality, Refusal, Substitution};
 use elbowroom_plan::{InstanceId, NodeId, StnPlan};
@@ -29,6 +30,9 @@ pub struct OverAll {
     pub condition: Condition,
     /// The nodes that change what the condition reads, in nominal order.
     pub events: Vec<NodeId>,
+    /// The events of which it is known whether they come before the moment, as long as the
+    /// parameters' values are in their ranges; and whether they do.
+    pub(crate) settled: BTreeMap<NodeId, bool>,
     /// Under which outcomes of conditional effects all this applies.
     pub assumptions: Vec<Inequality>,
     /// Stands for the moment in differences and inequalities.
@@ -43,7 +47,7 @@ impl OverAll {
         plan: &StnPlan,
         instance: InstanceId,
         condition: &Condition,
-        order: &[NodeId],
+        (order, precedence): (&[NodeId], &Precedence),
         timeline: &Arc<Timeline>,
         substitution: &Arc<Substitution>,
     ) -> Self {
@@ -54,16 +58,21 @@ impl OverAll {
         task.visit_fluents_of(condition, &mut |fluent| {
             touched.extend(timeline.fluent_nodes(fluent));
         });
+        let (start, end) = (plan.start(instance), plan.end(instance));
+        let events = order.iter().copied();
+        let events: Vec<NodeId> = events.filter(|node| touched.contains(node)).collect();
+        let (happened, to_come) = (precedence.not_after(start), precedence.not_before(end));
+        let settled = events.iter().filter_map(|event| {
+            let has_happened = happened.contains(event);
+            (has_happened || to_come.contains(event)).then_some((*event, has_happened))
+        });
         Self {
             instance,
-            start: plan.start(instance),
-            end: plan.end(instance),
+            start,
+            end,
             condition: condition.clone(),
-            events: order
-                .iter()
-                .copied()
-                .filter(|node| touched.contains(node))
-                .collect(),
+            settled: settled.collect(),
+            events,
             assumptions: timeline.assumptions.clone(),
             moment: NodeId::from(plan.nodes.len()),
             timeline: Arc::clone(timeline),

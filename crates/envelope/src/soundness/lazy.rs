@@ -61,15 +61,15 @@ impl<'a> AnySchedules<'a> {
         task: &'a Task,
         plan: &'a ParametrizedPlan,
         over_all: &'a OverAll,
-        old: Option<&Proof>,
-        moved: Option<BoxEnd>,
+        is_in_ranges: bool,
+        (old, moved): (Option<&Proof>, Option<BoxEnd>),
     ) -> Result<Attempt, Refusal> {
         match self {
             Self::Whole(schedules) => {
-                Prover::new(task, plan, over_all, schedules).prove(old, moved)
+                Prover::new(task, plan, over_all, schedules, is_in_ranges).prove(old, moved)
             }
             Self::Exact(schedules) => {
-                Prover::new(task, plan, over_all, schedules).prove(old, moved)
+                Prover::new(task, plan, over_all, schedules, is_in_ranges).prove(old, moved)
             }
         }
     }

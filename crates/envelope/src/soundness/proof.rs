@@ -42,6 +42,8 @@ pub(crate) struct Prover<'a, 'b, S: Scale> {
     pub(crate) plan: &'a ParametrizedPlan,
     pub(crate) over_all: &'a OverAll,
     pub(crate) schedules: &'b mut Schedules<'a, S>,
+    /// The events that may come before the moment or after it.
+    events: Vec<NodeId>,
     /// The differences assumed so far, for the counterexample.
     assumed: Vec<Difference>,
     places: usize,
@@ -56,8 +58,12 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
         plan: &'a ParametrizedPlan,
         over_all: &'a OverAll,
         schedules: &'b mut Schedules<'a, S>,
+        is_in_ranges: bool,
     ) -> Self {
+        let events = over_all.events.iter().copied();
+        let is_open = |event: &NodeId| !is_in_ranges || !over_all.settled.contains_key(event);
         Self {
+            events: events.filter(is_open).collect(),
             task,
             plan,
             over_all,
@@ -120,7 +126,7 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
                 limit: MOST_PLACES,
             });
         }
-        let Some(&event) = self.over_all.events.get(index) else {
+        let Some(&event) = self.events.get(index) else {
             return self.settle(happened);
         };
         let (old_after, old_before) = match old {
@@ -177,7 +183,11 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
 
     /// All events are placed: the condition's value is now an expression.
     fn settle(&mut self, happened: &[NodeId]) -> Result<Attempt, Refusal> {
-        let cut = |node: NodeId| happened.contains(&node);
+        let is_open = |node: &NodeId| self.events.contains(node);
+        let cut = |node: NodeId| match self.over_all.settled.get(&node) {
+            Some(has_happened) if !is_open(&node) => *has_happened,
+            _ => happened.contains(&node),
+        };
         let mut proofs = Vec::new();
         for mut inequalities in self.over_all.cases(self.task, &self.plan.plan, &cut)? {
             inequalities.extend(self.over_all.assumptions.iter().cloned());
