@@ -159,26 +159,34 @@ impl Timeline {
                         drift.1 = *node;
                     }
                 }
-                FluentChange::Shift(amount) => base = base.map(|base| base.plus(amount)),
+                FluentChange::Shift(amount) => {
+                    if let Some(base) = &mut base {
+                        base.add_scaled(amount, &Rational::ONE);
+                    }
+                }
                 FluentChange::Drift(rate) => drifts.push((*node, *node, rate)),
                 FluentChange::DriftEnd(since) => {
                     if let Some(index) = drifts.iter().position(|&(began, _, _)| began == *since) {
                         let (_, counted, rate) = drifts.remove(index);
-                        base = base.and_then(|base| add_drift(&base, rate, counted, *node));
+                        base = base.and_then(|base| add_drift(base, rate, counted, *node));
                     }
                 }
             }
         }
         for (_, counted, rate) in drifts {
-            base = base.and_then(|base| add_drift(&base, rate, counted, moment));
+            base = base.and_then(|base| add_drift(base, rate, counted, moment));
         }
         base
     }
 }
 
 /// `base + rate * (until - since)`; rates hold no times, so the product is always representable.
-fn add_drift(base: &Linear, rate: &Linear, since: NodeId, until: NodeId) -> Option<Linear> {
-    Some(base.plus(&rate.times(&Linear::difference(since, until))?))
+fn add_drift(mut base: Linear, rate: &Linear, since: NodeId, until: NodeId) -> Option<Linear> {
+    base.add_scaled(
+        &rate.times(&Linear::difference(since, until))?,
+        &Rational::ONE,
+    );
+    Some(base)
 }
 
 /// The parameter, or the difference of times that it is.

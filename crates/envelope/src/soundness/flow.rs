@@ -26,9 +26,15 @@ pub(crate) fn cheapest<W: Weight>(
         // A schedule `t` satisfies `t_to - t_from <= w`: reduced costs are non-negative from the
         // beginning.
         potential: network.schedule().times().to_vec(),
+        reached: vec![None; network.network().node_count()],
+        touched: Vec::new(),
     };
     let mut demand = demand.to_vec();
-    while let Some(source) = demand.iter().position(Rational::is_negative) {
+    // Where no more has to leave, nothing will have to later.
+    let mut first = 0;
+    while let Some(offset) = demand[first..].iter().position(Rational::is_negative) {
+        let source = first + offset;
+        first = source;
         let (sink, steps) = search.nearest(NodeId(u32::try_from(source).ok()?), &demand)?;
         let mut amount = (-&demand[source]).min(demand[sink.index()].clone());
         for step in &steps {
@@ -62,27 +68,71 @@ struct Search<'a, W> {
     flow: Flow,
     /// Invariant: no residual step is cheaper than the difference of its nodes' potentials.
     potential: Vec<W>,
+    /// What is known of the nodes during a search for a path; nothing between two of them.
+    reached: Vec<Option<Reached<W>>>,
+    /// The nodes of which something is known.
+    touched: Vec<NodeId>,
+}
+
+/// A node that a path leads to.
+#[derive(Clone)]
+struct Reached<W> {
+    distance: W,
+    /// The last step, and the node before it; `None` at the source.
+    step: Option<(Step, NodeId)>,
+    is_final: bool,
 }
 
 impl<W: Weight> Search<'_, W> {
     /// The node with open demand nearest to `source`, and the way there. Dijkstra's algorithm with
     /// reduced costs; the potentials are brought up to date.
+    ///
+    /// Takes time for the nodes that are nearer, and none for the others: potentials matter only by
+    /// their differences, so those of the nearer ones are lowered instead of raising all.
     fn nearest(&mut self, source: NodeId, demand: &[Rational]) -> Option<(NodeId, Vec<Step>)> {
+        let found = self.explore(source, demand);
+        let path = found.map(|(sink, reach)| {
+            for node in &self.touched {
+                if let Some(own) = &self.reached[node.index()]
+                    && own.distance < reach
+                {
+                    let potential = &mut self.potential[node.index()];
+                    *potential = potential.plus(&own.distance.minus(&reach));
+                }
+            }
+            let mut path = Vec::new();
+            let mut node = sink;
+            while let Some((step, before)) =
+                self.reached[node.index()].as_ref().and_then(|it| it.step)
+            {
+                path.push(step);
+                node = before;
+            }
+            (sink, path)
+        });
+        for node in self.touched.drain(..) {
+            self.reached[node.index()] = None;
+        }
+        path
+    }
+
+    /// Looks for that node, and says how far it is.
+    fn explore(&mut self, source: NodeId, demand: &[Rational]) -> Option<(NodeId, W)> {
         let network = self.network.network();
-        let count = network.node_count();
-        let mut distances: Vec<Option<W>> = vec![None; count];
-        let mut steps: Vec<Option<(Step, NodeId)>> = vec![None; count];
-        let mut is_final = vec![false; count];
         let mut queue = BinaryHeap::from([Reverse((W::zero(), source))]);
-        distances[source.index()] = Some(W::zero());
-        let mut sink = None;
+        self.touched.push(source);
+        self.reached[source.index()] = Some(Reached {
+            distance: W::zero(),
+            step: None,
+            is_final: false,
+        });
         while let Some(Reverse((distance, node))) = queue.pop() {
-            if std::mem::replace(&mut is_final[node.index()], true) {
+            let own = self.reached[node.index()].as_mut()?;
+            if std::mem::replace(&mut own.is_final, true) {
                 continue;
             }
             if demand[node.index()].is_positive() {
-                sink = Some((node, distance));
-                break;
+                return Some((node, distance));
             }
             let along = network
                 .leaving(node)
@@ -92,7 +142,8 @@ impl<W: Weight> Search<'_, W> {
                 .filter(|id| self.flow[id.index()].is_positive())
                 .map(|id| (Step::Back(id), network.constraint(id).from));
             for (step, far) in along.chain(back) {
-                if is_final[far.index()] {
+                let known = &mut self.reached[far.index()];
+                if known.as_ref().is_some_and(|known| known.is_final) {
                     continue;
                 }
                 let cost = match step {
@@ -103,29 +154,19 @@ impl<W: Weight> Search<'_, W> {
                     .plus(&self.potential[node.index()])
                     .minus(&self.potential[far.index()]);
                 let candidate = distance.plus(&reduced);
-                if distances[far.index()]
-                    .as_ref()
-                    .is_none_or(|old| candidate < *old)
-                {
+                if known.is_none() {
+                    self.touched.push(far);
+                }
+                if known.as_ref().is_none_or(|old| candidate < old.distance) {
                     queue.push(Reverse((candidate.clone(), far)));
-                    distances[far.index()] = Some(candidate);
-                    steps[far.index()] = Some((step, node));
+                    *known = Some(Reached {
+                        distance: candidate,
+                        step: Some((step, node)),
+                        is_final: false,
+                    });
                 }
             }
         }
-        let (sink, reach) = sink?;
-        for (potential, distance) in self.potential.iter_mut().zip(&distances) {
-            let moved = distance
-                .as_ref()
-                .map_or(&reach, |distance| distance.min(&reach));
-            *potential = potential.plus(moved);
-        }
-        let mut path = Vec::new();
-        let mut node = sink;
-        while let Some((step, before)) = steps[node.index()] {
-            path.push(step);
-            node = before;
-        }
-        Some((sink, path))
+        None
     }
 }
