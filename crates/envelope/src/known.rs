@@ -19,12 +19,20 @@ pub(crate) struct Known {
     /// For each cut, the room that each of its rows leaves; `None` if the row does not hold because
     /// an infinite end counts.
     room: Vec<Vec<Option<Rational>>>,
-    /// By end: the cuts that mention it, each with its rows and the end's factors there.
-    mentions: BTreeMap<BoxEnd, Vec<(usize, Vec<(usize, Rational)>)>>,
+    /// By end: where it counts.
+    mentions: BTreeMap<BoxEnd, Vec<Mention>>,
     /// Ends that cannot be infinite.
     finite: BTreeSet<BoxEnd>,
     /// The present box, if it is known.
     looked_at: Option<DecoupledEnvelope>,
+}
+
+/// A cut that an end counts in.
+#[derive(Clone, Debug)]
+struct Mention {
+    cut: usize,
+    /// The rows with the end, and its factor in each.
+    rows: Vec<(usize, Rational)>,
 }
 
 impl Known {
@@ -39,7 +47,8 @@ impl Known {
             }
         }
         for (end, rows) in rows {
-            self.mentions.entry(end).or_default().push((index, rows));
+            let mention = Mention { cut: index, rows };
+            self.mentions.entry(end).or_default().push(mention);
         }
         self.room.push(room(&cut, envelope));
         self.cuts.push(cut);
@@ -80,11 +89,11 @@ impl Known {
         to: Option<&Rational>,
     ) -> Option<&Cut> {
         let mut mentions = self.mentions.get(&end)?.iter();
-        let found = mentions.find(|(index, moved)| {
-            let cut = &self.cuts[*index];
-            let mut rows = cut.rows.iter().zip(&self.room[*index]).enumerate();
+        let found = mentions.find(|mention| {
+            let cut = &self.cuts[mention.cut];
+            let mut rows = cut.rows.iter().zip(&self.room[mention.cut]).enumerate();
             !rows.any(|(place, (row, room))| {
-                let factor = moved.iter().find(|(own, _)| *own == place);
+                let factor = mention.rows.iter().find(|(own, _)| *own == place);
                 let left = match (room, factor, to) {
                     (None, ..) | (_, Some(_), None) => return false,
                     (Some(room), None, _) => room.clone(),
@@ -93,15 +102,15 @@ impl Known {
                 left.is_positive() || left.is_zero() && !row.is_strict
             })
         });
-        found.map(|(index, _)| &self.cuts[*index])
+        found.map(|mention| &self.cuts[mention.cut])
     }
 
     /// The present box is the one with this end moved out.
     pub(crate) fn moved(&mut self, end: BoxEnd, from: &Rational, to: Option<&Rational>) {
         self.looked_at = None;
-        for (index, rows) in self.mentions.get(&end).into_iter().flatten() {
-            for (place, factor) in rows {
-                let room = &mut self.room[*index][*place];
+        for mention in self.mentions.get(&end).into_iter().flatten() {
+            for (place, factor) in &mention.rows {
+                let room = &mut self.room[mention.cut][*place];
                 *room = match (room.take(), to) {
                     (Some(room), Some(to)) => Some(room - factor * &(to - from)),
                     _ => None,

@@ -38,11 +38,15 @@ pub(super) struct Ahead<'a> {
 
 /// A step that was taken.
 struct Step {
-    /// How far the end reaches now, if it was moved: `Some(None)` if it is infinite.
-    reach: Option<(BoxEnd, Option<Rational>)>,
+    /// The end that was moved, if one was.
+    moved: Option<(BoxEnd, Reach)>,
     /// The number of boxes decided about by then.
     checks: usize,
 }
+
+/// How far an end reaches; `None` is infinitely far.
+#[derive(Clone)]
+struct Reach(Option<Rational>);
 
 /// Steps that were taken without a check.
 struct Leap {
@@ -152,15 +156,15 @@ impl<'a> Ahead<'a> {
             match &reach {
                 Some(reach) => {
                     leap.frontier.accept(end);
-                    if self.is_far(end, reach.as_ref()) {
+                    if self.is_far(end, reach.0.as_ref()) {
                         leap.frontier.finish(end);
                     }
-                    leap.envelope.set_reach(end, reach.clone());
+                    leap.envelope.set_reach(end, reach.0.clone());
                 }
                 None => leap.frontier.reject(end),
             }
             leap.steps.push(Step {
-                reach: reach.map(|reach| (end, reach)),
+                moved: reach.map(|reach| (end, reach)),
                 checks: leap.checks,
             });
         }
@@ -174,7 +178,7 @@ impl<'a> Ahead<'a> {
         end: BoxEnd,
         range: &Interval,
         step: &Rational,
-    ) -> Option<Option<Rational>> {
+    ) -> Option<Reach> {
         let from = end.reach(&leap.envelope)?;
         let reach = wanted(&from, end, range, step)?;
         leap.checks += 1;
@@ -186,10 +190,10 @@ impl<'a> Ahead<'a> {
             leap.checks += 1;
             if !self.is_refused(end, &reach, None) {
                 self.known.moved(end, &reach, None);
-                return Some(None);
+                return Some(Reach(None));
             }
         }
-        Some(Some(reach))
+        Some(Reach(Some(reach)))
     }
 
     /// Whether the box with that end moved is known not to be inside.
@@ -200,7 +204,7 @@ impl<'a> Ahead<'a> {
     /// Whether the box after these steps is inside the envelope; if not, what that says about
     /// others.
     fn confirmed(&mut self, leap: &Leap) -> Confirmed {
-        let moved = leap.steps.iter().filter(|step| step.reach.is_some());
+        let moved = leap.steps.iter().filter(|step| step.moved.is_some());
         let answer = match moved.count() {
             0 => return Confirmed::Yes,
             _ => self.oracle.accept_or_learn(&leap.envelope),
@@ -220,9 +224,9 @@ impl<'a> Ahead<'a> {
     ) -> ControlFlow<()> {
         for step in &leap.steps {
             self.checks = step.checks;
-            let flow = match &step.reach {
+            let flow = match &step.moved {
                 Some((end, reach)) => {
-                    self.envelope.set_reach(*end, reach.clone());
+                    self.envelope.set_reach(*end, reach.0.clone());
                     on_step(Some(&Widening {
                         envelope: &self.envelope,
                         end: *end,
