@@ -8,7 +8,8 @@
 //! same with the dynamic one.
 //!
 //! `rounds` and `rounds_first_widening` are deliveries of our own with all durations left open, by
-//! the number of parameters.
+//! the number of parameters. `many` is the whole answer of `elbowroom envelope`, with what limits each
+//! end, for plans with up to a thousand parameters.
 
 #[path = "../tests/shared/mod.rs"]
 mod shared;
@@ -17,11 +18,14 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use divan::Bencher;
-use elbowroom::flow;
+use elbowroom::answers::envelope::envelope;
+use elbowroom::answers::{EnvelopeRequest, Unwatched};
+use elbowroom::{AnyPlan, flow};
 use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_plan, read_problem};
 use elbowroom_plan::{ParametrizedPlan, format};
+use shared::chains::{Needs, chains};
 use shared::instances::{Instance, figure_3, figure_4};
 
 fn main() {
@@ -110,6 +114,28 @@ fn rounds(bencher: Bencher<'_, '_>, parameters: usize) {
 fn rounds_first_widening(bencher: Bencher<'_, '_>, parameters: usize) {
     let (task, plan) = delivery(parameters);
     bencher.bench_local(|| search(&task, &plan, Guarantee::Weak, 1));
+}
+
+/// Robots, ways of each, and what they need.
+const MANY: [(usize, usize, Needs); 6] = [
+    (1, 100, Needs::Time),
+    (1, 400, Needs::Time),
+    (1, 1000, Needs::Time),
+    (10, 100, Needs::Time),
+    (1, 100, Needs::Charge),
+    (1, 400, Needs::Charge),
+];
+
+#[divan::bench(args = MANY, sample_count = 3)]
+fn many(bencher: Bencher<'_, '_>, (robots, ways, needs): (usize, usize, Needs)) {
+    let (domain, problem, plan) = chains(robots, ways, needs);
+    let domain = Source::new("domain", domain);
+    let problem = Source::new("problem", problem);
+    let (problem, _) = read_problem(&domain, &problem).expect("a readable problem");
+    let task = Task::new(problem);
+    let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a readable plan");
+    let request = EnvelopeRequest::new(&Arc::new(task), AnyPlan::TimeTriggered(plan));
+    bencher.bench_local(|| envelope(&request, &mut Unwatched).expect("within exact reasoning"));
 }
 
 #[divan::bench_group]

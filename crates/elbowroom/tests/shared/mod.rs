@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test uses some of it")]
 
 pub(crate) mod case;
+pub(crate) mod chains;
 pub(crate) mod draw;
 pub(crate) mod instances;
 pub(crate) mod rounds;

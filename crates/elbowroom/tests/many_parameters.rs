@@ -1,0 +1,94 @@
+//! Plans with many parameters: the work grows with the plan, not with its square.
+
+mod shared;
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom::answers::envelope::{EnvelopeFinding, envelope};
+use elbowroom::answers::{EnvelopeRequest, Unwatched};
+use elbowroom::{AnyPlan, flow};
+use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_pddl::{Source, read_plan, read_problem};
+use elbowroom_plan::ParametrizedPlan;
+use shared::chains::{Needs, chains};
+
+fn read(robots: usize, ways: usize, needs: Needs) -> (Arc<Task>, TimeTriggeredPlan) {
+    let (domain, problem, plan) = chains(robots, ways, needs);
+    let (domain, problem) = (
+        Source::new("domain", domain),
+        Source::new("problem", problem),
+    );
+    let (problem, _) = read_problem(&domain, &problem).expect("a readable problem");
+    let task = Task::new(problem);
+    let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a readable plan");
+    (Arc::new(task), plan)
+}
+
+fn open(robots: usize, ways: usize, needs: Needs) -> (Arc<Task>, Arc<ParametrizedPlan>) {
+    let (task, plan) = read(robots, ways, needs);
+    let freed = flow::free(&task, &plan).expect("a valid plan");
+    let plan = flow::open(&task, freed, &[]).expect("durations to leave open");
+    assert_eq!(plan.parameters.len(), robots * ways);
+    (task, Arc::new(plan))
+}
+
+/// The number of bad cases that a search refutes from scratch: most of what it does.
+fn refutations(robots: usize, ways: usize, needs: Needs, guarantee: Guarantee) -> usize {
+    let (task, plan) = open(robots, ways, needs);
+    let mut oracle = Oracle::new(&task, &plan, guarantee).expect("within reach");
+    let settings = Settings {
+        relative: Some(Rational::new(1, 100)),
+        ..Settings::default()
+    };
+    let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(()));
+    let run = run.expect("few cases");
+    assert!(run.envelope.is_ok());
+    // Each box that is decided about has been checked, were nothing known beforehand.
+    assert!(run.checks > 2 * plan.parameters.len());
+    oracle.refutations()
+}
+
+#[test]
+fn the_work_of_a_search_grows_in_proportion_to_the_plan() {
+    for (robots, needs) in [(1, Needs::Time), (4, Needs::Time), (1, Needs::Charge)] {
+        for guarantee in Guarantee::ALL {
+            let small = refutations(robots, 12, needs, guarantee);
+            let large = refutations(robots, 48, needs, guarantee);
+            assert!(
+                large <= 6 * small,
+                "{robots} {needs:?} {guarantee}: {small} {large}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_limits_each_end_is_told_in_a_plan_with_many_parameters() {
+    let (task, plan) = read(3, 40, Needs::Time);
+    let request = EnvelopeRequest::new(&task, AnyPlan::TimeTriggered(plan));
+    let outcome = envelope(&request, &mut Unwatched).expect("within exact reasoning");
+    let EnvelopeFinding::Envelope { parameters, .. } = &outcome.answer.finding else {
+        panic!("{:?}", outcome.answer);
+    };
+    assert_eq!(parameters.len(), 120);
+    for room in parameters {
+        let limit = room.upper_limit.as_deref().unwrap_or_default();
+        assert!(limit.contains("(open)"), "{limit}");
+        // All ways of that robot, and of no other.
+        let own = &room.range.quantity.quantity;
+        let robot = own
+            .split_whitespace()
+            .find(|word| word.starts_with('r'))
+            .expect("a robot");
+        let others = ["r0", "r1", "r2"]
+            .into_iter()
+            .filter(|other| *other != robot);
+        for other in others {
+            assert!(!limit.contains(&format!("(go {other} ")), "{own}: {limit}");
+        }
+        assert!(room.lower_limit.is_some(), "{own}");
+    }
+}
