@@ -71,6 +71,7 @@ fn an_experiment_in_perturbed_worlds_leaves_tables_and_plots() {
         "as-published-actions-success.svg",
         "as-published-replans.svg",
         "as-published-success.svg",
+        "failures",
         "results.json",
         "sound-actions-failure.svg",
         "sound-actions-success.svg",

@@ -105,16 +105,27 @@ impl AnyExperiment {
         }
     }
 
-    /// Makes a trial once more, for its trace (`docs/formats/trace.md`) or, in a world without time,
-    /// its course (`docs/formats/course.md`).
+    /// Makes trials once more, for their traces (`docs/formats/trace.md`) or, in worlds without time,
+    /// their courses (`docs/formats/course.md`).
     ///
     /// # Errors
     /// When there is no such trial.
-    pub fn trace(&self, failed: &FailedTrial) -> Result<String, CompareError> {
-        let (row, column, _) = failed.place;
+    pub fn traces(&self, failed: &[FailedTrial]) -> Result<Vec<String>, CompareError> {
         match self {
-            Self::Timed(experiment) => Ok(compare::trace(experiment, (row, column), failed.id)?),
-            Self::Untimed(experiment) => Ok(perturbed::course(experiment, row, failed.id.trial)?),
+            Self::Timed(experiment) => {
+                let traces = failed.iter().map(|failed| {
+                    let (row, column, _) = failed.place;
+                    Ok(compare::trace(experiment, (row, column), failed.id)?)
+                });
+                traces.collect()
+            }
+            Self::Untimed(experiment) => {
+                let trials = failed
+                    .iter()
+                    .map(|failed| (failed.place.0, failed.id.trial));
+                let trials: Vec<(usize, u64)> = trials.collect();
+                Ok(perturbed::courses(experiment, &trials)?)
+            }
         }
     }
 

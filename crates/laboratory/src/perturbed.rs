@@ -12,6 +12,7 @@ mod results;
 mod table;
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -132,29 +133,38 @@ fn rows(
     })
 }
 
-/// Makes a trial once more, and writes down what is done in it: `docs/formats/course.md`. `row` is its
-/// row in the results.
+/// Makes trials once more, each named by its row in the results and its number, and writes down what
+/// is done in them: `docs/formats/course.md`.
 ///
 /// # Errors
 /// When there is no such row; as for [`run`] otherwise.
-pub fn course(
+pub fn courses(
     experiment: &PerturbedExperiment,
-    row: usize,
-    trial: u64,
-) -> Result<String, PerturbedError> {
-    let (case, world, executor) = rows(experiment)
-        .nth(row)
-        .ok_or_else(|| PerturbedError::other("there is no such row"))?;
-    let setting = Setting::new(experiment, case)?;
-    let mut course = Course::default();
+    trials: &[(usize, u64)],
+) -> Result<Vec<String>, PerturbedError> {
+    let rows: Vec<_> = rows(experiment).collect();
     let watch = Watch {
         goes_on: &|| true,
         tell: &|| {},
         records: None,
     };
-    setting.row((world, executor), trial..=trial, &watch, Some(&mut course))?;
-    let stored = StoredCourse::new(&setting, (world, executor), trial, &course);
-    Ok(stored.text())
+    // Tables take long to make, and trials of one case share one.
+    let mut settings: BTreeMap<usize, Setting<'_>> = BTreeMap::new();
+    let mut texts = Vec::with_capacity(trials.len());
+    for &(row, trial) in trials {
+        let &(case, world, executor) = rows
+            .get(row)
+            .ok_or_else(|| PerturbedError::other("there is no such row"))?;
+        let setting = match settings.entry(case) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => entry.insert(Setting::new(experiment, case)?),
+        };
+        let mut course = Course::default();
+        let own = (world, executor);
+        setting.row(own, trial..=trial, &watch, Some(&mut course))?;
+        texts.push(StoredCourse::new(setting, own, trial, &course).text());
+    }
+    Ok(texts)
 }
 
 impl<'e> Setting<'e> {
@@ -326,6 +336,7 @@ impl<'e> Setting<'e> {
         if !(watch.goes_on)() {
             return Ok(Row::new(self.case, world, kind, None));
         }
+        let is_for_reading = course.is_some();
         let mut executor = self.executor(kind)?;
         // The table is of the sound world; elsewhere it promises nothing.
         let foresight = match world {
@@ -348,7 +359,7 @@ impl<'e> Setting<'e> {
             course,
         };
         let mut row = Row::new(self.case, world, kind, foresight.map(Foresighted::value));
-        if world == WorldKind::Sound {
+        if world == WorldKind::Sound && !is_for_reading {
             row.other_optima = self.other_optima().clone()?;
         }
         for number in numbers {

@@ -246,7 +246,9 @@ fn failures_are_counted_by_kind_and_the_first_trial_of_each_can_be_made_once_mor
         assert_eq!(failed, row.success.count - row.success.successes);
         for kind in kinds {
             let trial = kind.first.trial;
-            let text = perturbed::course(&experiment, place, trial).unwrap();
+            let text = perturbed::courses(&experiment, &[(place, trial)])
+                .unwrap()
+                .remove(0);
             let course = StoredCourse::read(&text).unwrap();
             assert_eq!(course.text(), text);
             assert_eq!((&course.ended, course.trial), (&kind.verdict, trial));
@@ -268,17 +270,12 @@ fn failures_are_counted_by_kind_and_the_first_trial_of_each_can_be_made_once_mor
     let table = records.table().csv();
     assert!(table.contains("goal-reached"));
     let row = &made.rows[0];
-    let failed: Vec<u64> = (0..60)
-        .filter(|trial| {
-            let text = perturbed::course(&experiment, 0, *trial).unwrap();
-            StoredCourse::read(&text).unwrap().ended != "goal-reached"
-        })
-        .collect();
-    assert_eq!(
-        failed.len() as u64,
-        row.success.count - row.success.successes
-    );
-    assert!(perturbed::course(&experiment, made.rows.len(), 0).is_err());
+    let all: Vec<(usize, u64)> = (0..60).map(|trial| (0, trial)).collect();
+    let courses = perturbed::courses(&experiment, &all).unwrap();
+    let has_failed = |text: &&String| StoredCourse::read(text).unwrap().ended != "goal-reached";
+    let failed = courses.iter().filter(has_failed).count();
+    assert_eq!(failed as u64, row.success.count - row.success.successes);
+    assert!(perturbed::courses(&experiment, &[(made.rows.len(), 0)]).is_err());
 }
 
 #[test]

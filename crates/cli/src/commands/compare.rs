@@ -177,9 +177,8 @@ fn write_failures(
     if !failed.is_empty() {
         make_folder(&folder)?;
     }
-    for failed in failed {
+    for (failed, trace) in failed.iter().zip(experiment.traces(&failed)?) {
         let (row, column, kind) = failed.place;
-        let trace = experiment.trace(&failed)?;
         let name = format!("{row}-{column}-{kind}.jsonl");
         output::write_file(&folder.join(name), &trace)?;
     }
