@@ -9,7 +9,7 @@ use elbowroom::execution::{Ending, Event, Planner, PlannerAnswer};
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 
-use crate::lasting::{Notes, Scripted};
+use crate::lasting::scripted::{Notes, Scripted};
 use crate::scene::{Scene, read};
 
 /// Walking and climbing take 20 of 26 seconds, and the envelope lets walking take 15.3125. There is also

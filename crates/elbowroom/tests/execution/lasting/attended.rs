@@ -1,0 +1,54 @@
+//! Runs that end with their goal, and can be paused and given up.
+
+use elbowroom::execution::run::Verdict;
+use elbowroom::execution::{Event, Request};
+use elbowroom::num::Rational;
+
+use super::scripted::{abandon, assert_has, attended, has, pursue, task};
+
+#[test]
+fn an_attended_run_is_over_with_its_goal_and_takes_no_other() {
+    let task = task("", "(and (have book) (have cup))");
+    let told = attended(&task, 100, vec![(5, pursue("key", "(have key)"))]);
+    assert_has(&told, &["takes no other goals", "start"]);
+    assert_eq!(told.report.verdict, Verdict::GoalReached);
+    assert!(!has(&told, "key"), "{:#?}", told.notes);
+    assert_eq!(told.plans, 1);
+}
+
+#[test]
+fn an_attended_run_whose_goal_is_given_up_is_over_when_what_is_under_way_has_ended() {
+    let task = task("", "(and (have book) (have cup))");
+    let told = attended(&task, 100, vec![(5, abandon("problem"))]);
+    let starts = told.notes.iter().filter(|it| it.contains("start"));
+    assert_eq!(starts.count(), 1, "{:#?}", told.notes);
+    assert!(!has(&told, "cancel") && !has(&told, "rest"));
+    assert_eq!(told.report.verdict, Verdict::Interrupted);
+    assert_eq!(told.report.time, Rational::from(10));
+    assert_eq!(told.report.executed.len(), 1);
+}
+
+#[test]
+fn an_attended_run_is_paused_between_two_actions() {
+    let task = task("", "(and (have book) (have cup))");
+    let script = vec![
+        (5, Event::Asked(Request::Pause)),
+        (30, Event::Asked(Request::Resume)),
+    ];
+    let told = attended(&task, 100, script);
+    assert_has(&told, &["0: start", "30"]);
+    assert_eq!(told.report.verdict, Verdict::GoalReached);
+    assert!(
+        told.report.time >= Rational::from(40),
+        "{}",
+        told.report.time
+    );
+    // A goal that is given up while it is paused ends it, too.
+    let script = vec![
+        (5, Event::Asked(Request::Pause)),
+        (6, abandon("problem")),
+        (30, Event::Asked(Request::Resume)),
+    ];
+    let told = attended(&task, 100, script);
+    assert_eq!(told.report.verdict, Verdict::Interrupted);
+}

@@ -1,0 +1,233 @@
+//! Changes of facts and numbers, and what nobody expected.
+
+use elbowroom::execute::{Embedded, Execution};
+use elbowroom::execution::run::Verdict;
+use elbowroom::execution::{
+    Event, Observation, PlanAnswer, Planner, PlannerAnswer, Request, Ticket,
+};
+use elbowroom::model::{Situation, Task};
+use elbowroom::num::Rational;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::scripted::{Notes, Scripted, abandon, assert_has, fact, pursue, run, task};
+
+#[test]
+fn a_changed_fact_that_the_plan_can_bear_changes_nothing_and_another_makes_a_new_plan() {
+    let task = task("", "(and (have book) (have cup))");
+    let told = run(&task, 60, vec![(5, fact(&task, "(here key)", false))]);
+    assert_eq!(told.plans, 1, "{:#?}", told.notes);
+    // Somebody has brought the cup already, and taken it from where it was.
+    let gone = [
+        fact(&task, "(here cup)", false),
+        fact(&task, "(have cup)", true),
+    ];
+    let told = run(&task, 60, gone.into_iter().map(|it| (5_i64, it)).collect());
+    assert_has(&told, &["rest: goal-reached problem"]);
+    assert_eq!(told.report.starts, 1, "{:#?}", told.notes);
+}
+
+#[test]
+fn a_changed_number_counts_for_what_comes_next() {
+    let task = task("", "(and (have book) (have cup))");
+    let fluent = task.fluent_named("(charge)").expect("a correct test");
+    let value = |value: i64| Event::Value {
+        fluent,
+        value: Rational::from(value),
+    };
+    let told = run(&task, 100, vec![(5, value(0)), (50, value(3))]);
+    assert_has(
+        &told,
+        &[
+            "rest: unsolvable-from-here problem",
+            "50: plan",
+            "50: start",
+            "rest: goal-reached problem",
+        ],
+    );
+}
+
+#[test]
+fn where_no_plan_reaches_the_goals_the_run_says_so_and_takes_others() {
+    let task = task("", "(have book)");
+    let gone = fact(&task, "(here cup)", false);
+    let script = vec![
+        (20, gone),
+        (30, pursue("cup", "(have cup)")),
+        (40, abandon("cup")),
+        (50, pursue("key", "(have key)")),
+    ];
+    let told = run(&task, 100, script);
+    assert_has(
+        &told,
+        &[
+            "30: plan",
+            "rest: unsolvable-from-here cup",
+            "40: rest: no goals",
+            "50: start (fetch r key)",
+            "rest: goal-reached key",
+        ],
+    );
+}
+
+#[test]
+fn news_end_a_rest_but_not_more_often_than_once_a_second() {
+    let task = task("", "(and (have book) (have cup))");
+    let at = |time: Rational, name: &str, truth: bool| (time, fact(&task, name, truth));
+    let mut script = Vec::new();
+    for (time, truth) in [(5, false), (30, true)] {
+        let time = Rational::from(time);
+        script.push(at(time.clone(), "(here book)", truth));
+        script.push(at(time, "(here cup)", truth));
+    }
+    // Something else flickers a hundred times in two seconds.
+    script.extend((0..100).map(|n| at(Rational::new(1000 + n, 50), "(here key)", n % 2 == 1)));
+    let told = run(&task, 60, script);
+    assert_has(
+        &told,
+        &[
+            "rest: unsolvable-from-here",
+            "30: plan",
+            "rest: goal-reached problem",
+        ],
+    );
+    assert!(told.plans <= 8, "{} plans: {:#?}", told.plans, told.notes);
+}
+
+#[test]
+fn what_makes_no_sense_is_passed_over_with_a_remark() {
+    let task = task("", "(have book)");
+    let script = vec![
+        (1, pursue("odd", "(have spoon)")),
+        (2, abandon("odd")),
+        (3, Event::Asked(Request::Resume)),
+    ];
+    let told = run(&task, 60, script);
+    assert_has(
+        &told,
+        &[
+            "1: it is no goal of this problem",
+            "2: no goal of that name is open",
+            "3: it is not paused",
+            "rest: goal-reached problem",
+        ],
+    );
+    assert_eq!(told.plans, 1);
+}
+
+/// Whatever is asked, in whatever order: nothing is started while the run is paused, nothing is
+/// started twice at a time, and tickets are never given again.
+#[test]
+fn whatever_is_asked_the_run_stays_in_order() {
+    let task = task("(free s)", "(have book)");
+    for seed in 0..60_u64 {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        let mut below = |limit: u64| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 33) % limit
+        };
+        let items = ["book", "cup", "key"];
+        let mut script = Vec::new();
+        let mut pauses = Vec::new();
+        let mut paused_at = None;
+        for time in 1..40 {
+            let item = items[usize::try_from(below(3)).expect("small")];
+            let event = match below(8) {
+                0 | 1 => pursue(item, &format!("(have {item})")),
+                2 => abandon(item),
+                3 => fact(&task, &format!("(have {item})"), false),
+                4 => fact(&task, &format!("(here {item})"), below(2) == 0),
+                5 if paused_at.is_none() => {
+                    paused_at = Some(time);
+                    Event::Asked(Request::Pause)
+                }
+                6 => {
+                    pauses.extend(paused_at.take().map(|from| (from, time)));
+                    Event::Asked(Request::Resume)
+                }
+                _ => continue,
+            };
+            script.push((time, event));
+        }
+        pauses.extend(paused_at.map(|from| (from, 1000)));
+        let told = run(&task, 80, script);
+        assert_eq!(told.report.verdict, Verdict::Interrupted, "{seed}");
+        let mut tickets: Vec<Ticket> = Vec::new();
+        for done in &told.report.executed {
+            let start = &done.step.start;
+            for (from, to) in &pauses {
+                let is_inside = *start > Rational::from(*from) && *start < Rational::from(*to);
+                assert!(!is_inside, "{seed}: started in a pause: {:#?}", told.notes);
+            }
+            assert!(!tickets.contains(&done.ticket), "{seed}");
+            tickets.push(done.ticket);
+        }
+        let spans = told.report.executed.iter().map(|it| {
+            let end = &it.step.start + it.step.duration.clone().unwrap_or_default();
+            let robot = it.step.action.name.split(' ').nth(1).unwrap_or_default();
+            (robot, it.step.start.clone(), end)
+        });
+        let spans: Vec<_> = spans.collect();
+        for (index, one) in spans.iter().enumerate() {
+            for other in &spans[index + 1..] {
+                let overlap = one.0 == other.0 && one.1 < other.2 && other.1 < one.2;
+                assert!(
+                    !overlap,
+                    "{seed}: one robot does two things: {:#?}",
+                    told.notes
+                );
+            }
+        }
+    }
+}
+
+/// The planner of a test answers this, too.
+
+#[test]
+fn a_plan_that_was_made_for_goals_that_have_changed_since_is_not_begun() {
+    /// Takes five seconds of the world's time.
+    struct Slow;
+    impl Planner for Slow {
+        fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+            let answer = Embedded::default().plan(task, situation).answer;
+            assert!(matches!(answer, PlanAnswer::Plan(_)));
+            PlannerAnswer {
+                answer,
+                seconds: Some(Rational::from(5)),
+            }
+        }
+    }
+    let task = task("", "(and)");
+    let is_to_end = Arc::new(AtomicBool::new(false));
+    let script = [
+        (10, pursue("it", "(have cup)")),
+        (12, pursue("it", "(have key)")),
+    ];
+    let coming = script.map(|(time, event)| Observation {
+        time: Rational::from(time),
+        event,
+    });
+    let mut world = Scripted {
+        now: Rational::ZERO,
+        coming: coming.into(),
+        end: Rational::from(60),
+        is_to_end: Arc::clone(&is_to_end),
+        slow: None,
+        on_cancel: None,
+    };
+    let notes = Notes::default();
+    let report = Execution::of(&task)
+        .planned_by(Slow)
+        .recorded_by(notes.clone())
+        .ending_when(move || is_to_end.load(Ordering::SeqCst))
+        .lasting(true)
+        .run_in(&mut world);
+    let names: Vec<_> = report
+        .executed
+        .iter()
+        .map(|it| it.step.action.name.as_str())
+        .collect();
+    assert_eq!(names, ["(fetch r key)"]);
+}

@@ -1,0 +1,279 @@
+//! A world that follows a script, and what is noted of a run in it.
+
+use elbowroom::execute::{Embedded, Execution};
+use elbowroom::execution::run::{Report, RunSettings, Verdict};
+use elbowroom::execution::{
+    Command, Ending, Entry, Event, Observation, Passage, Planner, PlannerAnswer, Recorder, Request,
+    World, WorldError,
+};
+use elbowroom::model::{Situation, Task};
+use elbowroom::num::Rational;
+use elbowroom::pddl::{self, Source};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Robots that fetch things, in ten seconds, as long as there is power.
+pub(super) const DOMAIN: &str =
+    "(define (domain errands) (:requirements :durative-actions :typing :fluents)
+    (:types robot item)
+    (:predicates (free ?r - robot) (here ?x - item) (have ?x - item) (power))
+    (:functions (charge))
+    (:durative-action fetch :parameters (?r - robot ?x - item) :duration (= ?duration 10)
+      :condition (and (at start (free ?r)) (at start (here ?x)) (at start (>= (charge) 1))
+        (over all (power)))
+      :effect (and (at start (not (free ?r))) (at end (free ?r)) (at end (have ?x)))))";
+
+pub(super) const OBJECTS: &str = "(:objects r s - robot book cup key - item)";
+
+pub(super) fn task(init: &str, goal: &str) -> Arc<Task> {
+    let problem = format!(
+        "(define (problem day) (:domain errands) {OBJECTS}
+           (:init (free r) (here book) (here cup) (here key) (power) (= (charge) 9) {init})
+           (:goal {goal}))"
+    );
+    let source = |text: &str| Source::new("test", text);
+    let read = pddl::read_problem(&source(DOMAIN), &source(&problem));
+    Arc::new(Task::new(read.expect("a correct test").0))
+}
+
+/// A world in which actions take as long as planned, and in which a script says what else is seen
+/// and asked. At its end, the run is asked to end.
+pub(crate) struct Scripted {
+    pub(crate) now: Rational,
+    pub(crate) coming: Vec<Observation>,
+    pub(crate) end: Rational,
+    pub(crate) is_to_end: Arc<AtomicBool>,
+    /// An action that takes so long, however long it was planned to.
+    pub(crate) slow: Option<(&'static str, Rational)>,
+    /// What is seen when something was cancelled.
+    pub(crate) on_cancel: Option<Event>,
+}
+
+impl World for Scripted {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        let coming = &mut self.coming;
+        let mut tell = |time: Rational, event: Event| coming.push(Observation { time, event });
+        let measured = Vec::new;
+        match command {
+            Command::Start {
+                ticket,
+                action,
+                duration,
+            } => {
+                let ticket = *ticket;
+                let started = Event::Started {
+                    ticket,
+                    measured: measured(),
+                };
+                tell(now.clone(), started);
+                if let Some(duration) = duration {
+                    let slow = self.slow.as_ref().filter(|(name, _)| *name == action.name);
+                    let duration = slow.map_or(duration, |(_, duration)| duration);
+                    let ended = Event::Ended {
+                        ticket,
+                        ending: Ending::Succeeded,
+                        measured: measured(),
+                    };
+                    tell(now + duration, ended);
+                }
+            }
+            Command::Cancel { ticket } => {
+                let about = *ticket;
+                coming.retain(
+                    |it| !matches!(it.event, Event::Ended { ticket, .. } if ticket == about),
+                );
+                let ended = Event::Ended {
+                    ticket: about,
+                    ending: Ending::Cancelled,
+                    measured: measured(),
+                };
+                let time = now.clone();
+                let seen = self.on_cancel.clone().into_iter().chain([ended]);
+                coming.extend(seen.map(|event| Observation {
+                    time: time.clone(),
+                    event,
+                }));
+            }
+        }
+        Ok(())
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let until = until.min(&self.end).clone();
+        let next = self.coming.iter().map(|it| it.time.clone()).min();
+        let now = next.into_iter().chain([until]).min().unwrap_or_default();
+        self.now = now.max(self.now.clone());
+        if self.now >= self.end {
+            self.is_to_end.store(true, Ordering::SeqCst);
+        }
+        let now = self.now.clone();
+        let due = self.coming.extract_if(.., |it| it.time <= now).collect();
+        Ok(Passage {
+            now: self.now.clone(),
+            observations: due,
+        })
+    }
+}
+
+/// What is said of each entry that matters here.
+#[derive(Clone, Default)]
+pub(crate) struct Notes(pub(crate) Arc<Mutex<Vec<String>>>);
+
+impl Notes {
+    fn note(&self, note: String) {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(note);
+    }
+}
+
+impl Recorder for Notes {
+    fn record(&mut self, entry: &Entry<'_>) {
+        let at = |time: &Rational| time.to_decimal(1);
+        match entry {
+            Entry::Command {
+                now,
+                command: Command::Start { action, .. },
+                ..
+            } => {
+                self.note(format!("{}: start {}", at(now), action.name));
+            }
+            Entry::Command {
+                now,
+                command: Command::Cancel { .. },
+                ..
+            } => {
+                self.note(format!("{}: cancel", at(now)));
+            }
+            Entry::Planning { now, reason, .. } => {
+                self.note(format!("{}: plan, because {}", at(now), reason));
+            }
+            Entry::Kept { now, .. } => self.note(format!("{}: the plan is kept", at(now))),
+            Entry::Resting {
+                now,
+                verdict,
+                goals,
+                ..
+            } => {
+                let verdict = verdict.map_or("no goals", Verdict::name);
+                self.note(format!("{}: rest: {verdict} {}", at(now), goals.join(" ")));
+            }
+            Entry::Warning {
+                now, action, until, ..
+            } => {
+                self.note(format!("{}: {action} must end by {}", at(now), at(until)));
+            }
+            Entry::Taken {
+                remark: Some(remark),
+                now,
+                ..
+            } => {
+                self.note(format!("{}: {remark}", at(now)));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// An embedded planner that counts how often it is asked.
+pub(super) struct Counting(Arc<Mutex<usize>>);
+
+impl Planner for Counting {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+        let answer = Embedded::default().plan(task, situation);
+        PlannerAnswer {
+            seconds: None,
+            ..answer
+        }
+    }
+}
+
+pub(super) struct Told {
+    pub(super) notes: Vec<String>,
+    pub(super) plans: usize,
+    pub(super) report: Report,
+}
+
+/// A run of that script until `end`, which goes on when its goal is reached.
+pub(super) fn run(task: &Arc<Task>, end: i64, script: Vec<(impl Into<Rational>, Event)>) -> Told {
+    scripted(task, end, script, |execution| execution.lasting(true))
+}
+
+/// A run of that script until `end`, which can be paused and whose goal can be given up.
+pub(super) fn attended(
+    task: &Arc<Task>,
+    end: i64,
+    script: Vec<(impl Into<Rational>, Event)>,
+) -> Told {
+    scripted(task, end, script, |execution| execution.attended(true))
+}
+
+pub(super) fn scripted(
+    task: &Arc<Task>,
+    end: i64,
+    script: Vec<(impl Into<Rational>, Event)>,
+    kind: impl FnOnce(Execution<'_>) -> Execution<'_>,
+) -> Told {
+    let is_to_end = Arc::new(AtomicBool::new(false));
+    let script = script.into_iter().map(|(time, event)| Observation {
+        time: time.into(),
+        event,
+    });
+    let mut world = Scripted {
+        now: Rational::ZERO,
+        coming: script.collect(),
+        end: Rational::from(end),
+        is_to_end: Arc::clone(&is_to_end),
+        slow: None,
+        on_cancel: None,
+    };
+    let (notes, plans) = (Notes::default(), Arc::new(Mutex::new(0)));
+    let execution = Execution::of(task)
+        .with_settings(RunSettings::default())
+        .planned_by(Counting(Arc::clone(&plans)))
+        .recorded_by(notes.clone())
+        .ending_when(move || is_to_end.load(Ordering::SeqCst))
+        .explaining();
+    let report = kind(execution).run_in(&mut world);
+    let notes = notes
+        .0
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .clone();
+    let plans = *plans.lock().unwrap_or_else(PoisonError::into_inner);
+    Told {
+        notes,
+        plans,
+        report,
+    }
+}
+
+pub(super) fn pursue(name: &str, goal: &str) -> Event {
+    let (name, goal) = (name.to_owned(), goal.to_owned());
+    Event::Asked(Request::Pursue { name, goal })
+}
+
+pub(super) fn abandon(name: &str) -> Event {
+    let name = name.to_owned();
+    Event::Asked(Request::Abandon { name })
+}
+
+pub(super) fn fact(task: &Task, name: &str, truth: bool) -> Event {
+    let fact = task.fact_named(name).expect("a correct test");
+    Event::Fact { fact, truth }
+}
+
+pub(super) fn has(told: &Told, note: &str) -> bool {
+    told.notes.iter().any(|it| it.contains(note))
+}
+
+#[track_caller]
+pub(super) fn assert_has(told: &Told, notes: &[&str]) {
+    let mut left = told.notes.iter();
+    for note in notes {
+        let found = left.any(|it| it.contains(note));
+        assert!(found, "no `{note}` in its place in {:#?}", told.notes);
+    }
+}
