@@ -7,6 +7,7 @@ import { spawnSync } from "node:child_process";
 import { existsSync, readFileSync, readdirSync } from "node:fs";
 import { join } from "node:path";
 import { gzipSync } from "node:zlib";
+import { asker } from "./ask.mjs";
 
 const [, , elbowroom, cases, file] = process.argv;
 const bytes = readFileSync(file);
@@ -19,17 +20,7 @@ const module = await WebAssembly.compile(bytes);
 assert.deepEqual(WebAssembly.Module.imports(module), [{ module: "elbowroom", name: "now", kind: "function" }]);
 const { exports: library } = await WebAssembly.instantiate(module, { elbowroom: { now: () => performance.now() } });
 
-function ask(question) {
-  const asked = new TextEncoder().encode(JSON.stringify(question));
-  const room = library.elbowroom_reserve(asked.length);
-  new Uint8Array(library.memory.buffer, room, asked.length).set(asked);
-  const start = library.elbowroom_ask(room, asked.length);
-  library.elbowroom_release(room, asked.length);
-  const length = new DataView(library.memory.buffer).getUint32(start, true);
-  const reply = new TextDecoder().decode(new Uint8Array(library.memory.buffer, start + 4, length));
-  library.elbowroom_release(start, length + 4);
-  return JSON.parse(reply);
-}
+const ask = asker(library);
 const text = (path) => ({ name: path, text: readFileSync(path, "utf8") });
 // Without what depends on the machine: how long something took, and how much memory; addresses are half as long here.
 const timeless = (document) => document.replace(/^(\s*"(?:(?:first_plan_)?seconds|memory_bytes)":).*$/gm, "$1 0");
