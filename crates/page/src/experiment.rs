@@ -12,9 +12,6 @@ use crate::document::{Document, Rate, RateGroup, Rates, Section, Table, Text, To
 pub(crate) const INTERVALS: &str =
     "The share of runs that reached the goal, with Wilson's 95 % interval.";
 
-/// What buttons in a table of failures do.
-pub(crate) const BUTTON: &str = " The button of a row shows the first such trial.";
-
 /// The pages of some failed trials, by row, column and kind of failure.
 pub(crate) type Trials = BTreeMap<FailurePlace, Document>;
 
@@ -62,7 +59,7 @@ pub(crate) fn timed(results: &Results, trials: Trials) -> Document {
 }
 
 /// The kinds of failure, each with a trial to look at if there is one; and the pages of these.
-fn failures(results: &Results, mut trials: Trials) -> (Option<Section>, Vec<Document>) {
+fn failures(results: &Results, trials: Trials) -> (Option<Section>, Vec<Document>) {
     let columns = [
         ("world", false),
         ("executor", false),
@@ -72,10 +69,9 @@ fn failures(results: &Results, mut trials: Trials) -> (Option<Section>, Vec<Docu
         ("runs", true),
         ("first trial", false),
     ];
-    let (mut rows, mut opens, mut more) = (Vec::new(), Vec::new(), Vec::new());
+    let mut kinds = Vec::new();
     for (column, world) in results.columns.iter().enumerate() {
-        for (row, cells) in results.rows.iter().zip(&results.cells).enumerate() {
-            let (name, cells) = cells;
+        for (row, (name, cells)) in results.rows.iter().zip(&results.cells).enumerate() {
             for (kind, failure) in cells[column].failures.kinds().into_iter().enumerate() {
                 let words = |text: &Option<String>| text.clone().unwrap_or_default();
                 let first = failure.first;
@@ -83,7 +79,7 @@ fn failures(results: &Results, mut trials: Trials) -> (Option<Section>, Vec<Docu
                     0 => first.trial.to_string(),
                     problem => format!("{} of problem {problem}", first.trial),
                 };
-                rows.push(vec![
+                let cells = vec![
                     world.as_str().into(),
                     name.as_str().into(),
                     failure.verdict.replace('-', " ").into(),
@@ -91,33 +87,54 @@ fn failures(results: &Results, mut trials: Trials) -> (Option<Section>, Vec<Docu
                     words(&failure.action).into(),
                     failure.runs.to_string().into(),
                     trial.into(),
-                ]);
-                opens.push(trials.remove(&(row, column, kind)).map(|page| {
-                    more.push(page);
-                    more.len() - 1
-                }));
+                ];
+                kinds.push(((row, column, kind), cells));
             }
         }
     }
-    let mut note =
-        "Failed runs, by what the last plan was given up for, and the action that this was about."
-            .to_owned();
-    if !more.is_empty() {
-        note.push_str(BUTTON);
+    let table = Table {
+        heading: "Where runs fail".to_owned(),
+        note: "Failed runs, by what the last plan was given up for, and the action that this was \
+               about."
+            .to_owned(),
+        columns: named(&columns),
+        ..Table::default()
+    };
+    with_trials(table, kinds, trials)
+}
+
+/// The table with these kinds of failure, none if there are none; the rows of those of which there is
+/// a trial to look at lead to its page.
+pub(crate) fn with_trials(
+    mut table: Table,
+    kinds: Vec<(FailurePlace, Vec<Text>)>,
+    mut trials: Trials,
+) -> (Option<Section>, Vec<Document>) {
+    let mut more = Vec::new();
+    let mut opens = Vec::with_capacity(kinds.len());
+    for (place, cells) in kinds {
+        table.rows.push(cells);
+        opens.push(trials.remove(&place).map(|page| {
+            more.push(page);
+            more.len() - 1
+        }));
     }
-    let section = (!rows.is_empty()).then(|| {
-        Section::Table(Table {
-            heading: "Where runs fail".to_owned(),
-            note,
-            columns: columns
-                .map(|(name, is_number)| (name.to_owned(), is_number))
-                .to_vec(),
-            rows,
-            opens: if more.is_empty() { Vec::new() } else { opens },
-            ..Table::default()
-        })
-    });
+    if !more.is_empty() {
+        table.opens = opens;
+        table
+            .note
+            .push_str(" The button of a row shows the first such trial.");
+    }
+    let section = (!table.rows.is_empty()).then_some(Section::Table(table));
     (section, more)
+}
+
+/// Columns: their headings, and whether they hold numbers.
+pub(crate) fn named(columns: &[(&str, bool)]) -> Vec<(String, bool)> {
+    let named = columns.iter();
+    named
+        .map(|(name, is_number)| ((*name).to_owned(), *is_number))
+        .collect()
 }
 
 pub(crate) fn document(

@@ -4,7 +4,9 @@ use elbowroom::report::statistics::Proportion;
 use elbowroom_laboratory::perturbed::{PerturbedResults, StoredCourse, StoredStep};
 
 use crate::document::{Document, RateGroup, Rates, Section, Table, Text, Tone, Verdict};
-use crate::experiment::{BUTTON, INTERVALS, Trials, document, facts, made, mean, percent, rate};
+use crate::experiment::{
+    INTERVALS, Trials, document, facts, made, mean, named, percent, rate, with_trials,
+};
 use crate::plan::word;
 
 /// The page about an experiment in worlds without time.
@@ -82,27 +84,7 @@ pub(crate) fn untimed(results: &PerturbedResults, trials: Trials) -> Document {
 }
 
 /// The kinds of failure, each with a trial to look at if there is one; and the pages of these.
-fn failures(results: &PerturbedResults, mut trials: Trials) -> (Option<Section>, Vec<Document>) {
-    let (mut rows, mut opens, mut more) = (Vec::new(), Vec::new(), Vec::new());
-    for (place, row) in results.rows.iter().enumerate() {
-        for (kind, failure) in row.failures.kinds().into_iter().enumerate() {
-            let last = failure.cause.as_deref().map_or("there was none", after);
-            rows.push(vec![
-                row.case.as_str().into(),
-                word(&row.world).into(),
-                word(&row.executor).into(),
-                ending(&failure.verdict).into(),
-                failure.action.clone().unwrap_or_default().into(),
-                last.into(),
-                failure.runs.to_string().into(),
-                failure.first.trial.to_string().into(),
-            ]);
-            opens.push(trials.remove(&(place, 0, kind)).map(|page| {
-                more.push(page);
-                more.len() - 1
-            }));
-        }
-    }
+fn failures(results: &PerturbedResults, trials: Trials) -> (Option<Section>, Vec<Document>) {
     let columns = [
         ("case", false),
         ("world", false),
@@ -113,21 +95,30 @@ fn failures(results: &PerturbedResults, mut trials: Trials) -> (Option<Section>,
         ("trials", true),
         ("first", true),
     ];
-    let mut note = "Failed trials, by what ended them and by their last step.".to_owned();
-    if !more.is_empty() {
-        note.push_str(BUTTON);
+    let mut kinds = Vec::new();
+    for (place, row) in results.rows.iter().enumerate() {
+        for (kind, failure) in row.failures.kinds().into_iter().enumerate() {
+            let last = failure.cause.as_deref().map_or("there was none", after);
+            let cells = vec![
+                row.case.as_str().into(),
+                word(&row.world).into(),
+                word(&row.executor).into(),
+                ending(&failure.verdict).into(),
+                failure.action.clone().unwrap_or_default().into(),
+                last.into(),
+                failure.runs.to_string().into(),
+                failure.first.trial.to_string().into(),
+            ];
+            kinds.push(((place, 0, kind), cells));
+        }
     }
-    let section = (!rows.is_empty()).then(|| {
-        Section::Table(Table {
-            heading: "Where trials fail".to_owned(),
-            note,
-            columns: named(&columns),
-            rows,
-            opens: if more.is_empty() { Vec::new() } else { opens },
-            ..Table::default()
-        })
-    });
-    (section, more)
+    let table = Table {
+        heading: "Where trials fail".to_owned(),
+        note: "Failed trials, by what ended them and by their last step.".to_owned(),
+        columns: named(&columns),
+        ..Table::default()
+    };
+    with_trials(table, kinds, trials)
 }
 
 /// The page about a trial.
@@ -243,11 +234,4 @@ fn capital(words: &str) -> String {
     let mut letters = words.chars();
     let first = letters.next().map(|first| first.to_uppercase().to_string());
     first.unwrap_or_default() + letters.as_str()
-}
-
-fn named(columns: &[(&str, bool)]) -> Vec<(String, bool)> {
-    let named = columns
-        .iter()
-        .map(|(name, is_number)| ((*name).to_owned(), *is_number));
-    named.collect()
 }
