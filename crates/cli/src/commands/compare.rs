@@ -173,7 +173,12 @@ fn write_failures(
             })?;
         }
     }
-    let failed = answer.failed_trials(MOST_OF_A_CELL, MOST_FAILURES);
+    // Who has ended the experiment does not wait for more trials.
+    let failed = if answer.is_interrupted() {
+        Vec::new()
+    } else {
+        answer.failed_trials(MOST_OF_A_CELL, MOST_FAILURES)
+    };
     if !failed.is_empty() {
         make_folder(&folder)?;
     }
