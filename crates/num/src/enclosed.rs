@@ -3,6 +3,10 @@
 //! Each value is an interval that the true one certainly lies in: computed with whole numbers, the
 //! unit being 2^-60, and every rounding counted.
 
+mod normal;
+
+pub use normal::{exp_of_minus, normal, normal_density};
+
 use crate::Rational;
 
 /// One, in units of 2^-60.

@@ -201,6 +201,14 @@ impl Side {
             Self::Upper => value.clone(),
         })
     }
+
+    /// The number at which this end of an interval lies when it reaches so far out.
+    pub fn at_reach(self, reach: &Rational) -> Rational {
+        match self {
+            Self::Lower => -reach,
+            Self::Upper => reach.clone(),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -7,8 +7,11 @@
 //! - [`Rational`]: an exact fraction.
 //! - [`Delta`]: a rational plus a multiple of an infinitesimal, to treat `<` like `<=`.
 //! - [`CommonDenominator`]: the unit in which given fractions are whole numbers.
+//! - [`Total`]: a sum of many products.
 //! - [`Interval`]: a set of rationals between two ends, each closed, open or infinite.
-//! - [`enclosed`]: logarithms, between two fractions.
+//! - [`enclosed`]: logarithms, powers of e and the normal distribution, between two fractions.
+//! - [`chance`]: how likely a random number lies in an interval, and linear bounds on the logarithm
+//!   of that.
 //! - [`simplex`]: systems of linear inequalities, decided and optimised exactly, with proofs.
 //!
 //! No planning word occurs in this crate.
@@ -23,14 +26,17 @@
 //! # Ok::<(), elbowroom_num::ParseRationalError>(())
 //! ```
 
+pub mod chance;
 mod delta;
 mod denominator;
 pub mod enclosed;
 mod interval;
 mod rational;
 pub mod simplex;
+mod total;
 
 pub use delta::Delta;
 pub use denominator::CommonDenominator;
 pub use interval::{End, Interval, Side};
 pub use rational::{ParseRationalError, Rational};
+pub use total::Total;

@@ -53,7 +53,7 @@ impl Rational {
     }
 
     /// Brings `numerator / denominator` (not zero) to lowest terms.
-    fn reduced(numerator: i128, denominator: i128) -> Self {
+    pub(crate) fn reduced(numerator: i128, denominator: i128) -> Self {
         debug_assert!(denominator != 0);
         // Divisions of 128 bits cost many times those of 64, and nearly all operands are small.
         if let (Ok(numerator), Ok(denominator)) =
@@ -203,6 +203,18 @@ impl Rational {
             Small(numerator, denominator) => *numerator as f64 / *denominator as f64,
             Big(big) => big.to_f64().value(),
         }
+    }
+
+    /// The greatest multiple of a power of two, `2^-bits`, that is not above this, as a count of
+    /// these.
+    pub(crate) fn in_units(&self, bits: usize) -> IBig {
+        let unit = RBig::from(IBig::ONE << bits);
+        (self.to_big() * unit).floor()
+    }
+
+    /// So many times a power of two, `2^-bits`.
+    pub(crate) fn from_units(units: IBig, bits: usize) -> Self {
+        Self::from_big(RBig::from_parts(units, UBig::ONE << bits))
     }
 
     /// Numerator and denominator, when both fit an `i64`.

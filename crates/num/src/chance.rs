@@ -1,0 +1,262 @@
+//! How likely a random number lies in an interval, between two fractions.
+//!
+//! A [`Chance`] is a distribution as somebody states it: a density whose logarithm is concave, cut at
+//! both sides (what would be beyond a cut is at the cut), or a list of values. A [`Reach`] is an interval
+//! around a point, by how far its ends lie from it. Of all intervals in a [`Cell`], a rectangle of
+//! reaches, [`Chance::height`] says how far the logarithm of the probability is at most above a linear
+//! function: that is what makes the best of many intervals provable.
+//!
+//! For a density with a concave logarithm, the logarithm of the probability of an interval is a jointly
+//! concave function of its ends (Prékopa 1973), and lies below each of its tangents. What is at a cut is
+//! there or not: a cell that leaves that open counts it by a share that grows with the reach. Of a list of
+//! values, a cell counts those that it may reach.
+
+mod density;
+mod height;
+
+use crate::Rational;
+
+pub use density::Density;
+pub use height::{Cut, Steps};
+
+/// The distribution of a number that is rounded to multiples of something.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Chance {
+    /// It has a density, but for what is at its cuts.
+    Dense(Dense),
+    /// One of these values, all alike; sorted, at least one.
+    Values(Vec<Rational>),
+}
+
+/// A density, cut at both sides.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Dense {
+    /// The density.
+    pub density: Density,
+    /// Lesser numbers become this.
+    pub minimum: Option<Rational>,
+    /// Greater numbers become this.
+    pub maximum: Option<Rational>,
+    /// An interval counts as so much longer at either end: half of what numbers are rounded to.
+    pub margin: Rational,
+}
+
+/// How far an interval reaches below and above a point.
+pub type Reach = [Rational; 2];
+
+/// The intervals around a point whose lower ends lie so far below it, between two numbers, and whose
+/// upper ends so far above it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cell {
+    /// The least and the greatest distance of the lower end.
+    pub below: [Rational; 2],
+    /// The least and the greatest distance of the upper end.
+    pub above: [Rational; 2],
+    /// Of the lower and of the upper end, whether the greatest distance is not reached.
+    pub is_open: [bool; 2],
+}
+
+/// Where a linear bound on a probability touches, or nearly so.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Touch {
+    /// At this interval.
+    At(Reach),
+    /// Where the probability is this.
+    Mass(Rational),
+    /// Nowhere: no probability is more than 1.
+    Nowhere,
+}
+
+impl Chance {
+    /// A list of values.
+    ///
+    /// `None` if it is empty.
+    pub fn values(mut values: Vec<Rational>) -> Option<Self> {
+        values.sort_unstable();
+        (!values.is_empty()).then_some(Self::Values(values))
+    }
+
+    /// A density that is cut at both sides, of a number that is rounded to multiples of `resolution`.
+    /// Where nothing or everything is beyond a cut, that is said more simply.
+    ///
+    /// `None` if the density makes no sense ([`Density::is_sound`]).
+    pub fn dense(
+        density: Density,
+        minimum: Option<Rational>,
+        maximum: Option<Rational>,
+        resolution: &Rational,
+    ) -> Option<Self> {
+        if !density.is_sound() {
+            return None;
+        }
+        let round = |cut: Rational| {
+            (cut.checked_div(resolution).unwrap_or_default() + Rational::new(1, 2)).floor()
+                * resolution
+        };
+        let [first, last] = density.support();
+        let is_beyond = |cut: &Rational, end: &Option<Rational>| end.as_ref() >= Some(cut);
+        let minimum = minimum.map(round).filter(|cut| !is_beyond(cut, &first));
+        let maximum = maximum.map(round);
+        let maximum = maximum.filter(|cut| last.as_ref().is_none_or(|last| cut < last));
+        // The upper cut is the last to be made.
+        let ends = [&maximum, &minimum];
+        if let [Some(maximum), Some(minimum)] = ends
+            && maximum <= minimum
+        {
+            return Some(Self::Values(vec![maximum.clone()]));
+        }
+        if let Some(minimum) = &minimum
+            && last.as_ref().is_some_and(|last| last <= minimum)
+        {
+            return Some(Self::Values(vec![minimum.clone()]));
+        }
+        if let Some(maximum) = &maximum
+            && first.as_ref().is_some_and(|first| first >= maximum)
+        {
+            return Some(Self::Values(vec![maximum.clone()]));
+        }
+        Some(Self::Dense(Dense {
+            density,
+            minimum,
+            maximum,
+            margin: resolution / &Rational::from(2),
+        }))
+    }
+
+    /// How likely the number, rounded to a multiple of `resolution`, is not outside the closed interval
+    /// with these ends: at least so much.
+    pub fn inside(&self, [lower, upper]: [&Rational; 2], resolution: &Rational) -> Rational {
+        match self {
+            Self::Values(values) => share(values, |own| lower <= own && own <= upper),
+            Self::Dense(dense) => {
+                let steps = |end: &Rational| end.checked_div(resolution).unwrap_or_default();
+                let half = resolution / &Rational::from(2);
+                let first = steps(lower).ceil() * resolution;
+                let last = steps(upper).floor() * resolution;
+                if first > last {
+                    return Rational::ZERO;
+                }
+                let is_low = dense.minimum.as_ref().is_some_and(|cut| first <= *cut);
+                let is_high = dense.maximum.as_ref().is_some_and(|cut| *cut <= last);
+                let is_before = dense.minimum.as_ref().is_some_and(|cut| last < *cut);
+                let is_after = dense.maximum.as_ref().is_some_and(|cut| *cut < first);
+                if is_before || is_after {
+                    return Rational::ZERO;
+                }
+                let below = (!is_low).then(|| first - &half);
+                let above = (!is_high).then(|| last + &half);
+                let [below, _] = dense.density.between([below.as_ref(), above.as_ref()]);
+                below
+            }
+        }
+    }
+
+    /// Between which two numbers lies the probability of an interval around a point, counted longer by
+    /// the margin.
+    pub fn mass(&self, point: &Rational, [below, above]: &Reach) -> [Rational; 2] {
+        let (lower, upper) = (point - below, point + above);
+        match self {
+            Self::Values(values) => {
+                let share = share(values, |own| lower <= *own && *own <= upper);
+                [share.clone(), share]
+            }
+            Self::Dense(dense) => {
+                let is_out = dense.minimum.as_ref().is_some_and(|cut| upper < *cut)
+                    || dense.maximum.as_ref().is_some_and(|cut| *cut < lower);
+                if is_out {
+                    return [Rational::ZERO, Rational::ZERO];
+                }
+                let is_low = dense.minimum.as_ref().is_some_and(|cut| lower <= *cut);
+                let is_high = dense.maximum.as_ref().is_some_and(|cut| *cut <= upper);
+                let lower = (!is_low).then(|| lower - &dense.margin);
+                let upper = (!is_high).then(|| upper + &dense.margin);
+                let ends = [lower.as_ref(), upper.as_ref()];
+                dense.density.between(ends)
+            }
+        }
+    }
+
+    /// Of the lower and of the upper end, how far from a point it has to lie for the interval to have
+    /// any probability, and how far at most it gains anything.
+    ///
+    /// With a log-normal density, the most is where its logarithm is no longer concave.
+    pub fn limits(&self, point: &Rational) -> [(Rational, Option<Rational>); 2] {
+        let positive = |distance: Rational| distance.max(Rational::ZERO);
+        let ([first, last], [gains_below, gains_above]) = match self {
+            Self::Values(values) => {
+                let ends = [values.first().cloned(), values.last().cloned()];
+                (ends.clone(), ends)
+            }
+            Self::Dense(dense) => {
+                let [first, last] = dense.density.support();
+                let margin = &dense.margin;
+                let beyond = [
+                    first.as_ref().map(|first| first - margin),
+                    last.as_ref().map(|last| last + margin),
+                ];
+                let [lower, upper] = dense.cuts();
+                let [beyond_first, beyond_last] = beyond;
+                let first_here = dense.minimum.clone().or(beyond_first);
+                let last_here = dense.maximum.clone().or(beyond_last);
+                let gains = [
+                    lower.or(first.map(|first| first + margin)),
+                    upper.or(last.map(|last| last - margin)),
+                ];
+                ([first_here, last_here], gains)
+            }
+        };
+        let least_below = positive(last.map_or(Rational::ZERO, |last| point - &last));
+        let least_above = positive(first.map_or(Rational::ZERO, |first| &first - point));
+        let most_below = gains_below.map(|first| (point - &first).max(least_below.clone()));
+        let most_above = gains_above.map(|last| (&last - point).max(least_above.clone()));
+        [(least_below, most_below), (least_above, most_above)]
+    }
+
+    /// The places at which what an interval around a point has jumps: of the lower end, and of the upper
+    /// one, the distances, the least first.
+    pub fn jumps(&self, point: &Rational) -> [Vec<Rational>; 2] {
+        match self {
+            Self::Values(values) => {
+                let mut below: Vec<Rational> = values
+                    .iter()
+                    .rev()
+                    .filter(|own| *own < point)
+                    .map(|own| point - own)
+                    .collect();
+                let above = values.iter().filter(|own| *own > point);
+                let mut above: Vec<Rational> = above.map(|own| own - point).collect();
+                below.dedup();
+                above.dedup();
+                [below, above]
+            }
+            Self::Dense(dense) => {
+                let [lower, upper] = dense.cuts();
+                let below = lower.map(|cut| point - &cut);
+                let above = upper.map(|cut| &cut - point);
+                [below, above].map(|own| own.into_iter().filter(Rational::is_positive).collect())
+            }
+        }
+    }
+}
+
+impl Dense {
+    /// What bounds on the probability take for the cuts: beyond the upper one, where the logarithm of
+    /// the density is not concave, all that is left counts as if it were there.
+    pub(crate) fn cuts(&self) -> [Option<Rational>; 2] {
+        let bend = self.density.bend().map(|bend| bend - &self.margin);
+        let upper = match (self.maximum.clone(), bend) {
+            (Some(cut), Some(bend)) => Some(cut.min(bend)),
+            (cut, bend) => cut.or(bend),
+        };
+        [self.minimum.clone(), upper]
+    }
+}
+
+/// The share of the values that satisfy something.
+fn share(values: &[Rational], is_in: impl Fn(&Rational) -> bool) -> Rational {
+    let count = |count: usize| Rational::from(i64::try_from(count).unwrap_or(i64::MAX));
+    let inside = values.iter().filter(|own| is_in(own)).count();
+    count(inside)
+        .checked_div(&count(values.len()))
+        .unwrap_or_default()
+}

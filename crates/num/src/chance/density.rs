@@ -1,0 +1,219 @@
+//! Densities whose logarithm is concave, all over or as far as it matters.
+
+use crate::{Rational, enclosed};
+
+/// A density.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Density {
+    /// All values between two numbers alike.
+    Uniform {
+        /// The least value.
+        from: Rational,
+        /// The greatest value.
+        to: Rational,
+    },
+    /// Rises to the mode and falls after it.
+    Triangular {
+        /// The least value.
+        from: Rational,
+        /// The likeliest value.
+        mode: Rational,
+        /// The greatest value.
+        to: Rational,
+    },
+    /// Bell-shaped.
+    Normal {
+        /// The mean.
+        mean: Rational,
+        /// The standard deviation.
+        deviation: Rational,
+    },
+    /// `from`, and what an exponential distribution adds.
+    Exponential {
+        /// The least value.
+        from: Rational,
+        /// The mean of what is added.
+        mean: Rational,
+    },
+    /// The logarithm is normal.
+    Lognormal {
+        /// The mean of the logarithm.
+        location: Rational,
+        /// The standard deviation of the logarithm.
+        spread: Rational,
+    },
+}
+
+impl Density {
+    /// Whether its numbers are those of a density: what spreads is positive, and what has ends has them
+    /// in order.
+    pub fn is_sound(&self) -> bool {
+        match self {
+            Self::Uniform { from, to } => from < to,
+            Self::Triangular { from, mode, to } => from <= mode && mode <= to && from < to,
+            Self::Normal { deviation, .. } => deviation.is_positive(),
+            Self::Exponential { mean, .. } => mean.is_positive(),
+            Self::Lognormal { spread, .. } => spread.is_positive(),
+        }
+    }
+
+    /// The least and the greatest value, where there are.
+    pub fn support(&self) -> [Option<Rational>; 2] {
+        match self {
+            Self::Uniform { from, to } | Self::Triangular { from, to, .. } => {
+                [Some(from.clone()), Some(to.clone())]
+            }
+            Self::Normal { .. } => [None, None],
+            Self::Exponential { from, .. } => [Some(from.clone()), None],
+            Self::Lognormal { .. } => [Some(Rational::ZERO), None],
+        }
+    }
+
+    /// The value beyond which the logarithm of the density is not known to be concave, if there is one.
+    ///
+    /// The second derivative of the logarithm of a log-normal density has the sign of `ln x + spread² -
+    /// location - 1`.
+    pub fn bend(&self) -> Option<Rational> {
+        /// Shorter numbers do as well; rounded down.
+        const GRID: i64 = 1 << 20;
+        let Self::Lognormal { location, spread } = self else {
+            return None;
+        };
+        let logarithm = location + &Rational::ONE - spread * spread;
+        let [below, above] = enclosed::exp_of_minus(&logarithm.abs());
+        let bend = if logarithm.is_negative() {
+            below
+        } else {
+            Rational::ONE.checked_div(&above).unwrap_or_default()
+        };
+        let grid = Rational::from(GRID);
+        let short = (&bend * &grid).floor() / grid;
+        Some(if short.is_positive() { short } else { bend })
+    }
+
+    /// Between which two numbers lies the probability of at most this.
+    pub fn at_most(&self, at: &Rational) -> [Rational; 2] {
+        let exactly = |value: Rational| [value.clone(), value];
+        let none = || exactly(Rational::ZERO);
+        match self {
+            Self::Uniform { from, to } => {
+                let part = (at - from).max(Rational::ZERO).min(to - from);
+                exactly(part.checked_div(&(to - from)).unwrap_or_default())
+            }
+            Self::Triangular { from, mode, to } => {
+                let width = to - from;
+                let square = |end: &Rational, side: &Rational| {
+                    let area = (at - end) * (at - end);
+                    let share = area.checked_div(&(&width * &(end - side).abs()));
+                    share.unwrap_or_default()
+                };
+                exactly(if at <= from {
+                    Rational::ZERO
+                } else if at >= to {
+                    Rational::ONE
+                } else if at < mode {
+                    square(from, mode)
+                } else {
+                    Rational::ONE - square(to, mode)
+                })
+            }
+            Self::Normal { mean, deviation } => (at - mean)
+                .checked_div(deviation)
+                .map_or_else(none, |at| enclosed::normal(&at)),
+            Self::Exponential { from, mean } => {
+                let Some(times) = (at - from).checked_div(mean) else {
+                    return none();
+                };
+                if !times.is_positive() {
+                    return none();
+                }
+                let [below, above] = enclosed::exp_of_minus(&times);
+                [
+                    (Rational::ONE - above).max(Rational::ZERO),
+                    Rational::ONE - below,
+                ]
+            }
+            Self::Lognormal { .. } => match self.standardized(at) {
+                Some([below, above]) => {
+                    let [least, _] = enclosed::normal(&below);
+                    let [_, most] = enclosed::normal(&above);
+                    [least, most]
+                }
+                None => none(),
+            },
+        }
+    }
+
+    /// Between which two numbers lies the probability between two values, each of which may be missing.
+    pub fn between(&self, [lower, upper]: [Option<&Rational>; 2]) -> [Rational; 2] {
+        if let (Some(lower), Some(upper)) = (lower, upper)
+            && lower >= upper
+        {
+            return [Rational::ZERO, Rational::ZERO];
+        }
+        let [least, most] = upper.map_or([Rational::ONE, Rational::ONE], |at| self.at_most(at));
+        let [under, over] = lower.map_or([Rational::ZERO, Rational::ZERO], |at| self.at_most(at));
+        [(least - over).max(Rational::ZERO), most - under]
+    }
+
+    /// Between which two numbers lies the density; at the end of the support, that inside of it.
+    pub fn at(&self, at: &Rational) -> [Rational; 2] {
+        let exactly = |value: Option<Rational>| {
+            let value = value.unwrap_or_default();
+            [value.clone(), value]
+        };
+        let [first, last] = self.support();
+        if first.is_some_and(|first| *at < first) || last.is_some_and(|last| *at > last) {
+            return exactly(None);
+        }
+        match self {
+            Self::Uniform { from, to } => exactly((to - from).reciprocal()),
+            Self::Triangular { from, mode, to } => {
+                let peak = Rational::from(2)
+                    .checked_div(&(to - from))
+                    .unwrap_or_default();
+                let part = if at < mode {
+                    (at - from).checked_div(&(mode - from))
+                } else {
+                    (to - at).checked_div(&(to - mode))
+                };
+                exactly(Some(part.map_or(peak.clone(), |part| part * &peak)))
+            }
+            Self::Normal { mean, deviation } => {
+                let standardized = (at - mean).checked_div(deviation).unwrap_or_default();
+                enclosed::normal_density(&standardized)
+                    .map(|own| own.checked_div(deviation).unwrap_or_default())
+            }
+            Self::Exponential { from, mean } => {
+                let times = (at - from).checked_div(mean).unwrap_or_default();
+                enclosed::exp_of_minus(&times).map(|own| own.checked_div(mean).unwrap_or_default())
+            }
+            Self::Lognormal { spread, .. } => {
+                let Some(ends) = self.standardized(at) else {
+                    return exactly(None);
+                };
+                let holds_peak = !ends[0].is_positive() && !ends[1].is_negative();
+                let [one, other] = ends.map(|end| enclosed::normal_density(&end));
+                let [_, peak] = enclosed::normal_density(&Rational::ZERO);
+                let [a, b] = one;
+                let [c, d] = other;
+                let most = if holds_peak { peak } else { b.max(d) };
+                let divisor = at * spread;
+                [a.min(c), most].map(|own| own.checked_div(&divisor).unwrap_or_default())
+            }
+        }
+    }
+
+    /// By how many standard deviations the logarithm of a number differs from its mean, between two
+    /// numbers; `None` for what is not positive.
+    fn standardized(&self, at: &Rational) -> Option<[Rational; 2]> {
+        let Self::Lognormal { location, spread } = self else {
+            return None;
+        };
+        let [below, above] = enclosed::ln(at)?;
+        Some([
+            (below - location).checked_div(spread)?,
+            (above - location).checked_div(spread)?,
+        ])
+    }
+}

@@ -1,0 +1,220 @@
+//! How far the logarithm of a probability is at most above a linear function.
+
+use super::{Cell, Chance, Dense, Reach, Touch};
+use crate::{Rational, enclosed};
+
+/// How a cell sees what is at a cut.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Cut {
+    /// There is none, or no interval of the cell reaches it: the interval ends inside.
+    Before,
+    /// Some do: the logarithm gains at most `gain`, times the share of the way to `place` that is gone.
+    Open {
+        /// Its distance from the point.
+        place: Rational,
+        /// What it adds.
+        gain: Rational,
+    },
+    /// All do: everything on this side of the point is inside.
+    Inside,
+}
+
+impl Chance {
+    /// For the intervals around a point in a cell: by how much the logarithm of their probability is at
+    /// most greater than the sum of how far their ends lie from the point, each times its slope. The
+    /// least is found where the bound touches, or nearly so, and with the slopes that are right there.
+    ///
+    /// `None` if nothing follows from a bound that touches there.
+    pub fn height(
+        &self,
+        point: &Rational,
+        cell: &Cell,
+        touch: &Touch,
+        slopes: &Reach,
+    ) -> Option<Rational> {
+        let sides = [&cell.below, &cell.above];
+        let most = |slope: &Rational, [near, far]: &[Rational; 2]| (slope * near).max(slope * far);
+        match (self, touch) {
+            (_, Touch::Nowhere) => {
+                let sum = slopes
+                    .iter()
+                    .zip(sides)
+                    .map(|(slope, side)| most(&-slope, side));
+                Some(sum.sum())
+            }
+            (Self::Values(values), Touch::Mass(mass)) => {
+                let [_, mut height] = enclosed::ln(mass)?;
+                height -= Rational::ONE;
+                let parts = Steps::new(values, point, cell);
+                height += parts.center.checked_div(mass)?;
+                for ((slope, side), steps) in slopes.iter().zip(sides).zip(parts.sides) {
+                    let first = (side[0].clone(), Rational::ZERO);
+                    let heights = std::iter::once(first)
+                        .chain(steps)
+                        .map(|(place, share)| Some(share.checked_div(mass)? - slope * &place));
+                    // Between steps nothing is gained; a slope that falls is worst at the far end.
+                    let own = heights.collect::<Option<Vec<_>>>()?.into_iter().max()?;
+                    height += if slope.is_negative() {
+                        own - slope * &(&side[1] - &side[0])
+                    } else {
+                        own
+                    };
+                }
+                Some(height)
+            }
+            (Self::Dense(dense), Touch::At(at)) => {
+                let seen = dense.seen(point, cell)?;
+                let ([least, greatest], rises) = dense.tangent(point, &seen, at)?;
+                if !least.is_positive() {
+                    return None;
+                }
+                let [_, mut height] = enclosed::ln(&greatest)?;
+                for place in 0..2 {
+                    let (slope, side) = (&slopes[place], sides[place]);
+                    let gain = match &seen[place] {
+                        Cut::Open { place, gain } => gain.checked_div(place)?,
+                        Cut::Before | Cut::Inside => Rational::ZERO,
+                    };
+                    let own = rises[place].iter().map(|rise| {
+                        let base = -(rise * &at[place]);
+                        most(&(rise + &gain - slope), side) + base
+                    });
+                    height += own.max()?;
+                }
+                Some(height)
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Dense {
+    /// How the lower and the upper cut are seen; `None` if nothing can be told of it.
+    pub fn seen(&self, point: &Rational, cell: &Cell) -> Option<[Cut; 2]> {
+        let [minimum, maximum] = self.cuts();
+        let below = minimum.as_ref().map(|cut| point - cut);
+        let above = maximum.as_ref().map(|cut| cut - point);
+        let simply =
+            |place: &Option<Rational>, [near, far]: &[Rational; 2], is_open: bool| match place {
+                Some(place) if near >= place => Cut::Inside,
+                Some(place) if far > place || (far == place && !is_open) => Cut::Open {
+                    place: place.clone(),
+                    gain: Rational::ZERO,
+                },
+                _ => Cut::Before,
+            };
+        let mut seen = [
+            simply(&below, &cell.below, cell.is_open[0]),
+            simply(&above, &cell.above, cell.is_open[1]),
+        ];
+        let plain = seen.clone();
+        for side in 0..2 {
+            let Cut::Open { place, gain } = &mut seen[side] else {
+                continue;
+            };
+            let mut at = [cell.below[0].clone(), cell.above[0].clone()];
+            at[side].clone_from(place);
+            let [inside, _] = self.part(point, &plain, &at);
+            let beyond = match (side, &minimum, &maximum) {
+                (0, Some(cut), _) => self.density.at_most(&(cut - &self.margin))[1].clone(),
+                (_, _, Some(cut)) => {
+                    Rational::ONE - self.density.at_most(&(cut + &self.margin))[0].clone()
+                }
+                _ => Rational::ZERO,
+            };
+            let more = Rational::ONE + beyond.checked_div(&inside)?;
+            let [_, above] = enclosed::ln(&more)?;
+            *gain = above;
+        }
+        Some(seen)
+    }
+
+    /// Where an interval of a cell begins and ends for the density alone; `None` where a side counts as
+    /// a whole.
+    fn ends(&self, point: &Rational, seen: &[Cut; 2], at: &Reach) -> [Option<Rational>; 2] {
+        let [minimum, maximum] = self.cuts();
+        let lower = (seen[0] != Cut::Inside).then(|| {
+            let end = point - &at[0];
+            minimum.map_or(end.clone(), |cut| end.max(cut)) - &self.margin
+        });
+        let upper = (seen[1] != Cut::Inside).then(|| {
+            let end = point + &at[1];
+            maximum.map_or(end.clone(), |cut| end.min(cut)) + &self.margin
+        });
+        [lower, upper]
+    }
+
+    /// What an interval has of the density alone.
+    fn part(&self, point: &Rational, seen: &[Cut; 2], at: &Reach) -> [Rational; 2] {
+        let ends = self.ends(point, seen, at);
+        self.density.between([ends[0].as_ref(), ends[1].as_ref()])
+    }
+
+    /// What an interval has of the density alone, and how fast its logarithm rises as its lower and its
+    /// upper end move out, all between two numbers; `None` if that is not known.
+    pub fn tangent(
+        &self,
+        point: &Rational,
+        seen: &[Cut; 2],
+        at: &Reach,
+    ) -> Option<([Rational; 2], [[Rational; 2]; 2])> {
+        let [least, greatest] = self.part(point, seen, at);
+        let [minimum, maximum] = self.cuts();
+        let is_beyond = [
+            minimum.is_some_and(|cut| point - &at[0] < cut),
+            maximum.is_some_and(|cut| point + &at[1] > cut),
+        ];
+        let ends = self.ends(point, seen, at);
+        let mut rises = [const { [Rational::ZERO; 2] }; 2];
+        for (side, end) in ends.iter().enumerate() {
+            if let Some(end) = end
+                && !is_beyond[side]
+            {
+                let [low, high] = self.density.at(end);
+                rises[side] = [low.checked_div(&greatest)?, high.checked_div(&least)?];
+            }
+        }
+        Some(([least, greatest], rises))
+    }
+}
+
+/// What intervals of a cell have of a list of values: those that all of them have, and, for each side,
+/// the distances at which they come to have more, each with the share of all values that it then has.
+pub struct Steps {
+    /// The share that all of them have.
+    pub center: Rational,
+    /// Of the lower end and of the upper one.
+    pub sides: [Vec<(Rational, Rational)>; 2],
+}
+
+impl Steps {
+    /// The values that intervals of a cell around a point may have.
+    pub fn new(values: &[Rational], point: &Rational, cell: &Cell) -> Self {
+        let one = Rational::from(i64::try_from(values.len()).unwrap_or(i64::MAX)).reciprocal();
+        let one = one.unwrap_or_default();
+        let mut center = Rational::ZERO;
+        let mut sides = [Vec::new(), Vec::new()];
+        for value in values {
+            let (side, distance, [near, far]): (usize, _, _) = if value < point {
+                (0, point - value, &cell.below)
+            } else {
+                (1, value - point, &cell.above)
+            };
+            if distance <= *near {
+                center += &one;
+            } else if distance < *far || (distance == *far && !cell.is_open[side]) {
+                sides[side].push(distance);
+            }
+        }
+        let sides = sides.map(|mut distances| {
+            distances.sort_unstable();
+            let mut share = Rational::ZERO;
+            let steps = distances.into_iter().map(|distance| {
+                share += &one;
+                (distance, share.clone())
+            });
+            steps.collect()
+        });
+        Self { center, sides }
+    }
+}

@@ -1,0 +1,224 @@
+//! Probabilities of intervals, and linear bounds on their logarithms, against plain counting.
+
+use proptest::prelude::*;
+
+use elbowroom_num::chance::{Cell, Chance, Cut, Density, Reach, Steps, Touch};
+use elbowroom_num::{Rational, enclosed};
+
+fn number(tenths: i64) -> Rational {
+    Rational::new(tenths, 10)
+}
+
+fn densities() -> impl Strategy<Value = Density> {
+    prop_oneof![
+        (0..80_i64, 1..80_i64).prop_map(|(from, width)| Density::Uniform {
+            from: number(from),
+            to: number(from + width),
+        }),
+        (0..60_i64, 0..40_i64, 0..40_i64).prop_map(|(from, up, down)| Density::Triangular {
+            from: number(from),
+            mode: number(from + up),
+            to: number(from + up + down + 1),
+        }),
+        (20..80_i64, 3..40_i64).prop_map(|(mean, deviation)| Density::Normal {
+            mean: number(mean),
+            deviation: number(deviation),
+        }),
+        (0..60_i64, 3..40_i64).prop_map(|(from, mean)| Density::Exponential {
+            from: number(from),
+            mean: number(mean),
+        }),
+        (10..20_i64, 1..6_i64).prop_map(|(location, spread)| Density::Lognormal {
+            location: number(location),
+            spread: number(spread),
+        }),
+    ]
+}
+
+fn chances() -> impl Strategy<Value = Chance> {
+    let cut = || prop::option::of((0..11_i64).prop_map(|own| own * 10));
+    let dense = (densities(), cut(), cut()).prop_map(|(density, low, high)| {
+        let resolution = Rational::new(1, 10);
+        Chance::dense(density, low.map(number), high.map(number), &resolution)
+            .expect("a sound density")
+    });
+    let values = prop::collection::vec((0..22_i64).prop_map(|own| own * 5), 1..6);
+    prop_oneof![
+        3 => dense,
+        1 => values.prop_map(|own| {
+            Chance::values(own.into_iter().map(number).collect()).expect("some values")
+        }),
+    ]
+}
+
+/// A cell with a place in it.
+fn cells() -> impl Strategy<Value = (Cell, Reach)> {
+    let side = || {
+        prop::collection::vec((0..7_i64).prop_map(|own| own * 10), 3).prop_map(|mut ends| {
+            ends.sort_unstable();
+            ends
+        })
+    };
+    (side(), side(), any::<bool>()).prop_map(|(below, above, is_open)| {
+        let cell = Cell {
+            below: [number(below[0]), number(below[2])],
+            above: [number(above[0]), number(above[2])],
+            is_open: [is_open, is_open],
+        };
+        (cell, [number(below[1]), number(above[1])])
+    })
+}
+
+proptest! {
+    #[test]
+    fn no_interval_of_a_cell_is_above_a_bound_on_it(
+        chance in chances(),
+        (cell, at) in cells(),
+        slopes in (0..20_i64, 0..20_i64),
+        point in (1..9_i64).prop_map(|own| own * 10),
+    ) {
+        let point = number(point);
+        let slopes = [Rational::new(slopes.0, 16), Rational::new(slopes.1, 16)];
+        let touches = [Touch::At(at.clone()), Touch::Mass(number(3)), Touch::Nowhere];
+        for touch in touches {
+            let Some(height) = chance.height(&point, &cell, &touch, &slopes) else { continue };
+            // What a cell does not reach is not asked.
+            let most = |side: usize, [near, far]: &[Rational; 2]| {
+                if cell.is_open[side] && near < far { 5_i64 } else { 6 }
+            };
+            prop_assume!(!cell.is_open[0] || (cell.below[0] < cell.below[1] && cell.above[0] < cell.above[1]));
+            for step in 0..=most(0, &cell.below) {
+                for other in 0..=most(1, &cell.above) {
+                    let place = |[near, far]: &[Rational; 2], step: i64| {
+                        near + &((far - near) * Rational::new(step, 6))
+                    };
+                    let reach = [place(&cell.below, step), place(&cell.above, other)];
+                    let [mass, _] = chance.mass(&point, &reach);
+                    let Some([below, _]) = enclosed::ln(&mass) else { continue };
+                    let bound = &height + &slopes[0] * &reach[0] + &slopes[1] * &reach[1];
+                    prop_assert!(below <= bound, "{:?} at {:?}: {} > {}", touch, reach, below, bound);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_bound_with_the_right_slopes_touches(
+        density in densities(),
+        (cell, at) in cells(),
+        point in (1..9_i64).prop_map(|own| own * 10),
+    ) {
+        let point = number(point);
+        let chance = Chance::dense(density, None, None, &Rational::new(1, 1000)).unwrap();
+        let Chance::Dense(dense) = &chance else { return Ok(()) };
+        let Some(seen) = dense.seen(&point, &cell) else { return Ok(()) };
+        prop_assume!(seen.iter().all(|own| *own == Cut::Before));
+        let Some(([mass, _], rises)) = dense.tangent(&point, &seen, &at) else { return Ok(()) };
+        prop_assume!(mass > Rational::new(1, 1_000_000));
+        let slopes = rises.map(|[low, _]| low);
+        let height = chance.height(&point, &cell, &Touch::At(at.clone()), &slopes).unwrap();
+        let [_, above] = enclosed::ln(&mass).unwrap();
+        let bound = &height + &slopes[0] * &at[0] + &slopes[1] * &at[1];
+        prop_assert!(bound - above < Rational::new(1, 100_000_000));
+    }
+
+    #[test]
+    fn what_a_number_is_rounded_to_is_inside_no_more_often_than_an_interval_with_its_margin(
+        chance in chances(),
+        (_, at) in cells(),
+        point in (1..9_i64).prop_map(|own| own * 10),
+    ) {
+        let point = number(point);
+        let (lower, upper) = (&point - &at[0], &point + &at[1]);
+        let inside = chance.inside([&lower, &upper], &Rational::new(1, 10));
+        let [_, above] = chance.mass(&point, &at);
+        prop_assert!(inside <= above);
+    }
+
+    #[test]
+    fn reaching_less_than_the_least_has_no_chance_and_more_than_the_most_gains_nothing(
+        chance in chances(),
+        (_, at) in cells(),
+        point in (1..9_i64).prop_map(|own| own * 10),
+    ) {
+        let point = number(point);
+        let [(least_below, most_below), (least_above, most_above)] = chance.limits(&point);
+        let [low, high] = chance.mass(&point, &at);
+        if at[0] < least_below || at[1] < least_above {
+            prop_assert!(low.is_zero());
+        } else if !matches!(&chance, Chance::Dense(own) if own.density.bend().is_some()) {
+            let cut = |value: &Rational, most: &Option<Rational>| {
+                most.as_ref().map_or(value.clone(), |most| value.clone().min(most.clone()))
+            };
+            let kept = [cut(&at[0], &most_below), cut(&at[1], &most_above)];
+            let [_, kept] = chance.mass(&point, &kept);
+            prop_assert!(kept >= low && kept <= high.max(kept.clone()), "{kept} {low}");
+        }
+    }
+}
+
+#[test]
+fn masses_are_those_of_draws() {
+    // Some ten thousand evenly spread quantiles stand for draws.
+    let quantile = |density: &Density, share: f64| -> f64 {
+        let (mut low, mut high): (f64, f64) = (-100.0, 200.0);
+        for _ in 0..60 {
+            let middle = f64::midpoint(low, high);
+            let at = Rational::from_f64_exactly(middle).unwrap();
+            if density.at_most(&at)[0].to_f64() < share {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    };
+    let density = Density::Normal {
+        mean: Rational::from(10),
+        deviation: Rational::from(3),
+    };
+    let resolution = Rational::new(1, 10);
+    let cuts = [Some(Rational::from(7)), Some(Rational::from(14))];
+    let [minimum, maximum] = cuts;
+    let chance = Chance::dense(density.clone(), minimum, maximum, &resolution).unwrap();
+    let draws: Vec<f64> = (0..2000)
+        .map(|index| quantile(&density, (f64::from(index) + 0.5) / 2000.0))
+        .map(|own| (own.clamp(7.0, 14.0) * 10.0).round() / 10.0)
+        .collect();
+    for (lower, upper) in [
+        (70, 140),
+        (71, 139),
+        (90, 140),
+        (70, 110),
+        (100, 100),
+        (20, 69),
+    ] {
+        let inside = chance.inside([&number(lower), &number(upper)], &resolution);
+        let ends = [number(lower).to_f64() - 1e-9, number(upper).to_f64() + 1e-9];
+        let count = draws
+            .iter()
+            .filter(|own| ends[0] <= **own && **own <= ends[1])
+            .count();
+        let share = f64::from(u32::try_from(count).unwrap()) / 2000.0;
+        assert!(
+            (inside.to_f64() - share).abs() < 2e-3,
+            "{lower} {upper}: {inside} {share}"
+        );
+    }
+}
+
+#[test]
+fn steps_of_values_add_up_to_what_an_interval_has() {
+    let values: Vec<Rational> = [10, 20, 30, 40, 40, 70].map(number).to_vec();
+    let chance = Chance::Values(values.clone());
+    let cell = Cell {
+        below: [number(5), number(25)],
+        above: [number(0), number(15)],
+        is_open: [false; 2],
+    };
+    let steps = Steps::new(&values, &number(30), &cell);
+    let total = steps.sides.iter().filter_map(|own| own.last());
+    let total = steps.center + total.map(|(_, share)| share).sum::<Rational>();
+    let far = [cell.below[1].clone(), cell.above[1].clone()];
+    assert_eq!(chance.mass(&number(30), &far)[0], total);
+}
