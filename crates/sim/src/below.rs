@@ -75,22 +75,27 @@ fn standard_normal_below(value: f64) -> f64 {
     0.5 * libm::erfc(-value / std::f64::consts::SQRT_2)
 }
 
+/// What is drawn becomes the nearest multiple of the resolution: the number below which what is
+/// drawn comes out on that side of `value`.
+pub fn rounding_edge(value: f64, side: Side, resolution: f64) -> f64 {
+    let steps = value / resolution;
+    let whole = steps.round();
+    let steps = if (steps - whole).abs() < 1e-6 {
+        whole
+    } else {
+        steps
+    };
+    let edge = match side {
+        Side::Below => steps.ceil() - 0.5,
+        Side::UpTo => steps.floor() + 0.5,
+    };
+    edge * resolution
+}
+
 impl Rule {
     /// How likely a value drawn for something planned to be `planned` is on that side of `value`.
     pub fn share(&self, value: f64, side: Side, planned: f64, resolution: f64) -> Option<f64> {
-        // What is drawn becomes the nearest multiple of the resolution.
-        let steps = value / resolution;
-        let whole = steps.round();
-        let steps = if (steps - whole).abs() < 1e-6 {
-            whole
-        } else {
-            steps
-        };
-        let edge = match side {
-            Side::Below => steps.ceil() - 0.5,
-            Side::UpTo => steps.floor() + 0.5,
-        };
-        let edge = edge * resolution;
+        let edge = rounding_edge(value, side, resolution);
         let scale = if self.is_relative { planned } else { 1.0 };
         if scale <= 0.0 {
             return Some(f64::from(u8::from(edge > 0.0)));

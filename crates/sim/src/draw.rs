@@ -27,6 +27,10 @@ pub enum Purpose {
     Effect = 7,
     /// A change by itself from one step to the next.
     Change = 8,
+    /// When a fact changes by itself that does so at a rate.
+    Hazard = 9,
+    /// What a failure leaves behind.
+    Outcome = 10,
 }
 
 /// A source of random numbers that depends on these four and on nothing else.

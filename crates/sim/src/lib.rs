@@ -41,9 +41,12 @@ mod pattern;
 mod sim;
 mod unreliable;
 
-pub use below::Side;
+pub use below::{Side, rounding_edge};
 pub use draw::{Distribution, Purpose};
-pub use model::{Amount, Exogenous, ExogenousChange, Failing, Failure, Reports, Rule, WorldModel};
+pub use model::{
+    Amount, Becoming, Exogenous, ExogenousChange, Failing, Failure, Hazard, Outcome, OutcomeChange,
+    Reports, Rule, Template, WorldModel,
+};
 pub use paced::{Begun, Durations, Pace, Paced};
 pub use pattern::ActionPattern;
 pub use sim::SimWorld;

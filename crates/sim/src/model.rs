@@ -1,5 +1,7 @@
 //! What a world file says: `docs/formats/world.md`.
 
+mod hazard;
+mod outcome;
 mod text;
 
 use elbowroom_model::Problem;
@@ -9,6 +11,9 @@ use rand::Rng;
 
 use crate::draw::{Distribution, rounded};
 use crate::pattern::ActionPattern;
+
+pub use hazard::Hazard;
+pub use outcome::{Becoming, Outcome, OutcomeChange, Template};
 
 /// A world, before it has a seed.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +31,9 @@ pub struct WorldModel {
     pub failures: Vec<Failing>,
     /// The exogenous events, apart from the problem's timed initials.
     pub exogenous: Vec<Exogenous>,
+    /// How often facts change by themselves; without a rule, never. The last rule that matches
+    /// counts.
+    pub hazards: Vec<Hazard>,
     /// How well the world reports.
     pub reports: Reports,
 }
@@ -67,6 +75,9 @@ pub struct Failing {
     /// become true again, and those that it made true, false. If not, they stay as the start left
     /// them.
     pub is_undone: bool,
+    /// What a failure may leave behind, after what is undone. They add up to 1 at most; the rest is
+    /// a failure that changes nothing more.
+    pub outcomes: Vec<Outcome>,
 }
 
 /// The moment at which an action fails.
@@ -134,6 +145,7 @@ impl WorldModel {
             amounts: Vec::new(),
             failures: Vec::new(),
             exogenous: Vec::new(),
+            hazards: Vec::new(),
             reports: Reports::default(),
         }
     }

@@ -63,6 +63,11 @@ impl ActionPattern {
         })
     }
 
+    /// The name; `None`: any.
+    pub(crate) fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
+
     /// Whether something of that name may be meant, whatever its objects.
     pub(crate) fn may_match(&self, name: &str) -> bool {
         let mine = self.name.as_deref();

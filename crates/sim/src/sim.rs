@@ -1,5 +1,7 @@
 //! One trajectory of a world.
 
+mod failures;
+mod hazards;
 mod held;
 mod world;
 
@@ -13,7 +15,8 @@ use elbowroom_num::Rational;
 use rand::Rng;
 
 use crate::draw::{Purpose, keyed};
-use crate::model::{ExogenousChange, Failure, WorldModel};
+use crate::model::{ExogenousChange, Failure, Outcome, WorldModel};
+use hazards::Chance;
 
 /// A simulated world: true state, and what is going to happen.
 ///
@@ -40,23 +43,31 @@ pub struct SimWorld<'a> {
     /// How often each action was started.
     occurrences: BTreeMap<String, u64>,
     /// The actions that were started, until they have ended.
-    actions: BTreeMap<Ticket, Commanded>,
+    actions: BTreeMap<Ticket, Commanded<'a>>,
+    /// The facts that change by themselves at a rate.
+    chances: Vec<Chance>,
 }
 
 #[derive(Clone, Debug)]
-struct Commanded {
+struct Commanded<'a> {
     action: Arc<Action>,
     planned: Option<Rational>,
     occurrence: u64,
     has_started: bool,
+    /// What its failure leaves behind, if it is one that leaves something.
+    outcome: Option<&'a Outcome>,
+    /// Whether it can only fail any more, and holds things up until it does.
+    is_broken: bool,
 }
 
 #[derive(Clone, Debug)]
 enum Coming {
     Start(Ticket),
     End(Ticket),
+    Break(Ticket),
     Fail(Ticket),
     Exogenous(usize),
+    Chance(usize),
 }
 
 impl<'a> SimWorld<'a> {
@@ -72,6 +83,7 @@ impl<'a> SimWorld<'a> {
             untold: Vec::new(),
             occurrences: BTreeMap::new(),
             actions: BTreeMap::new(),
+            chances: Vec::new(),
         };
         for (index, exogenous) in model.exogenous.iter().enumerate() {
             let name = match &exogenous.change {
@@ -86,6 +98,7 @@ impl<'a> SimWorld<'a> {
                 world.put(time.max(Rational::ZERO), Coming::Exogenous(index));
             }
         }
+        world.expose();
         world
     }
 
@@ -143,8 +156,10 @@ impl<'a> SimWorld<'a> {
             match entry.remove() {
                 Coming::Start(ticket) => self.start(ticket),
                 Coming::End(ticket) => self.end(ticket),
-                Coming::Fail(ticket) => self.break_down(ticket),
+                Coming::Break(ticket) => self.break_down(ticket),
+                Coming::Fail(ticket) => self.fail_at_last(ticket),
                 Coming::Exogenous(index) => self.change(index),
+                Coming::Chance(index) => self.take_chance(index),
             }
         }
     }
@@ -188,8 +203,15 @@ impl<'a> SimWorld<'a> {
         let fails = self
             .model
             .failing(&action.name)
-            .filter(|failing| failure.random::<f64>() < failing.probability)
-            .map(|failing| failing.when);
+            .filter(|failing| failure.random::<f64>() < failing.probability);
+        let outcome = fails.and_then(|failing| {
+            let (name, occurrence) = (&action.name, commanded.occurrence);
+            failing.outcome(&mut keyed(self.seed, name, occurrence, Purpose::Outcome))
+        });
+        if let Some(commanded) = self.actions.get_mut(&ticket) {
+            commanded.outcome = outcome;
+        }
+        let fails = fails.map(|failing| failing.when);
         let unmet = self.truth.unmet_on_arrival(&snap.condition, Some(&planned));
         if !unmet.is_empty() {
             let why = format!("it needs {}", self.in_words(&unmet));
@@ -197,7 +219,7 @@ impl<'a> SimWorld<'a> {
         }
         let is_instantaneous = matches!(action.body, Body::Instantaneous(_));
         if fails == Some(Failure::AtStart) || (is_instantaneous && fails.is_some()) {
-            return self.fail(ticket, "it did not start");
+            return self.break_down(ticket);
         }
         let measured = self.measured(&commanded, snap, 0);
         let _ = self.truth.start(ticket, action, &planned, &measured);
@@ -218,11 +240,11 @@ impl<'a> SimWorld<'a> {
         let duration = self.model.duration(&action.name, &planned, &mut rng);
         let end = &self.now + &duration;
         match fails {
-            Some(Failure::AtEnd) => self.put(end, Coming::Fail(ticket)),
+            Some(Failure::AtEnd) => self.put(end, Coming::Break(ticket)),
             Some(Failure::Midway) => {
                 let share = crate::draw::rounded(failure.random(), &self.model.resolution);
                 let time = &self.now + duration * share;
-                self.put(time, Coming::Fail(ticket));
+                self.put(time, Coming::Break(ticket));
             }
             _ => self.put(end, Coming::End(ticket)),
         }
@@ -260,38 +282,6 @@ impl<'a> SimWorld<'a> {
         });
     }
 
-    /// An action fails by itself, and what its start did may be undone.
-    fn break_down(&mut self, ticket: Ticket) {
-        let action = self.actions.get(&ticket).map(|own| Arc::clone(&own.action));
-        self.fail(ticket, "it broke down");
-        let Some(action) = action else {
-            return;
-        };
-        let failing = self.model.failing(&action.name);
-        if !failing.is_some_and(|failing| failing.is_undone) {
-            return;
-        }
-        let start = action
-            .durative()
-            .map_or(&[][..], |body| &body.start.effects);
-        let changes = start.iter().filter(|effect| effect.guard.is_trivial());
-        let changes = changes.map(|effect| &effect.change);
-        let is_added = |fact| {
-            let mut effects = start.iter();
-            effects.any(|effect| effect.change == Change::Add(fact))
-        };
-        for change in changes {
-            let (fact, truth) = match change {
-                Change::Add(fact) => (*fact, false),
-                // Where a start both deletes and adds, it makes true.
-                Change::Delete(fact) if !is_added(*fact) => (*fact, true),
-                Change::Delete(_) | Change::Update { .. } => continue,
-            };
-            self.truth.change_fact(fact, truth);
-            self.tell(Event::Fact { fact, truth });
-        }
-    }
-
     fn fail(&mut self, ticket: Ticket, why: &str) {
         self.truth.stop(ticket);
         if self.actions.remove(&ticket).is_some() {
@@ -306,7 +296,7 @@ impl<'a> SimWorld<'a> {
     }
 
     /// The amounts that the world file has for a happening; the others are the domain's.
-    fn measured(&self, commanded: &Commanded, snap: &SnapAction, place: u64) -> Vec<Measured> {
+    fn measured(&self, commanded: &Commanded<'_>, snap: &SnapAction, place: u64) -> Vec<Measured> {
         let action = &commanded.action.name;
         let update = |effect: &Effect| match &effect.change {
             Change::Update { fluent, value, .. } => Some((*fluent, value.clone())),

@@ -246,6 +246,88 @@ fn numbers_that_make_no_sense_are_mistakes() {
 }
 
 #[test]
+fn outcomes_that_make_no_sense_are_mistakes() {
+    let outcome = "[[failure]]\naction = \"go\"\nprobability = 1\n[[failure.outcome]]\n";
+    let cases = [
+        ("delay = 1\n", 6, "`probability` is missing"),
+        ("probability = 0.5\n", 6, "changes nothing"),
+        ("probability = 2\ndelay = 1\n", 7, "between 0 and 1"),
+        ("probability = -1\ndelay = 1\n", 7, "between 0 and 1"),
+        ("probability = 1\ndelay = -1\n", 8, "never negative"),
+        ("probability = 1\ndelay = inf\n", 8, "number of seconds"),
+        (
+            "probability = 1\nbecomes_true = [\"(up)\"]\n",
+            8,
+            "it has at",
+        ),
+        (
+            "probability = 1\nbecomes_true = [\"(at)\"]\n",
+            8,
+            "takes 1 arguments",
+        ),
+        (
+            "probability = 1\nbecomes_true = [\"(at c)\"]\n",
+            8,
+            "no object `c`",
+        ),
+        (
+            "probability = 1\nbecomes_true = [\"(at _)\"]\n",
+            8,
+            "parameter of the action",
+        ),
+        (
+            "probability = 1\nbecomes_true = [\"(at ?q)\"]\n",
+            8,
+            "it has ?p",
+        ),
+        (
+            "probability = 1\nbecomes_true = [\"\"]\n",
+            8,
+            "name one fact",
+        ),
+        (
+            "probability = 1\nbecomes_true = [\"(at a)\"]\nbecomes_false = [\"(at a)\"]\n",
+            9,
+            "twice",
+        ),
+        (
+            "probability = 1\nassign = { \"(fuel)\" = 1 }\n",
+            8,
+            "it has charge, level",
+        ),
+        (
+            "probability = 1\nincrease = { \"(charge)\" = nan }\n",
+            8,
+            "finite",
+        ),
+        ("probability = 1\nchance = 1\n", 8, "chance"),
+        (
+            "probability = 0.7\ndelay = 1\n[[failure.outcome]]\nprobability = 0.7\ndelay = 2\n",
+            10,
+            "add up to 1.4",
+        ),
+    ];
+    for (rest, line, words) in cases {
+        let sections = format!("{outcome}{rest}");
+        let (found, message) = mistake(&sections);
+        assert_eq!(found, line, "{sections}: {message}");
+        assert!(message.contains(words), "{sections}: {message}");
+    }
+    let of_any = outcome.replace("\"go\"", "\"*\"");
+    let (line, message) = mistake(&format!(
+        "{of_any}probability = 1\nbecomes_true = [\"(at ?p)\"]\n"
+    ));
+    assert_eq!(line, 8);
+    assert!(message.contains("give `action` a name"), "{message}");
+    let (line, message) =
+        mistake("[[delay]]\naction = \"go\"\nconstant = 1\n[[delay.outcome]]\ndelay = 1\n");
+    assert!(
+        line >= 3 && message.contains("`outcome` says nothing"),
+        "{line} {message}"
+    );
+}
+
+#[test]
 fn the_limits_of_late_reports_count() {
     let text = "format = \"elbowroom-world\"\nversion = 1\n[reports]\nlate = 1\n\
         uniform = { from = 0, to = 10 }\nminimum = 20\nmaximum = 20\n";

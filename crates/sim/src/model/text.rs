@@ -1,6 +1,8 @@
 //! Reading world files.
 
 mod changes;
+mod failures;
+mod hazards;
 mod section;
 
 use elbowroom_model::Problem;
@@ -8,7 +10,7 @@ use elbowroom_num::Rational;
 use elbowroom_text::{Diagnostic, Severity, Source, Span};
 use toml::Spanned;
 
-use super::{Amount, Exogenous, ExogenousChange, Failing, Failure, Reports, Rule, WorldModel};
+use super::{Amount, Exogenous, ExogenousChange, Reports, Rule, WorldModel};
 use crate::draw::Distribution;
 use crate::pattern::{ActionPattern, Names};
 use section::{File, Section, Shape};
@@ -61,6 +63,11 @@ pub(super) fn read(source: &Source, problem: &Problem) -> Read<WorldModel> {
     }
     for section in &file.event {
         model.exogenous.push(reader.exogenous(section)?);
+    }
+    for section in &file.hazard {
+        model
+            .hazards
+            .push(reader.hazard(section, &model.resolution)?);
     }
     if let Some(section) = &file.reports {
         model.reports = reader.reports(section)?;
@@ -256,37 +263,6 @@ impl Reader<'_> {
                     Distribution::LogNormal { mean, deviation }
                 }
             }
-        })
-    }
-
-    fn failing(&self, section: &Spanned<Section>) -> Read<Failing> {
-        let given = section.get_ref();
-        let own = ["action", "probability", "when", "undone"];
-        if let Some((span, message)) = given.excess("[[failure]]", &own, false) {
-            return Err(self.wrong(&span, message));
-        }
-        let probability = given.probability.as_ref();
-        let probability =
-            probability.ok_or_else(|| self.wrong(&section.span(), "`probability` is missing"))?;
-        let when = match &given.when {
-            None => Failure::AtEnd,
-            Some(when) => match when.get_ref().as_str() {
-                "start" => Failure::AtStart,
-                "midway" => Failure::Midway,
-                "end" => Failure::AtEnd,
-                _ => return Err(self.wrong(&when.span(), "write \"start\", \"midway\" or \"end\"")),
-            },
-        };
-        if let (Failure::AtStart, Some(undone)) = (when, &given.undone) {
-            let message =
-                "an action that does not start leaves nothing to undo; leave `undone` out";
-            return Err(self.wrong(&undone.span(), message));
-        }
-        Ok(Failing {
-            action: self.action(section)?,
-            probability: self.probability(probability)?,
-            when,
-            is_undone: given.undone.as_ref().is_some_and(|it| *it.get_ref()),
         })
     }
 

@@ -28,6 +28,8 @@ impl World for SimWorld<'_> {
                         planned: duration.clone(),
                         occurrence,
                         has_started: false,
+                        outcome: None,
+                        is_broken: false,
                     },
                 );
                 let mut rng = keyed(self.seed, &action.name, occurrence, Purpose::Delay);
@@ -39,6 +41,11 @@ impl World for SimWorld<'_> {
                 }
             }
             Command::Cancel { ticket } => {
+                // What has broken down is over when it has failed, and not before.
+                let is_broken = |own: &Commanded<'_>| own.is_broken;
+                if self.actions.get(ticket).is_some_and(is_broken) {
+                    return Ok(());
+                }
                 if self.actions.remove(ticket).is_some() {
                     self.truth.stop(*ticket);
                     self.tell(Event::Ended {

@@ -1,5 +1,6 @@
 //! World files as they stand, and what may stand where.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use serde::Deserialize;
@@ -22,6 +23,8 @@ pub(super) struct File {
     pub(super) failure: Vec<Spanned<Section>>,
     #[serde(default)]
     pub(super) event: Vec<Spanned<Section>>,
+    #[serde(default)]
+    pub(super) hazard: Vec<Spanned<Section>>,
     pub(super) reports: Option<Spanned<Section>>,
 }
 
@@ -33,9 +36,12 @@ pub(super) struct Section {
     pub(super) fluent: Option<Spanned<String>>,
     pub(super) fact: Option<Spanned<String>>,
     pub(super) becomes: Option<Spanned<toml::Value>>,
+    pub(super) becomes_true_per_second: Option<Spanned<f64>>,
+    pub(super) becomes_false_per_second: Option<Spanned<f64>>,
     pub(super) probability: Option<Spanned<f64>>,
     pub(super) when: Option<Spanned<String>>,
     pub(super) undone: Option<Spanned<bool>>,
+    pub(super) outcome: Option<Spanned<Vec<Spanned<OutcomeSection>>>>,
     pub(super) reported: Option<Spanned<bool>>,
     pub(super) constant: Option<Spanned<f64>>,
     pub(super) normal: Option<Spanned<Shape>>,
@@ -50,6 +56,23 @@ pub(super) struct Section {
     pub(super) duplicated: Option<Spanned<f64>>,
     pub(super) late: Option<Spanned<f64>>,
     pub(super) contradicted: Option<Spanned<f64>>,
+}
+
+/// Names of facts or fluents where they stand, and numbers.
+pub(super) type Numbers = BTreeMap<Spanned<String>, Spanned<f64>>;
+
+/// What a failure may leave behind.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct OutcomeSection {
+    pub(super) probability: Option<Spanned<f64>>,
+    pub(super) becomes_true: Vec<Spanned<String>>,
+    pub(super) becomes_false: Vec<Spanned<String>>,
+    pub(super) assign: Numbers,
+    pub(super) increase: Numbers,
+    pub(super) decrease: Numbers,
+    pub(super) delay: Option<Spanned<f64>>,
+    pub(super) reported: Option<Spanned<bool>>,
 }
 
 /// The numbers of a distribution.
@@ -88,9 +111,18 @@ impl Section {
             ("fluent", at(self.fluent.as_ref())),
             ("fact", at(self.fact.as_ref())),
             ("becomes", at(self.becomes.as_ref())),
+            (
+                "becomes_true_per_second",
+                at(self.becomes_true_per_second.as_ref()),
+            ),
+            (
+                "becomes_false_per_second",
+                at(self.becomes_false_per_second.as_ref()),
+            ),
             ("probability", at(self.probability.as_ref())),
             ("when", at(self.when.as_ref())),
             ("undone", at(self.undone.as_ref())),
+            ("outcome", at(self.outcome.as_ref())),
             ("reported", at(self.reported.as_ref())),
             ("constant", at(self.constant.as_ref())),
             ("normal", at(self.normal.as_ref())),

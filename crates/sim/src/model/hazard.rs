@@ -1,0 +1,85 @@
+//! Facts that change by themselves at a rate.
+
+use elbowroom_model::Problem;
+use elbowroom_model::problem::{ObjectId, Predicate};
+
+use super::WorldModel;
+use crate::pattern::ActionPattern;
+
+/// How often facts change by themselves, per second.
+///
+/// A rate of λ means: for as long as the fact has the other value, it changes within the next
+/// `t` seconds with probability 1 − exp(−λ·t), whatever has been before and whoever made it so
+/// (an exponentially distributed time, drawn anew each time).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hazard {
+    /// The facts.
+    pub fact: ActionPattern,
+    /// While it is false.
+    pub becomes_true: f64,
+    /// While it is true.
+    pub becomes_false: f64,
+    /// Whether the world reports such a change.
+    pub is_reported: bool,
+}
+
+/// Of so many facts at most, rates are given.
+pub(super) const MOST_FACTS: usize = 10_000;
+
+impl WorldModel {
+    /// How often a fact, `(predicate object …)`, changes by itself; `None`: never.
+    pub fn hazard(&self, fact: &str) -> Option<&Hazard> {
+        let mut rules = self.hazards.iter().rev();
+        rules.find(|rule| rule.fact.matches(fact))
+    }
+
+    /// All facts of the problem that change by themselves at a rate, by name, each once.
+    pub fn hazardous(&self, problem: &Problem) -> Vec<(String, &Hazard)> {
+        let mut found = Vec::new();
+        for predicate in &problem.predicates {
+            let mut rules = self.hazards.iter();
+            if rules.any(|rule| rule.fact.may_match(&predicate.name)) {
+                for arguments in arguments(predicate, problem) {
+                    let name = problem.apply_name(&predicate.name, &arguments);
+                    found.extend(self.hazard(&name).map(|rule| (name, rule)));
+                }
+            }
+        }
+        found
+    }
+}
+
+impl Hazard {
+    /// The rate at which a fact becomes `truth` while it is not.
+    pub fn rate(&self, truth: bool) -> f64 {
+        if truth {
+            self.becomes_true
+        } else {
+            self.becomes_false
+        }
+    }
+}
+
+/// How many facts a predicate has; `None` if that cannot be counted.
+pub(super) fn count(predicate: &Predicate, problem: &Problem) -> Option<usize> {
+    let mut parameters = predicate.parameters.iter();
+    parameters.try_fold(1_usize, |count, parameter| {
+        count.checked_mul(problem.objects_of(&parameter.types).count())
+    })
+}
+
+fn arguments(predicate: &Predicate, problem: &Problem) -> Vec<Vec<ObjectId>> {
+    let mut all = vec![Vec::new()];
+    for parameter in &predicate.parameters {
+        let objects: Vec<ObjectId> = problem.objects_of(&parameter.types).collect();
+        let longer = all.iter().flat_map(|first: &Vec<ObjectId>| {
+            objects.iter().map(|object| {
+                let mut arguments = first.clone();
+                arguments.push(*object);
+                arguments
+            })
+        });
+        all = longer.collect();
+    }
+    all
+}

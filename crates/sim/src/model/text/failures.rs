@@ -1,0 +1,258 @@
+//! Failures of actions, and what they leave behind.
+
+use elbowroom_model::problem::{Schema, TypeId, Variable};
+use elbowroom_num::Rational;
+use toml::Spanned;
+
+use super::section::{OutcomeSection, Section};
+use super::{Read, Reader};
+use crate::model::outcome::Word;
+use crate::model::{Becoming, Failing, Failure, Outcome, OutcomeChange, Template};
+use crate::pattern::{ActionPattern, Names};
+
+/// How a number changes a fluent.
+#[derive(Clone, Copy)]
+enum How {
+    Assign,
+    Increase,
+    Decrease,
+}
+
+impl Reader<'_> {
+    pub(super) fn failing(&self, section: &Spanned<Section>) -> Read<Failing> {
+        let given = section.get_ref();
+        let own = ["action", "probability", "when", "undone", "outcome"];
+        if let Some((span, message)) = given.excess("[[failure]]", &own, false) {
+            return Err(self.wrong(&span, message));
+        }
+        let probability = given.probability.as_ref();
+        let probability =
+            probability.ok_or_else(|| self.wrong(&section.span(), "`probability` is missing"))?;
+        let when = match &given.when {
+            None => Failure::AtEnd,
+            Some(when) => match when.get_ref().as_str() {
+                "start" => Failure::AtStart,
+                "midway" => Failure::Midway,
+                "end" => Failure::AtEnd,
+                _ => return Err(self.wrong(&when.span(), "write \"start\", \"midway\" or \"end\"")),
+            },
+        };
+        if let (Failure::AtStart, Some(undone)) = (when, &given.undone) {
+            let message =
+                "an action that does not start leaves nothing to undo; leave `undone` out";
+            return Err(self.wrong(&undone.span(), message));
+        }
+        let action = self.action(section)?;
+        let mut outcomes = Vec::new();
+        let mut sum = 0.0;
+        for outcome in given.outcome.iter().flat_map(Spanned::get_ref) {
+            let found = self.outcome(outcome, &action)?;
+            sum += found.probability;
+            // Tenths do not add up to 1 in binary.
+            if sum > 1.0 + 1e-9 {
+                let message = format!(
+                    "with this outcome the probabilities add up to {sum}: they are shares of the \
+                     failures, so 1 is the most"
+                );
+                let at = outcome.get_ref().probability.as_ref();
+                return Err(self.wrong(&at.map_or_else(|| outcome.span(), Spanned::span), message));
+            }
+            outcomes.push(found);
+        }
+        Ok(Failing {
+            probability: self.probability(probability)?,
+            when,
+            is_undone: given.undone.as_ref().is_some_and(|it| *it.get_ref()),
+            outcomes,
+            action,
+        })
+    }
+
+    fn outcome(&self, section: &Spanned<OutcomeSection>, action: &ActionPattern) -> Read<Outcome> {
+        let given = section.get_ref();
+        let probability = given.probability.as_ref().ok_or_else(|| {
+            let message = "`probability` is missing: how likely this is if the action fails";
+            self.wrong(&section.span(), message)
+        })?;
+        let mut changes: Vec<OutcomeChange> = Vec::new();
+        let mut add = |text: &Spanned<String>, what: Template, becomes| {
+            if changes.iter().any(|change| change.what == what) {
+                let message = format!("one outcome changes `{}` twice", text.get_ref());
+                return Err(self.wrong(&text.span(), message));
+            }
+            changes.push(OutcomeChange { what, becomes });
+            Ok(())
+        };
+        for (facts, truth) in [(&given.becomes_true, true), (&given.becomes_false, false)] {
+            for fact in facts {
+                let what = self.template(fact, Names::Predicates, action)?;
+                add(fact, what, Becoming::Truth(truth))?;
+            }
+        }
+        for (numbers, how) in [
+            (&given.assign, How::Assign),
+            (&given.increase, How::Increase),
+            (&given.decrease, How::Decrease),
+        ] {
+            for (fluent, value) in numbers {
+                let what = self.template(fluent, Names::Functions, action)?;
+                let number = Rational::from_f64_as_written(*value.get_ref());
+                let number =
+                    number.ok_or_else(|| self.wrong(&value.span(), "the number must be finite"))?;
+                let becomes = match how {
+                    How::Assign => Becoming::Value(number),
+                    How::Increase => Becoming::Grown(number),
+                    How::Decrease => Becoming::Grown(-number),
+                };
+                add(fluent, what, becomes)?;
+            }
+        }
+        let delay = match &given.delay {
+            None => Rational::ZERO,
+            Some(delay) => {
+                let seconds = Rational::from_f64_as_written(*delay.get_ref());
+                let seconds = seconds.filter(|seconds| !seconds.is_negative());
+                let message = "a delay is a number of seconds, and never negative";
+                seconds.ok_or_else(|| self.wrong(&delay.span(), message))?
+            }
+        };
+        if changes.is_empty() && !delay.is_positive() {
+            let message = "this outcome changes nothing; say what: becomes_true, becomes_false, \
+                           assign, increase, decrease or delay. What the outcomes leave of 1 is the \
+                           failure that changes nothing";
+            return Err(self.wrong(&section.span(), message));
+        }
+        Ok(Outcome {
+            probability: self.probability(probability)?,
+            changes,
+            delay,
+            is_reported: given.reported.as_ref().is_none_or(|it| *it.get_ref()),
+        })
+    }
+
+    /// A fact or a fluent with objects and parameters of the action: `(at ?box table)`.
+    fn template(
+        &self,
+        text: &Spanned<String>,
+        names: Names,
+        action: &ActionPattern,
+    ) -> Read<Template> {
+        let wrong = |message: String| Err(self.wrong(&text.span(), message));
+        let inner = text.get_ref().trim();
+        let inner = match inner.strip_prefix('(') {
+            Some(rest) => rest.strip_suffix(')').unwrap_or(rest),
+            None => inner,
+        };
+        let mut words = inner.split_whitespace().map(str::to_ascii_lowercase);
+        let name = words.next().unwrap_or_default();
+        if name.is_empty() || name == "*" {
+            return wrong("name one fact or fluent, with its objects".to_owned());
+        }
+        let words: Vec<String> = words.collect();
+        // Whether there is such a predicate or function, and how many objects it has.
+        let blanks = vec!["_"; words.len()].join(" ");
+        let pattern = format!("({name} {blanks})");
+        ActionPattern::read(&pattern, names, self.problem)
+            .map_err(|problem| self.wrong(&text.span(), problem))?;
+        let parameters = self.parameters(&name, names);
+        let schema = self.schema_of(action);
+        let mut objects = Vec::new();
+        for (word, parameter) in words.iter().zip(parameters) {
+            objects.push(if word.starts_with('?') {
+                let Some(schema) = schema else {
+                    return wrong(format!(
+                        "`{word}` is a parameter of no action that is named; give `action` a name"
+                    ));
+                };
+                match self.argument(word, schema, &parameter.types) {
+                    Ok(place) => Word::Argument(place),
+                    Err(message) => return wrong(message),
+                }
+            } else {
+                let object = self.problem.object(word);
+                match object {
+                    None if word == "_" => {
+                        return wrong(
+                            "write an object, or a parameter of the action such as `?x`".to_owned(),
+                        );
+                    }
+                    None => return wrong(format!("there is no object `{word}`")),
+                    Some(object) if !self.problem.has_type(object, &parameter.types) => {
+                        return wrong(format!(
+                            "`{name}` does not go with `{word}`: its type is another"
+                        ));
+                    }
+                    Some(_) => Word::Object(word.clone()),
+                }
+            });
+        }
+        let mut rules = self.problem.rules.iter();
+        if names == Names::Predicates
+            && rules.any(|rule| Some(rule.predicate) == self.problem.predicate(&name))
+        {
+            return wrong(format!(
+                "`{name}` is derived: it follows from other facts; change those"
+            ));
+        }
+        Ok(Template { name, objects })
+    }
+
+    fn parameters(&self, name: &str, names: Names) -> &[Variable] {
+        let found = match names {
+            Names::Predicates => self
+                .problem
+                .predicate(name)
+                .map(|predicate| &self.problem.predicates[predicate.index()].parameters),
+            Names::Functions => self
+                .problem
+                .function(name)
+                .map(|function| &self.problem.functions[function.index()].parameters),
+            Names::Actions => None,
+        };
+        found.map_or(&[], Vec::as_slice)
+    }
+
+    fn schema_of(&self, action: &ActionPattern) -> Option<&Schema> {
+        let name = action.name()?;
+        let mut schemas = self.problem.schemas.iter();
+        schemas.find(|schema| schema.name.eq_ignore_ascii_case(name))
+    }
+
+    /// The place of a parameter among those of an action, if some object fits both it and `types`.
+    fn argument(&self, word: &str, schema: &Schema, types: &[TypeId]) -> Result<usize, String> {
+        let mut parameters = schema.parameters.iter();
+        let place = parameters.position(|parameter| parameter.name.eq_ignore_ascii_case(word));
+        let Some(place) = place else {
+            let names = schema
+                .parameters
+                .iter()
+                .map(|parameter| parameter.name.as_str());
+            let names: Vec<&str> = names.collect();
+            return Err(format!(
+                "`{}` has no parameter `{word}`; it has {}",
+                schema.name,
+                if names.is_empty() {
+                    "none".to_owned()
+                } else {
+                    names.join(", ")
+                }
+            ));
+        };
+        let mut objects = self.problem.objects_of(&schema.parameters[place].types);
+        // Where there are no objects at all, nothing is started either.
+        let fits = objects.any(|object| self.problem.has_type(object, types));
+        if fits
+            || self
+                .problem
+                .objects_of(&schema.parameters[place].types)
+                .next()
+                .is_none()
+        {
+            Ok(place)
+        } else {
+            Err(format!(
+                "no object that `{word}` can be is of the right type here"
+            ))
+        }
+    }
+}

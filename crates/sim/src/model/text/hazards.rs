@@ -1,0 +1,90 @@
+//! Rates at which facts change by themselves.
+
+use elbowroom_num::Rational;
+use elbowroom_text::Span;
+use toml::Spanned;
+
+use super::section::Section;
+use super::{Read, Reader};
+use crate::model::Hazard;
+use crate::model::hazard::{MOST_FACTS, count};
+use crate::pattern::Names;
+
+impl Reader<'_> {
+    pub(super) fn hazard(&self, section: &Spanned<Section>, resolution: &Rational) -> Read<Hazard> {
+        let given = section.get_ref();
+        let own = [
+            "fact",
+            "becomes_true_per_second",
+            "becomes_false_per_second",
+            "reported",
+        ];
+        if let Some((span, message)) = given.excess("[[hazard]]", &own, false) {
+            return Err(self.wrong(&span, message));
+        }
+        let fact = given.fact.as_ref();
+        let fact = fact.ok_or_else(|| self.wrong(&section.span(), "`fact` is missing"))?;
+        let pattern = self.pattern(fact, Names::Predicates)?;
+        let Some(name) = pattern.name() else {
+            let message = "name a predicate, `(predicate _ object)` or one fact";
+            return Err(self.wrong(&fact.span(), message));
+        };
+        self.can_have_rates(name, &fact.span())?;
+        let (up, down) = (
+            &given.becomes_true_per_second,
+            &given.becomes_false_per_second,
+        );
+        if up.is_none() && down.is_none() {
+            let message =
+                "say how often: becomes_true_per_second, becomes_false_per_second, or both";
+            return Err(self.wrong(&section.span(), message));
+        }
+        let rate = |rate: &Option<Spanned<f64>>| match rate {
+            Some(rate) => self.rate(rate, resolution),
+            None => Ok(0.0),
+        };
+        Ok(Hazard {
+            becomes_true: rate(up)?,
+            becomes_false: rate(down)?,
+            is_reported: given.reported.as_ref().is_none_or(|it| *it.get_ref()),
+            fact: pattern,
+        })
+    }
+
+    /// Whether the facts of a predicate are the world's to change, and not too many.
+    fn can_have_rates(&self, name: &str, at: &Span) -> Read<()> {
+        let Some(predicate) = self.problem.predicate(name) else {
+            return Ok(());
+        };
+        let mut rules = self.problem.rules.iter();
+        if rules.any(|rule| rule.predicate == predicate) {
+            let message = format!(
+                "`{name}` is derived: it follows from other facts; give the rates of those"
+            );
+            return Err(self.wrong(at, message));
+        }
+        let facts = count(&self.problem.predicates[predicate.index()], self.problem);
+        if facts.is_none_or(|facts| facts > MOST_FACTS) {
+            let message = format!(
+                "`{name}` has more than {MOST_FACTS} facts, which is the most that can change by \
+                 themselves; split the predicate, or take fewer objects"
+            );
+            return Err(self.wrong(at, message));
+        }
+        Ok(())
+    }
+
+    fn rate(&self, rate: &Spanned<f64>, resolution: &Rational) -> Read<f64> {
+        let value = *rate.get_ref();
+        if !value.is_finite() || value < 0.0 {
+            let message = "a rate is a number of changes per second: 0 or more";
+            return Err(self.wrong(&rate.span(), message));
+        }
+        if value * resolution.to_f64() > 1.0 {
+            let message =
+                "that is more often than once in a step of `resolution`; give a smaller rate";
+            return Err(self.wrong(&rate.span(), message));
+        }
+        Ok(value)
+    }
+}

@@ -1,0 +1,104 @@
+//! Failures that nothing but chance explains, and what they leave behind.
+
+use std::sync::Arc;
+
+use elbowroom_execution::{Event, Ticket};
+use elbowroom_model::ground::{Action, Change};
+
+use super::{Coming, SimWorld};
+use crate::model::{Becoming, Outcome};
+
+impl SimWorld<'_> {
+    /// An action breaks down; it fails at once, or when it has held things up.
+    pub(super) fn break_down(&mut self, ticket: Ticket) {
+        let Some(commanded) = self.actions.get_mut(&ticket) else {
+            return;
+        };
+        commanded.is_broken = true;
+        match commanded.outcome.map(|outcome| &outcome.delay) {
+            Some(delay) if delay.is_positive() => {
+                self.put(&self.now + delay, Coming::Fail(ticket));
+            }
+            _ => self.fail_at_last(ticket),
+        }
+    }
+
+    /// An action that has broken down has failed. What its start did may be undone, and something
+    /// may be left behind.
+    pub(super) fn fail_at_last(&mut self, ticket: Ticket) {
+        let Some(commanded) = self.actions.get(&ticket).cloned() else {
+            return;
+        };
+        let action = &commanded.action;
+        let why = if commanded.has_started {
+            "it broke down"
+        } else {
+            "it did not start"
+        };
+        self.fail(ticket, why);
+        let failing = self.model.failing(&action.name);
+        if commanded.has_started && failing.is_some_and(|failing| failing.is_undone) {
+            self.undo_start(action);
+        }
+        if let Some(outcome) = commanded.outcome {
+            self.leave(outcome, action);
+        }
+    }
+
+    fn undo_start(&mut self, action: &Arc<Action>) {
+        let start = action
+            .durative()
+            .map_or(&[][..], |body| &body.start.effects);
+        let changes = start.iter().filter(|effect| effect.guard.is_trivial());
+        let changes = changes.map(|effect| &effect.change);
+        let is_added = |fact| {
+            let mut effects = start.iter();
+            effects.any(|effect| effect.change == Change::Add(fact))
+        };
+        for change in changes {
+            let (fact, truth) = match change {
+                Change::Add(fact) => (*fact, false),
+                // Where a start both deletes and adds, it makes true.
+                Change::Delete(fact) if !is_added(*fact) => (*fact, true),
+                Change::Delete(_) | Change::Update { .. } => continue,
+            };
+            self.truth.change_fact(fact, truth);
+            self.tell(Event::Fact { fact, truth });
+        }
+    }
+
+    fn leave(&mut self, outcome: &Outcome, action: &Action) {
+        let task = Arc::clone(self.truth.task());
+        for change in &outcome.changes {
+            let name = change.what.of(&action.name);
+            let event = match &change.becomes {
+                Becoming::Truth(truth) => {
+                    // An object of another type than the predicate's cannot matter.
+                    let Some(fact) = task.fact_named(&name) else {
+                        continue;
+                    };
+                    let truth = *truth;
+                    self.truth.change_fact(fact, truth);
+                    Event::Fact { fact, truth }
+                }
+                Becoming::Value(number) | Becoming::Grown(number) => {
+                    let Some(fluent) = task.fluent_named(&name) else {
+                        continue;
+                    };
+                    let value = if matches!(change.becomes, Becoming::Value(_)) {
+                        number.clone()
+                    } else if let Some(value) = self.truth.value(fluent) {
+                        value + number
+                    } else {
+                        continue;
+                    };
+                    self.truth.change_value(fluent, &value);
+                    Event::Value { fluent, value }
+                }
+            };
+            if outcome.is_reported {
+                self.tell(event);
+            }
+        }
+    }
+}

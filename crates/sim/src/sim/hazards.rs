@@ -1,0 +1,74 @@
+//! Facts that change by themselves at a rate.
+
+use elbowroom_execution::Event;
+use elbowroom_model::ground::FactId;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::Exp1;
+
+use super::{Coming, SimWorld};
+use crate::draw::{Purpose, keyed, rounded};
+
+/// The moments at which a fact changes unless it already is so: a Poisson process. Cut down to
+/// those moments at which the fact has the other value, it has no memory either, and it does not
+/// depend on what anybody does.
+#[derive(Clone, Debug)]
+pub(super) struct Chance {
+    fact: FactId,
+    becomes: bool,
+    /// Per second.
+    rate: f64,
+    is_reported: bool,
+    /// The last of these moments, in seconds, before it is rounded.
+    at: f64,
+    rng: ChaCha8Rng,
+}
+
+impl SimWorld<'_> {
+    /// Puts the first such moment of each fact on the agenda.
+    pub(super) fn expose(&mut self) {
+        let task = self.truth.task().clone();
+        for (name, hazard) in self.model.hazardous(task.problem()) {
+            // Arguments are of the right types, so the fact is there.
+            let Some(fact) = task.fact_named(&name) else {
+                continue;
+            };
+            for becomes in [false, true] {
+                let rate = hazard.rate(becomes);
+                if rate > 0.0 {
+                    self.chances.push(Chance {
+                        fact,
+                        becomes,
+                        rate,
+                        is_reported: hazard.is_reported,
+                        at: 0.0,
+                        rng: keyed(self.seed, &name, u64::from(becomes), Purpose::Hazard),
+                    });
+                    self.come_again(self.chances.len() - 1);
+                }
+            }
+        }
+    }
+
+    /// The next such moment.
+    fn come_again(&mut self, index: usize) {
+        let chance = &mut self.chances[index];
+        let pause: f64 = chance.rng.sample(Exp1);
+        chance.at += pause / chance.rate;
+        let time = rounded(chance.at, &self.model.resolution);
+        self.put(time, Coming::Chance(index));
+    }
+
+    /// One of these moments has come.
+    pub(super) fn take_chance(&mut self, index: usize) {
+        let chance = &self.chances[index];
+        let (fact, truth, is_reported) = (chance.fact, chance.becomes, chance.is_reported);
+        if self.truth.fact(fact) != truth {
+            self.truth.change_fact(fact, truth);
+            if is_reported {
+                self.tell(Event::Fact { fact, truth });
+            }
+        }
+        self.come_again(index);
+    }
+}
