@@ -15,7 +15,7 @@ use elbowroom_model::ground::FactId;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use crate::circumstances::Circumstances;
-use crate::likelihoods::Flip;
+use crate::likelihoods::{Flip, Rate};
 use crate::model::{Model, is_fact};
 use crate::network::{Loss, PrunedNetwork, TooCoupled};
 
@@ -208,11 +208,12 @@ impl Model {
     /// in any case.
     fn with_steady(&self, fact: FactId) -> Option<Self> {
         let position = self.position(fact).filter(|_| is_fact(fact))?;
-        if self.flips[position] == Flip::NEVER {
+        if self.flips[position] == Flip::NEVER && self.rates[position] == Rate::NEVER {
             return None;
         }
         let mut model = self.clone();
         model.flips[position] = Flip::NEVER;
+        model.rates[position] = Rate::NEVER;
         Some(model)
     }
 }

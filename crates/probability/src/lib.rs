@@ -78,7 +78,7 @@ pub use actions::{Unsupported, all_actions};
 pub use belief::Belief;
 pub use circumstances::{Circumstances, Running};
 pub use dispatch::{Choice, LayerDispatch, NextHappening, Reconsider};
-pub use likelihoods::{Flip, Likelihoods};
+pub use likelihoods::{Flip, Likelihoods, Rate};
 pub use model::{Model, Semantics};
 pub use network::{Loss, LossCause, PrunedNetwork, Reading, TooCoupled};
 pub use search::{Candidates, Found, OrderSearch, SearchSettings, SearchStop};

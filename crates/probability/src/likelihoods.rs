@@ -54,6 +54,45 @@ impl Flip {
     }
 }
 
+/// How often a fact changes by itself, per second, as long as it has the other value: whatever has
+/// been before, it has changed within the next `t` seconds with probability 1 − exp(−rate · t).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rate {
+    /// While it is false.
+    pub becomes_true: f64,
+    /// While it is true.
+    pub becomes_false: f64,
+}
+
+impl Rate {
+    /// A fact that does not change with time.
+    pub const NEVER: Self = Self {
+        becomes_true: 0.0,
+        becomes_false: 0.0,
+    };
+
+    /// The probabilities of being true so many seconds later, if it is true now and if it is not.
+    pub fn later(self, seconds: f64) -> (f64, f64) {
+        let sum = self.becomes_true + self.becomes_false;
+        if sum <= 0.0 {
+            return (1.0, 0.0);
+        }
+        let changed = -(-sum * seconds).exp_m1();
+        let in_the_end = self.becomes_true / sum;
+        (1.0 - (1.0 - in_the_end) * changed, in_the_end * changed)
+    }
+
+    /// The probability that it stays as it is for so many seconds on end.
+    pub fn lasting(self, truth: bool, seconds: f64) -> f64 {
+        let away = if truth {
+            self.becomes_false
+        } else {
+            self.becomes_true
+        };
+        (-away * seconds).exp()
+    }
+}
+
 /// The success probabilities of an action: its start and its effects.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Success {
@@ -72,19 +111,37 @@ pub struct Defaults {
     pub becomes_true: Option<f64>,
     /// For facts that are true.
     pub becomes_false: Option<f64>,
+    /// For facts that are false, per second.
+    pub becomes_true_per_second: Option<f64>,
+    /// For facts that are true, per second.
+    pub becomes_false_per_second: Option<f64>,
     /// For starts of actions.
     pub start: Option<f64>,
     /// For effects.
     pub effect: Option<f64>,
 }
 
-/// The part of a [`Flip`] that an entry states.
+/// The part of a [`Flip`] and of a [`Rate`] that an entry states.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PartialFlip {
     /// See [`Flip::becomes_true`].
     pub becomes_true: Option<f64>,
     /// See [`Flip::becomes_false`].
     pub becomes_false: Option<f64>,
+    /// See [`Rate::becomes_true`].
+    pub becomes_true_per_second: Option<f64>,
+    /// See [`Rate::becomes_false`].
+    pub becomes_false_per_second: Option<f64>,
+}
+
+impl PartialFlip {
+    /// Of facts that never change by themselves.
+    pub(crate) const NEVER: Self = Self {
+        becomes_true: Some(0.0),
+        becomes_false: Some(0.0),
+        becomes_true_per_second: Some(0.0),
+        becomes_false_per_second: Some(0.0),
+    };
 }
 
 /// Likelihoods: the probabilities of spontaneous changes, and of successful actions and effects.
@@ -92,7 +149,8 @@ pub struct PartialFlip {
 /// What is said of one ground fact or action goes before what is said of its predicate or schema,
 /// and that before the defaults.
 ///
-/// Invariant: all probabilities are in [0, 1]; whoever fills the fields sees to it.
+/// Invariant: all probabilities are in [0, 1], and rates per second are finite and not negative;
+/// whoever fills the fields sees to it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Likelihoods {
     /// The likelihoods of actions and facts that are not named.
@@ -126,6 +184,7 @@ impl Likelihoods {
                 becomes_false: Some(0.0),
                 start: Some(1.0),
                 effect: Some(1.0),
+                ..Defaults::default()
             },
             ..Self::default()
         }
@@ -157,15 +216,62 @@ impl Likelihoods {
     }
 
     pub(crate) fn flip_of(&self, predicate: PredicateId, arguments: &[ObjectId]) -> Option<Flip> {
+        let said = self.said_of(predicate, arguments);
+        // Who says how often it changes in a second need not say how often it does in a step.
+        let by_time = |rate: Option<f64>| rate.map(|_| 0.0);
+        let up = said.becomes_true.or(self.defaults.becomes_true);
+        let down = said.becomes_false.or(self.defaults.becomes_false);
+        let (up_by_time, down_by_time) = self.rates_of(said);
+        Some(Flip {
+            becomes_true: up.or(by_time(up_by_time))?,
+            becomes_false: down.or(by_time(down_by_time))?,
+        })
+    }
+
+    /// How often a fact changes by itself, per second: not at all, if nothing is said of it.
+    pub fn rate(&self, task: &Task, fact: FactId) -> Rate {
+        let (predicate, arguments) = task.atom(fact);
+        let (up, down) = self.rates_of(self.said_of(predicate, &arguments));
+        Rate {
+            becomes_true: up.unwrap_or(0.0),
+            becomes_false: down.unwrap_or(0.0),
+        }
+    }
+
+    /// Whether facts may change with time, and not only with steps.
+    pub fn has_rates(&self) -> bool {
+        let some = |rate: Option<f64>| rate.is_some_and(|rate| rate > 0.0);
+        let entries = self.predicates.values().chain(self.facts.values());
+        let mut rates =
+            entries.flat_map(|it| [it.becomes_true_per_second, it.becomes_false_per_second]);
+        rates.any(some)
+            || some(self.defaults.becomes_true_per_second)
+            || some(self.defaults.becomes_false_per_second)
+    }
+
+    /// What the entries of a fact and of its predicate say.
+    fn said_of(&self, predicate: PredicateId, arguments: &[ObjectId]) -> PartialFlip {
         let own = self.facts.get(&(predicate, arguments.to_vec())).copied();
         let own = own.unwrap_or_default();
         let all = self.predicates.get(&predicate).copied().unwrap_or_default();
-        let becomes_true = own.becomes_true.or(all.becomes_true);
-        let becomes_false = own.becomes_false.or(all.becomes_false);
-        Some(Flip {
-            becomes_true: becomes_true.or(self.defaults.becomes_true)?,
-            becomes_false: becomes_false.or(self.defaults.becomes_false)?,
-        })
+        PartialFlip {
+            becomes_true: own.becomes_true.or(all.becomes_true),
+            becomes_false: own.becomes_false.or(all.becomes_false),
+            becomes_true_per_second: own.becomes_true_per_second.or(all.becomes_true_per_second),
+            becomes_false_per_second: own
+                .becomes_false_per_second
+                .or(all.becomes_false_per_second),
+        }
+    }
+
+    fn rates_of(&self, said: PartialFlip) -> (Option<f64>, Option<f64>) {
+        let defaults = &self.defaults;
+        (
+            said.becomes_true_per_second
+                .or(defaults.becomes_true_per_second),
+            said.becomes_false_per_second
+                .or(defaults.becomes_false_per_second),
+        )
     }
 
     /// The probability that an attempt to start an action succeeds.

@@ -15,7 +15,7 @@ use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
 
-use crate::likelihoods::{Flip, Likelihoods, Missing};
+use crate::likelihoods::{Flip, Likelihoods, Missing, Rate};
 
 pub(crate) use requirement::{Requirement, evaluate, visit_facts};
 
@@ -41,6 +41,10 @@ pub struct Model {
     /// counts, with ids that no fact has.
     pub(crate) facts: Vec<FactId>,
     pub(crate) flips: Vec<Flip>,
+    /// How often facts change with time.
+    pub(crate) rates: Vec<Rate>,
+    /// Whether any of them is above 0.
+    pub(crate) has_rates: bool,
     /// The fluents that some happening changes, sorted.
     pub(crate) fluents: Vec<FluentId>,
     /// By node of the plan.
@@ -132,6 +136,16 @@ impl Model {
         let effects = &self.event(node).effects;
         let position = self.position(fact);
         effects.iter().any(|effect| Some(effect.fact) == position)
+    }
+
+    /// Whether facts change with time, and not only with steps.
+    pub fn has_rates(&self) -> bool {
+        self.has_rates
+    }
+
+    /// How long an action takes at least, in seconds.
+    pub(crate) fn shortest(&self, id: InstanceId) -> f64 {
+        self.plan.duration(id).0.to_f64()
     }
 
     pub(crate) fn event(&self, node: NodeId) -> &Event {

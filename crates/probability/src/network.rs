@@ -1,5 +1,6 @@
 //! The success probability of an order, step by step: [`PrunedNetwork`].
 
+mod clock;
 mod cluster;
 mod effects;
 mod facts;
@@ -13,6 +14,7 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::model::{Model, Requirement};
+use clock::Clock;
 use facts::Facts;
 pub(crate) use facts::Snapshot;
 use ledger::Ledger;
@@ -50,6 +52,7 @@ pub struct PrunedNetwork<'m> {
     remaining: Vec<(InstanceId, Option<Rational>)>,
     /// The actions under way, in order of their start.
     running: Vec<InstanceId>,
+    clock: Clock,
     /// P(A), and what is required throughout the actions under way.
     probability: f64,
     /// Numeric conditions taken for granted, as their numbers depend on time.
@@ -65,6 +68,7 @@ pub struct PrunedNetwork<'m> {
 struct Mark {
     facts: facts::Checkpoint,
     undo: usize,
+    now: f64,
     probability: f64,
     assumed: usize,
 }
@@ -73,7 +77,8 @@ struct Mark {
 enum Undo {
     Number(usize, Number),
     Started,
-    Ended(usize, InstanceId),
+    /// The place, the action, and when it was to end.
+    Ended(usize, InstanceId, f64),
 }
 
 impl<'m> PrunedNetwork<'m> {
@@ -96,6 +101,7 @@ impl<'m> PrunedNetwork<'m> {
             numbers: Numbers::new(model, &circumstances.values),
             remaining: Vec::new(),
             running: Vec::new(),
+            clock: Clock::at(&circumstances.now),
             probability: 1.0,
             assumed: 0,
             sequence: Vec::new(),
@@ -109,6 +115,8 @@ impl<'m> PrunedNetwork<'m> {
             let remaining = event.duration.as_ref().map(|duration| duration - &elapsed);
             network.remaining.push((running.instance, remaining));
             network.running.push(running.instance);
+            let end = running.start.to_f64() + model.shortest(running.instance);
+            network.clock.ends.push(end);
             for (fluent, _) in &event.continuous {
                 let number = &mut network.numbers.changing[*fluent];
                 *number = Numbers::begun(number);
@@ -251,6 +259,7 @@ impl<'m> PrunedNetwork<'m> {
     fn try_push(&mut self, node: NodeId) -> Result<(), TooCoupled> {
         let model = self.model;
         let event = model.event(node);
+        self.pass(node)?;
         self.require(&event.condition, node, Reading::OnArrival)?;
         self.multiply(event.success, (node, Reading::OnArrival), || {
             LossCause::Start
@@ -263,12 +272,14 @@ impl<'m> PrunedNetwork<'m> {
         match model.plan().nodes[node.index()] {
             Node::Start(id) => {
                 self.running.push(id);
+                self.clock.ends.push(self.clock.now + model.shortest(id));
                 self.undo.push(Undo::Started);
             }
             Node::End(id) => {
                 if let Some(place) = self.running.iter().position(|&running| running == id) {
                     self.running.remove(place);
-                    self.undo.push(Undo::Ended(place, id));
+                    let end = self.clock.ends.remove(place);
+                    self.undo.push(Undo::Ended(place, id, end));
                 }
             }
             Node::Zero | Node::Instant(_) | Node::Timed(_) => {}
@@ -383,6 +394,7 @@ impl<'m> PrunedNetwork<'m> {
         Mark {
             facts: self.facts.checkpoint(),
             undo: self.undo.len(),
+            now: self.clock.now,
             probability: self.probability,
             assumed: self.assumed,
         }
@@ -394,12 +406,17 @@ impl<'m> PrunedNetwork<'m> {
                 Some(Undo::Number(fluent, number)) => self.numbers.changing[fluent] = number,
                 Some(Undo::Started) => {
                     self.running.pop();
+                    self.clock.ends.pop();
                 }
-                Some(Undo::Ended(place, id)) => self.running.insert(place, id),
+                Some(Undo::Ended(place, id, end)) => {
+                    self.running.insert(place, id);
+                    self.clock.ends.insert(place, end);
+                }
                 None => {}
             }
         }
         self.facts.undo_to(mark.facts);
+        self.clock.now = mark.now;
         self.probability = mark.probability;
         self.assumed = mark.assumed;
     }

@@ -136,6 +136,8 @@ fn certainty_gains_what_it_gains_in_the_world_in_which_there_is_certainty() {
                 let never = PartialFlip {
                     becomes_true: Some(0.0),
                     becomes_false: Some(0.0),
+                    becomes_true_per_second: Some(0.0),
+                    becomes_false_per_second: Some(0.0),
                 };
                 likelihoods.facts.insert(case.task.atom(fact), never);
                 let expected = success(&case, &likelihoods, semantics, &order);

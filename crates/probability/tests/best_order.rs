@@ -19,7 +19,7 @@ use elbowroom_probability::{
 };
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use twin::random::{Case, Taste, case};
+use twin::random::{Case, Taste, case, in_time};
 
 struct Compared {
     /// The best order has more than one happening.
@@ -136,6 +136,44 @@ fn no_order_is_more_likely_to_succeed_than_the_one_found() {
     }
     assert!(long > 250, "{long} orders had more than one happening");
     assert!(hasty > 100, "{hasty} orders were there from the beginning");
+}
+
+#[test]
+fn no_order_is_more_likely_to_succeed_where_facts_change_with_time() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut long = 0;
+    for round in 0..300 {
+        let taste = Taste {
+            couples: round % 4 == 0,
+            timed: round % 3 == 0,
+            negations: round % 2 == 0,
+            ..EASY
+        };
+        let case = case(&mut rng, taste);
+        let case = in_time(&mut rng, case);
+        let settings = SearchSettings {
+            keeps_interference: rng.random_bool(0.5),
+            candidates: Candidates::All,
+        };
+        let semantics = [Semantics::Paper, Semantics::World][round % 2];
+        long += usize::from(compare(&case, semantics, settings).is_long);
+    }
+    assert!(long > 80, "{long} orders had more than one happening");
+}
+
+#[test]
+fn waiting_costs_where_facts_change_with_time_so_actions_stay_parallel() {
+    let (task, plan) = lamps(3);
+    let text = "format = \"elbowroom-likelihoods\"\nversion = 1
+        [defaults]\nbecomes_true = 0.0\nbecomes_false = 0.0\nstart = 1.0\neffect = 1.0
+        [facts.whole]\nbecomes_false_per_second = 0.1\n";
+    let likelihoods = likelihoods::read(text.as_bytes(), &task).unwrap();
+    let found = search((task, plan), &likelihoods).order.unwrap();
+    // All three at once, a second each: who begins one after the other waits six seconds in all.
+    assert!(
+        (found.probability - (-0.3_f64).exp()).abs() < 1e-12,
+        "{found:?}"
+    );
 }
 
 /// Lamps of one kind to be screwed in, in any order and also at once.

@@ -8,7 +8,7 @@ use elbowroom_probability::{Model, PrunedNetwork, Semantics};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use twin::Worlds;
-use twin::random::{Case, Taste, case, order};
+use twin::random::{Case, Taste, case, in_time, order};
 
 const FACTORED: Taste = Taste {
     facts: 4,
@@ -100,6 +100,25 @@ fn coupled_facts_have_exact_probabilities() {
     };
     for _ in 0..1500 {
         let case = case(&mut rng, taste);
+        for semantics in [Semantics::Paper, Semantics::World] {
+            possible += compare(&case, semantics, &mut rng);
+        }
+    }
+    assert!(possible > 15_000, "{possible} steps were possible at all");
+}
+
+#[test]
+fn facts_that_change_with_time_have_exact_probabilities() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let mut possible = 0;
+    for round in 0..1500 {
+        let taste = Taste {
+            couples: round % 2 == 0,
+            actions: 3,
+            ..FACTORED
+        };
+        let case = case(&mut rng, taste);
+        let case = in_time(&mut rng, case);
         for semantics in [Semantics::Paper, Semantics::World] {
             possible += compare(&case, semantics, &mut rng);
         }

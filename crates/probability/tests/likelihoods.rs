@@ -88,6 +88,52 @@ fn the_more_specific_entry_counts() {
 }
 
 #[test]
+fn rates_per_second_stand_beside_likelihoods_per_step() {
+    let task = doors();
+    let text = format!(
+        "{HEAD}
+        [defaults]
+        becomes_true = 0
+        becomes_true_per_second = 0.5
+        start = 1.0
+        effect = 0.9
+        [facts.painted]
+        becomes_false_per_second = 0.25
+        [facts.open]
+        becomes_false = 0.1
+        becomes_true_per_second = 0
+        [facts.\"open b\"]
+        becomes_false_per_second = 2"
+    );
+    let likelihoods = read(text.as_bytes(), &task).unwrap();
+    assert!(likelihoods.has_rates());
+    let fact = |name: &str| task.fact_named(name).unwrap();
+    let said = |name: &str| {
+        let flip = likelihoods.flip(&task, fact(name)).unwrap();
+        let rate = likelihoods.rate(&task, fact(name));
+        let flips = [flip.becomes_true, flip.becomes_false];
+        (flips, [rate.becomes_true, rate.becomes_false])
+    };
+    // Who gives the rate of a second need not give the likelihood of a step.
+    assert_eq!(said("(painted a)"), ([0.0, 0.0], [0.5, 0.25]));
+    assert_eq!(said("(open a)"), ([0.0, 0.1], [0.0, 0.0]));
+    assert_eq!(said("(open b)"), ([0.0, 0.1], [0.0, 2.0]));
+    // Maps do not change, whatever the defaults say.
+    assert_eq!(said("(near a b)"), ([0.0, 0.0], [0.0, 0.0]));
+    let written = write(task.problem(), &likelihoods);
+    assert_eq!(
+        read(written.as_bytes(), &task).unwrap(),
+        likelihoods,
+        "{written}"
+    );
+    for wrong in ["-1", "\"often\"", "inf"] {
+        let text = format!("{HEAD}[facts.open]\nbecomes_true_per_second = {wrong}\n");
+        let mistakes = mistakes(&text);
+        assert!(mistakes.contains("a rate, 0 or more"), "{mistakes}");
+    }
+}
+
+#[test]
 fn mistakes_are_reported_with_their_place_and_what_to_do() {
     let complete = "[defaults]\nbecomes_true = 0\nbecomes_false = 0\nstart = 1\neffect = 1\n";
     for (text, expected) in [

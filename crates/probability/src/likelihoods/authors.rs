@@ -105,6 +105,7 @@ impl Reader<'_> {
         let flip = PartialFlip {
             becomes_true,
             becomes_false,
+            ..PartialFlip::default()
         };
         if self.likelihoods.facts.insert(fact, flip).is_some() {
             let message = format!("`{}` is listed twice", name.text);
@@ -248,10 +249,7 @@ impl Reader<'_> {
             let id = PredicateId::from(index);
             let is_mentioned = self.likelihoods.facts.keys().any(|(p, _)| *p == id);
             if !predicate.is_derived && !is_mentioned && !is_changed(self.problem, id) {
-                let never = PartialFlip {
-                    becomes_true: Some(0.0),
-                    becomes_false: Some(0.0),
-                };
+                let never = PartialFlip::NEVER;
                 self.likelihoods.predicates.insert(id, never);
             }
         }

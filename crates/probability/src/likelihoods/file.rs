@@ -144,9 +144,25 @@ impl Reader<'_> {
     fn defaults(&mut self, key: &Key<'_>, value: &Value<'_>) {
         self.each(key, value, &mut |reader, key, value| {
             let name = key.get_ref().as_ref();
-            let known = ["becomes_true", "becomes_false", "start", "effect"];
+            let known = [
+                "becomes_true",
+                "becomes_false",
+                "becomes_true_per_second",
+                "becomes_false_per_second",
+                "start",
+                "effect",
+            ];
             if !known.contains(&name) {
                 return reader.unknown(key, &known);
+            }
+            if name.ends_with("_per_second") {
+                let rate = reader.rate(value);
+                let defaults = &mut reader.likelihoods.defaults;
+                match name {
+                    "becomes_true_per_second" => defaults.becomes_true_per_second = rate,
+                    _ => defaults.becomes_false_per_second = rate,
+                }
+                return;
             }
             let probability = reader.probability(value);
             let defaults = &mut reader.likelihoods.defaults;
@@ -170,7 +186,17 @@ impl Reader<'_> {
             &mut |reader, key, value| match key.get_ref().as_ref() {
                 "becomes_true" => flip.becomes_true = reader.probability(value),
                 "becomes_false" => flip.becomes_false = reader.probability(value),
-                _ => reader.unknown(key, &["becomes_true", "becomes_false"]),
+                "becomes_true_per_second" => flip.becomes_true_per_second = reader.rate(value),
+                "becomes_false_per_second" => flip.becomes_false_per_second = reader.rate(value),
+                _ => reader.unknown(
+                    key,
+                    &[
+                        "becomes_true",
+                        "becomes_false",
+                        "becomes_true_per_second",
+                        "becomes_false_per_second",
+                    ],
+                ),
             },
         );
         let is_new = match arguments {
@@ -333,6 +359,23 @@ impl Reader<'_> {
             .ok()
     }
 
+    /// A number of changes per second.
+    fn rate(&mut self, value: &Value<'_>) -> Option<f64> {
+        let read = match value.get_ref() {
+            DeValue::Float(number) => number.as_str().replace('_', "").parse::<f64>().ok(),
+            DeValue::Integer(number) => number.as_str().replace('_', "").parse::<f64>().ok(),
+            _ => None,
+        };
+        let rate = read.filter(|rate| rate.is_finite() && *rate >= 0.0);
+        if rate.is_none() {
+            let message = "this is no number of changes per second".to_owned();
+            let expected = "a rate, 0 or more: 0.1 is once in ten seconds on average";
+            self.mistakes
+                .mistake(value.span(), message, expected.to_owned());
+        }
+        rate
+    }
+
     /// Something is said of each fact and each action.
     fn check_complete(&mut self, document: &DeTable<'_>) {
         let section = |name: &str| {
@@ -348,10 +391,7 @@ impl Reader<'_> {
             }
             if !is_mentioned && !is_changed(self.problem, id) {
                 // What never changes, and is not mentioned, stays as it is.
-                let never = PartialFlip {
-                    becomes_true: Some(0.0),
-                    becomes_false: Some(0.0),
-                };
+                let never = PartialFlip::NEVER;
                 self.likelihoods.predicates.insert(id, never);
                 continue;
             }

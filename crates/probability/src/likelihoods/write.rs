@@ -14,6 +14,11 @@ pub fn write(problem: &Problem, likelihoods: &Likelihoods) -> String {
     let entries = [
         ("becomes_true", defaults.becomes_true),
         ("becomes_false", defaults.becomes_false),
+        ("becomes_true_per_second", defaults.becomes_true_per_second),
+        (
+            "becomes_false_per_second",
+            defaults.becomes_false_per_second,
+        ),
         ("start", defaults.start),
         ("effect", defaults.effect),
     ];
@@ -65,6 +70,8 @@ fn fact(text: &mut String, key: &str, flip: &PartialFlip) {
         &[
             ("becomes_true", flip.becomes_true),
             ("becomes_false", flip.becomes_false),
+            ("becomes_true_per_second", flip.becomes_true_per_second),
+            ("becomes_false_per_second", flip.becomes_false_per_second),
         ],
     );
 }

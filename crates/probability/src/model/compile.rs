@@ -12,7 +12,7 @@ use elbowroom_plan::{Node, PartialOrderPlan};
 
 use super::requirement::{Requirement, is_derived, visit_facts};
 use super::{Event, FactEffect, Model, Semantics, Update};
-use crate::likelihoods::{Flip, Likelihoods, Missing};
+use crate::likelihoods::{Flip, Likelihoods, Missing, Rate};
 
 pub(super) fn model(
     task: Arc<Task>,
@@ -44,11 +44,14 @@ pub(super) fn model(
     facts.retain(|fact| !is_derived(&task, *fact));
     let flips = facts.iter().map(|&fact| likelihoods.flip(&task, fact));
     let flips = flips.collect::<Result<_, _>>()?;
+    let rates = facts.iter().map(|&fact| likelihoods.rate(&task, fact));
+    let rates = rates.collect();
     let mut compiler = Compiler {
         task: &task,
         likelihoods,
         facts: facts.into_iter().collect(),
         flips,
+        rates,
         fluents: fluents.into_iter().collect(),
     };
     let mut events = vec![Event::default(); plan.nodes.len()];
@@ -83,6 +86,7 @@ pub(super) fn model(
     let Compiler {
         facts,
         flips,
+        rates,
         fluents,
         ..
     } = compiler;
@@ -93,6 +97,8 @@ pub(super) fn model(
         semantics,
         facts,
         flips,
+        has_rates: rates.iter().any(|rate| *rate != Rate::NEVER),
+        rates,
         fluents,
         events,
         goal,
@@ -147,6 +153,7 @@ struct Compiler<'a> {
     likelihoods: &'a Likelihoods,
     facts: Vec<FactId>,
     flips: Vec<Flip>,
+    rates: Vec<Rate>,
     fluents: Vec<FluentId>,
 }
 
@@ -166,6 +173,7 @@ impl Compiler<'_> {
         let memory = FactId(last.max(FactId::FIRST_FREE.0));
         self.facts.push(memory);
         self.flips.push(Flip::NEVER);
+        self.rates.push(Rate::NEVER);
         memory
     }
 

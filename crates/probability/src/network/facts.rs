@@ -11,8 +11,9 @@ use elbowroom_model::ground::{Condition, Expression, FactId};
 use elbowroom_num::Rational;
 
 use super::cluster::{Cluster, Kernel};
-use super::outcome::{Outcome, Pending, by_itself, kernel};
+use super::outcome::{Outcome, Pending, by_itself, kernel, later};
 use crate::belief::Belief;
+use crate::likelihoods::Rate;
 use crate::model::{Model, evaluate, visit_facts};
 
 pub(crate) use snapshot::Snapshot;
@@ -35,6 +36,8 @@ struct Record {
 #[derive(Clone, Debug)]
 pub(super) struct Facts {
     layer: u32,
+    /// By layer, how it becomes the next one: after a step, or as so many seconds pass.
+    transitions: Vec<Option<f64>>,
     records: Vec<Record>,
     clusters: Vec<Option<Cluster>>,
     undo: Vec<Undo>,
@@ -63,6 +66,7 @@ impl Facts {
         };
         Self {
             layer: 0,
+            transitions: Vec::new(),
             records: model.facts.iter().map(record).collect(),
             clusters: Vec::new(),
             undo: Vec::new(),
@@ -87,6 +91,7 @@ impl Facts {
         }
         self.clusters.truncate(checkpoint.clusters);
         self.layer = checkpoint.layer;
+        self.transitions.truncate(checkpoint.layer as usize);
     }
 
     /// Makes a fact certain before anything has happened.
@@ -215,7 +220,19 @@ impl Facts {
             cluster.layer = next;
             self.set_cluster(slot, Some(cluster));
         }
+        if is_step {
+            self.transitions.push(None);
+        }
         self.layer = next;
+    }
+
+    /// Time passes, and facts change by themselves, but for these, which stay as they are.
+    pub(super) fn pass(&mut self, seconds: f64, held: &[(usize, bool)]) {
+        self.transitions.push(Some(seconds));
+        self.layer += 1;
+        for &(fact, truth) in held {
+            self.set_certain_later(fact, truth);
+        }
     }
 
     /// Guarded effects with uncertain guards, together with everything else that happens.
@@ -295,10 +312,14 @@ impl Facts {
         if record.layer >= self.layer {
             return record.p;
         }
-        let flip = model.flips[fact];
+        let (flip, rate) = (model.flips[fact], model.rates[fact]);
         let mut p = record.p;
-        for _ in record.layer..self.layer {
-            p = flip.after(p);
+        for transition in &self.transitions[record.layer as usize..self.layer as usize] {
+            p = match transition {
+                None => flip.after(p),
+                Some(_) if rate == Rate::NEVER => p,
+                Some(seconds) => later(rate, *seconds).apply(p),
+            };
         }
         self.set_record(fact, p);
         p

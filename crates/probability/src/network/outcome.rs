@@ -1,7 +1,7 @@
 //! What effects, and changes by themselves, do to the probability of a fact.
 
 use super::cluster::Kernel;
-use crate::likelihoods::Flip;
+use crate::likelihoods::{Flip, Rate};
 use crate::model::{FactEffect, Model, Semantics};
 
 /// An effect that takes place, with its chance to fail.
@@ -38,6 +38,12 @@ pub(super) fn by_itself(flip: Flip) -> Kernel {
         if_true: 1.0 - flip.becomes_false,
         if_false: flip.becomes_true,
     }
+}
+
+/// A fact changing by itself while time passes.
+pub(super) fn later(rate: Rate, seconds: f64) -> Kernel {
+    let (if_true, if_false) = rate.later(seconds);
+    Kernel { if_true, if_false }
 }
 
 /// The transition of a fact by the effects that take place; deletions come before additions.

@@ -16,6 +16,9 @@ pub(super) fn check(model: &Model) -> Result<(), NotSmall> {
     if !model.fluents.is_empty() {
         return Err(unsupported("actions change numbers"));
     }
+    if model.has_rates() {
+        return Err(unsupported("facts change with time, at rates per second"));
+    }
     if !model.task().timed().is_empty() {
         return Err(unsupported("facts change at fixed times"));
     }

@@ -174,7 +174,10 @@ impl Bounds {
             is_counted: vec![false; model.facts.len()],
             bound: probability,
         };
-        run.count(&needed, separations);
+        // What time does to facts is not counted: it may do good as well as harm.
+        if !model.has_rates() {
+            run.count(&needed, separations);
+        }
         // Products of the same numbers in another order may differ in the last digits.
         Bound {
             probability: run.bound * (1.0 + 1e-12),

@@ -38,6 +38,8 @@ struct Key {
     next_timed: usize,
     /// Such a sequence may be no order as it stands: see `OrderSearch::may_be_over`.
     is_timed_last: bool,
+    /// Where facts change with time: see [`PrunedNetwork::times_to_come`].
+    times: Vec<i64>,
     truths: Vec<Truth>,
     numbers: Vec<Number>,
 }
@@ -126,7 +128,7 @@ impl Memo {
         nominal: &Nominal,
         network: &mut PrunedNetwork<'_>,
         is_used: &[bool],
-        next_timed: usize,
+        (next_timed, has_timed): (usize, bool),
         room: Option<Room>,
     ) -> bool {
         let need = self.needs.of(is_used, network.running());
@@ -141,6 +143,7 @@ impl Memo {
             next_timed,
             is_timed_last: last
                 .is_some_and(|node| matches!(model.plan().nodes[node.index()], Node::Timed(_))),
+            times: network.times_to_come(has_timed),
             truths: (0..need.len())
                 .filter(matters)
                 .map(|fact| nominal.truth(fact))

@@ -318,7 +318,7 @@ impl<'s, 'w> Run<'s, 'w> {
             &self.nominal,
             &mut self.network,
             &self.is_used,
-            self.next_timed,
+            (self.next_timed, has_timed),
             room,
         )
     }

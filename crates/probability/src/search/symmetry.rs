@@ -13,6 +13,7 @@ use elbowroom_plan::{InstanceId, NodeId};
 
 use super::separations::Separations;
 use crate::circumstances::Circumstances;
+use crate::likelihoods::Rate;
 use crate::model::{Event, Model};
 
 /// The symmetries of a model, once for all searches.
@@ -39,8 +40,9 @@ struct Signature {
     needs: [Vec<(Seen, bool)>; 3],
     /// Effects at start and end: with their probability, and whether they cannot fail.
     effects: [Vec<(Seen, bool, f64, bool)>; 2],
-    /// Of each own fact: how likely it flips, and what the goal wants of it.
-    own: Vec<(f64, f64, Option<bool>)>,
+    /// Of each own fact: how likely it flips, how often it changes with time, and what the
+    /// goal wants of it.
+    own: Vec<(f64, f64, Rate, Option<bool>)>,
 }
 
 impl Symmetry {
@@ -195,7 +197,8 @@ fn signature(
     };
     let flips = own.iter().map(|&fact| {
         let flip = model.flips[fact];
-        (flip.becomes_true, flip.becomes_false, wanted(fact))
+        let rate = model.rates[fact];
+        (flip.becomes_true, flip.becomes_false, rate, wanted(fact))
     });
     let signature = Signature {
         is_durative,

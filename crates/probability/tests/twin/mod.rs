@@ -33,6 +33,10 @@ pub(crate) struct Worlds<'a> {
     values: BTreeMap<FluentId, Rational>,
     running: Vec<InstanceId>,
     possible: Vec<(World, f64)>,
+    /// In seconds.
+    now: f64,
+    /// When the actions under way end.
+    ends: BTreeMap<InstanceId, f64>,
 }
 
 impl<'a> Worlds<'a> {
@@ -79,7 +83,13 @@ impl<'a> Worlds<'a> {
             values: circumstances.values.clone(),
             running: circumstances.running.iter().map(|r| r.instance).collect(),
             possible: worlds.into_iter().map(world).collect(),
+            now: circumstances.now.to_f64(),
+            ends: BTreeMap::new(),
         };
+        for running in &circumstances.running {
+            let end = running.start.to_f64() + all.lasts(running.instance);
+            all.ends.insert(running.instance, end);
+        }
         all.look_throughout();
         all
     }
@@ -103,7 +113,81 @@ impl<'a> Worlds<'a> {
         &self.running
     }
 
+    fn lasts(&self, id: InstanceId) -> f64 {
+        self.plan.duration(id).0.to_f64()
+    }
+
+    /// Seconds pass until the happening, which is as early as it can be.
+    fn pass(&mut self, node: NodeId) {
+        let due = match self.plan.nodes[node.index()] {
+            Node::End(id) => self.ends[&id],
+            Node::Timed(index) => self.task.timed()[index].time.to_f64(),
+            _ => self.now,
+        };
+        let seconds = (due - self.now).max(0.0);
+        self.now += seconds;
+        if seconds == 0.0 {
+            return;
+        }
+        let mut held = Vec::new();
+        for &id in &self.running {
+            if let Body::Durative(body) = &self.plan.instance(id).action.body {
+                self.literals(&body.over_all, &mut held);
+            }
+        }
+        for index in 0..self.task.fact_count() {
+            let fact = FactId(u32::try_from(index).unwrap());
+            if self.task.is_derived(fact) {
+                continue;
+            }
+            let rate = self.likelihoods.rate(self.task, fact);
+            let sum = rate.becomes_true + rate.becomes_false;
+            let mut after = BTreeMap::new();
+            for (world, weight) in std::mem::take(&mut self.possible) {
+                let truth = world.facts[index];
+                let (away, back) = if truth {
+                    (rate.becomes_false, rate.becomes_true)
+                } else {
+                    (rate.becomes_true, rate.becomes_false)
+                };
+                if held.contains(&(fact, truth)) {
+                    // Not even for a moment.
+                    *after.entry(world).or_insert(0.0) += weight * (-away * seconds).exp();
+                    continue;
+                }
+                let stays = if sum > 0.0 {
+                    (back + away * (-sum * seconds).exp()) / sum
+                } else {
+                    1.0
+                };
+                let mut other = world.clone();
+                other.facts[index] = !truth;
+                *after.entry(world).or_insert(0.0) += weight * stays;
+                *after.entry(other).or_insert(0.0) += weight * (1.0 - stays);
+            }
+            self.possible = after
+                .into_iter()
+                .filter(|(_, weight)| *weight > 0.0)
+                .collect();
+        }
+        self.look_throughout();
+    }
+
+    /// The facts that a condition asks for one by one.
+    fn literals(&self, condition: &Condition, all: &mut Vec<(FactId, bool)>) {
+        match condition {
+            Condition::And(parts) => parts.iter().for_each(|part| self.literals(part, all)),
+            Condition::Fact(fact) if !self.task.is_derived(*fact) => all.push((*fact, true)),
+            Condition::Not(part) => match &**part {
+                Condition::Fact(fact) if !self.task.is_derived(*fact) => all.push((*fact, false)),
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+
     pub(crate) fn push(&mut self, node: NodeId) {
+        self.pass(node);
         match self.plan.nodes[node.index()] {
             Node::Zero => {}
             Node::Timed(index) => {
@@ -125,6 +209,8 @@ impl<'a> Worlds<'a> {
                     Body::Durative(body) => {
                         self.do_snap(id, &body.start, success, &body.end.effects);
                         self.running.push(id);
+                        let end = self.now + self.lasts(id);
+                        self.ends.insert(id, end);
                     }
                 }
             }

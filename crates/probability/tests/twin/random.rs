@@ -245,6 +245,7 @@ fn likelihoods(rng: &mut impl Rng, task: &Task) -> Likelihoods {
         let flip = PartialFlip {
             becomes_true: Some(probability(rng) * 0.5),
             becomes_false: Some(probability(rng) * 0.6),
+            ..PartialFlip::default()
         };
         likelihoods
             .predicates
@@ -265,6 +266,15 @@ fn likelihoods(rng: &mut impl Rng, task: &Task) -> Likelihoods {
         likelihoods.schemas.insert(SchemaId::from(index), success);
     }
     likelihoods
+}
+
+/// The same case, with facts that also change with time.
+pub(crate) fn in_time(rng: &mut impl Rng, mut case: Case) -> Case {
+    for flip in case.likelihoods.predicates.values_mut() {
+        flip.becomes_true_per_second = Some(probability(rng) * 0.2);
+        flip.becomes_false_per_second = Some(probability(rng) * 0.3);
+    }
+    case
 }
 
 fn circumstances(rng: &mut impl Rng, task: &Task, plan: &PartialOrderPlan) -> Circumstances {

@@ -3,7 +3,7 @@
 use elbowroom_model::ground::FactId;
 
 use super::super::cluster::Cluster;
-use super::super::outcome::by_itself;
+use super::super::outcome::{by_itself, later};
 use super::{Facts, MOST_COUPLED, Record};
 use crate::model::Model;
 
@@ -158,10 +158,16 @@ impl Facts {
         let layer = self.layer;
         let is_behind = |cluster: &Cluster| cluster.layer < layer;
         if let Some(mut cluster) = self.clusters[slot as usize].clone().filter(is_behind) {
-            for _ in cluster.layer..layer {
+            for transition in &self.transitions[cluster.layer as usize..layer as usize] {
                 for place in 0..cluster.facts.len() {
-                    let flip = model.flips[cluster.facts[place]];
-                    cluster.transform(place, by_itself(flip));
+                    let fact = cluster.facts[place];
+                    cluster.transform(
+                        place,
+                        match transition {
+                            None => by_itself(model.flips[fact]),
+                            Some(seconds) => later(model.rates[fact], *seconds),
+                        },
+                    );
                 }
             }
             cluster.layer = layer;
