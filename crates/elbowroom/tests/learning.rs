@@ -170,7 +170,14 @@ fn what_was_cut_off_counts() {
         .collect();
     let mean = |records: Vec<Record>| {
         let name = "log".to_owned();
-        let answer = learnt(vec![Log { name, records }], None);
+        let answer = learnt(
+            vec![Log {
+                name,
+                records,
+                course: None,
+            }],
+            None,
+        );
         match &answer.actions[0].durations {
             DurationsLearnt::Together { group } => group.fit.mean,
             other => panic!("{other:?}"),
@@ -217,6 +224,7 @@ fn conformal_intervals_hold_the_next_run() {
         let logs = (0..80).map(|number| Log {
             name: number.to_string(),
             records: run(&mut rng),
+            course: None,
         });
         let inside = InsideRequest {
             task: Arc::clone(&task),
@@ -285,4 +293,60 @@ fn a_trace_that_was_cut_off_is_read_up_to_there() {
             assert!(record.end <= later.end, "{record:?} {later:?}");
         }
     }
+}
+
+/// Doors are unlocked and locked by somebody, at rates; the robot unlocks one of them itself.
+#[test]
+fn rates_of_changes_are_found_again_and_actions_and_deadlines_are_no_changes() {
+    const UP: f64 = 0.01;
+    const DOWN: f64 = 0.04;
+    let world = format!(
+        "{WORLD}[[hazard]]\nfact = \"unlocked\"\nbecomes_true_per_second = {UP}\n\
+         becomes_false_per_second = {DOWN}\n"
+    );
+    for count in [20, 50, 200] {
+        let logs = (0..count).map(|number| {
+            let (trace, _) = run(&world, 1000 * count + number);
+            Log::read(&Source::new(format!("run {number}"), trace)).expect("a trace")
+        });
+        let answer = learnt(logs.collect(), None);
+        // Neither what drives and picks do, nor that the counter closes.
+        let found: Vec<_> = answer
+            .changes
+            .iter()
+            .map(|it| (it.predicate.as_str(), it.becomes))
+            .collect();
+        assert_eq!(found, [("unlocked", false), ("unlocked", true)], "{count}");
+        for (learnt, truth) in answer.changes.iter().zip([DOWN, UP]) {
+            let found = learnt.all.per_second.expect("there was time");
+            let error = (truth / learnt.all.seconds).sqrt();
+            assert!(learnt.all.changes > 2, "{count}: {learnt:?}");
+            assert!((found - truth).abs() <= 3.5 * error, "{count}: {learnt:?}");
+            assert!(learnt.apart.is_empty(), "{count}: {learnt:?}");
+        }
+        // What was learnt is a world in which the next run can be simulated.
+        let (task, _) = problem();
+        let model = WorldModel::read(answer.world.as_str(), task.problem());
+        let model = model.expect("a correct world file");
+        let hazard = model.hazard("(unlocked office)").expect("it has rates");
+        let learnt: Vec<_> = answer.changes.iter().map(|it| it.all.per_second).collect();
+        assert_eq!(
+            learnt,
+            [Some(hazard.becomes_false), Some(hazard.becomes_true)]
+        );
+    }
+}
+
+/// A pick that fails leaves the parcel where it was: that is no change by itself.
+#[test]
+fn what_a_failure_undoes_has_not_changed_by_itself() {
+    let world = WORLD.replace("when = \"midway\"", "when = \"midway\"\nundone = true");
+    let logs = (0..20).map(|seed| {
+        let (trace, _) = run(&world, seed);
+        Log::read(&Source::new(format!("run {seed}"), trace)).expect("a trace")
+    });
+    let answer = learnt(logs.collect(), None);
+    let picks = answer.actions.iter().find(|action| action.action == "pick");
+    assert!(picks.is_some_and(|pick| pick.failures.failed > 0));
+    assert_eq!(answer.changes, []);
 }

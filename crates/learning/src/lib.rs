@@ -5,6 +5,7 @@
 //! - [`survival`], [`fit`]: distributions from samples of which some were cut off, because the
 //!   action was cancelled or failed (right-censored); leaving these out would make slow actions
 //!   look quick.
+//! - [`changes`]: how often facts change by themselves, per second.
 //! - [`learn`]: which actions are described together, and by what; [`world`]: the result as a world
 //!   file.
 //! - [`conformal`]: intervals that hold the next value with a stated probability, whatever its
@@ -25,11 +26,12 @@
 //! let settings = Settings::default();
 //! let learnt = learn(&records, &settings);
 //! assert_eq!(learnt[0].name, "drive");
-//! let world = world::write(&learnt, settings.resolution);
+//! let world = world::write(&learnt, &[], settings.resolution);
 //! assert!(world.contains("relative = true"));
 //! # Ok::<(), elbowroom_text::Diagnostics>(())
 //! ```
 
+pub mod changes;
 pub mod conformal;
 pub mod drift;
 pub mod fit;

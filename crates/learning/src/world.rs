@@ -1,15 +1,17 @@
 //! What was learnt, as a world file (`docs/formats/world.md`).
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use elbowroom_sim::{Distribution, Failure};
 use toml::{Table, Value};
 
+use crate::changes::{Changes, Rate};
 use crate::fit::Fit;
 use crate::learn::{Durations, Group, Learnt, constant};
 
 /// The world file, with a comment on each section that says on what it rests.
-pub fn write(learnt: &[Learnt], resolution: f64) -> String {
+pub fn write(learnt: &[Learnt], changes: &[Changes], resolution: f64) -> String {
     let mut text = String::from("format = \"elbowroom-world\"\nversion = 1\n");
     let _ = writeln!(text, "resolution = {}", Value::Float(resolution));
     for action in learnt {
@@ -20,7 +22,50 @@ pub fn write(learnt: &[Learnt], resolution: f64) -> String {
         }
         failures(&mut text, action);
     }
+    for of_one in changes.chunk_by(|a, b| a.predicate == b.predicate) {
+        hazards(&mut text, of_one);
+    }
     text
+}
+
+/// The rates of a predicate's facts: one section for all, or one for each, as soon as one direction
+/// is described fact by fact; what a section says of both directions counts.
+fn hazards(text: &mut String, changes: &[Changes]) {
+    let mut section = |fact: &str, rates: &[(bool, Rate)]| {
+        let changing = rates.iter().filter(|(_, rate)| rate.changes > 0);
+        let changing: Vec<_> = changing.collect();
+        if changing.is_empty() {
+            return;
+        }
+        text.push('\n');
+        for (becomes, rate) in &changing {
+            let (lower, upper) = rate.interval().unwrap_or((0.0, f64::INFINITY));
+            let Rate { changes, seconds } = rate;
+            let _ = writeln!(
+                text,
+                "# becomes {becomes}: {changes} in {seconds:.1} s; 95 % interval {lower:.5} to {upper:.5}"
+            );
+        }
+        text.push_str("[[hazard]]\n");
+        push(text, "fact", Value::String(fact.to_owned()));
+        for (becomes, rate) in changing {
+            let key = format!("becomes_{becomes}_per_second");
+            push(text, &key, Value::Float(rate.per_second().unwrap_or(0.0)));
+        }
+    };
+    if !changes.iter().any(|change| change.is_apart) {
+        let rates: Vec<_> = changes.iter().map(|it| (it.becomes, it.all)).collect();
+        return section(&changes[0].predicate, &rates);
+    }
+    let facts = changes.iter().flat_map(|change| &change.facts);
+    let facts: BTreeSet<&str> = facts.map(|(fact, _)| fact.as_str()).collect();
+    for fact in facts {
+        let rates: Vec<_> = changes
+            .iter()
+            .map(|change| (change.becomes, change.rate_of(fact)))
+            .collect();
+        section(fact, &rates);
+    }
 }
 
 fn durations(text: &mut String, learnt: &Learnt) {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use elbowroom::answers::Unwatched;
 use elbowroom::answers::learn::{
     ActionLearnt, ConformalBox, DriftAnswer, DurationsLearnt, FitAnswer, GroupAnswer,
-    InsideRequest, LearnAnswer, LearnRequest, Log, LogError, Settings, Verdict,
+    InsideRequest, LearnAnswer, LearnRequest, Log, LogError, RateLearnt, Settings, Verdict,
     expectation_and_reality, learn,
 };
 use elbowroom::num::{End, Rational};
@@ -124,6 +124,7 @@ fn text(request: &LearnRequest, answer: &LearnAnswer, look: Look) -> String {
         notes: Vec::new(),
     };
     text.push_str(table.within(look.width).trim_start_matches('\n'));
+    changes(&mut text, answer, look);
     for action in &answer.actions {
         remarks(&mut text, action, look);
     }
@@ -177,6 +178,47 @@ fn rows(request: &LearnRequest, action: &ActionLearnt) -> Vec<Vec<String>> {
             rows
         }
     }
+}
+
+/// How often facts changed by themselves, which no plan expects.
+fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
+    if answer.changes.is_empty() {
+        return;
+    }
+    let row = |name: &str, becomes: bool, rate: &RateLearnt| {
+        let (lower, upper) = rate.interval.unwrap_or((0.0, f64::INFINITY));
+        vec![
+            name.to_owned(),
+            becomes.to_string(),
+            rate.changes.to_string(),
+            short(rate.seconds),
+            rate.per_second.map_or(String::new(), rate_words),
+            format!("{} to {}", rate_words(lower), rate_words(upper)),
+        ]
+    };
+    let mut rows = Vec::new();
+    for learnt in &answer.changes {
+        rows.push(row(&learnt.predicate, learnt.becomes, &learnt.all));
+        let apart = learnt.apart.iter();
+        rows.extend(apart.map(|(fact, rate)| row(&format!("  {fact}"), learnt.becomes, rate)));
+    }
+    let table = Table {
+        caption: String::new(),
+        headings: ["fact", "becomes", "times", "seconds", "per second", "95 %"]
+            .map(str::to_owned)
+            .to_vec(),
+        keys: 2,
+        rows,
+        notes: Vec::new(),
+    };
+    text.push('\n');
+    text.push_str("Changes that no action and no timed initial makes:\n\n");
+    text.push_str(table.within(look.width).trim_start_matches('\n'));
+}
+
+/// Rates are small numbers: four digits behind the point.
+fn rate_words(rate: f64) -> String {
+    format!("{rate:.4}")
 }
 
 fn distribution(group: &GroupAnswer, unit: &str) -> String {

@@ -1,5 +1,7 @@
 //! What do logs say about the world, and will the next run stay inside the plan's envelope?
 
+mod changes;
+mod courses;
 mod inside;
 
 use elbowroom_learning::fit::Fit;
@@ -13,6 +15,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{RequestError, Version, Watcher};
 
+pub use changes::{ChangesLearnt, RateLearnt};
+pub use courses::Course;
 pub use elbowroom_learning::learn::Settings;
 pub use inside::{ConformalBox, ConformalInterval, InsideRequest, Verdict};
 
@@ -34,6 +38,8 @@ pub struct Log {
     pub name: String,
     /// The attempts to execute actions, in order.
     pub records: Vec<Record>,
+    /// What became of the facts; `None` where the log does not say, as tables do not.
+    pub course: Option<Course>,
 }
 
 /// A log that cannot be read.
@@ -61,15 +67,21 @@ impl Log {
     /// When it is neither, with the place of the mistake.
     pub fn read(source: &Source) -> Result<Self, LogError> {
         let name = source.name().to_owned();
-        let records = if source.text().trim_start().starts_with('{') {
-            match Stored::read(source.text()) {
-                Ok(trace) => records::of_trace(&trace),
-                Err(error) => return Err(LogError::Trace { name, error }),
-            }
-        } else {
-            table::read(source)?
-        };
-        Ok(Self { name, records })
+        if !source.text().trim_start().starts_with('{') {
+            return Ok(Self {
+                name,
+                records: table::read(source)?,
+                course: None,
+            });
+        }
+        match Stored::read(source.text()) {
+            Ok(trace) => Ok(Self {
+                name,
+                records: records::of_trace(&trace),
+                course: Course::of(&trace),
+            }),
+            Err(error) => Err(LogError::Trace { name, error }),
+        }
     }
 }
 
@@ -86,6 +98,9 @@ pub struct LearnAnswer {
     pub attempts: usize,
     /// Statistics of the attempts, by the actions' names.
     pub actions: Vec<ActionLearnt>,
+    /// How often facts change by themselves: those of each predicate of which one did.
+    #[serde(default)]
+    pub changes: Vec<ChangesLearnt>,
     /// All of it as a world file.
     pub world: String,
     /// Intervals for the next run, if they were asked for.
@@ -221,6 +236,7 @@ pub fn learn(
         .flat_map(|log| log.records.iter().cloned())
         .collect();
     let learnt = learn::learn(&records, &request.settings);
+    let changes = changes::of(&request.logs);
     let inside = match &request.inside {
         Some(inside) => Some(inside::answer(inside, &learnt, watcher)?),
         None => None,
@@ -231,7 +247,8 @@ pub fn learn(
         logs: request.logs.iter().map(|log| log.name.clone()).collect(),
         attempts: records.len(),
         actions: learnt.iter().map(ActionLearnt::of).collect(),
-        world: world::write(&learnt, request.settings.resolution),
+        changes: changes.iter().map(ChangesLearnt::of).collect(),
+        world: world::write(&learnt, &changes, request.settings.resolution),
         inside,
     })
 }

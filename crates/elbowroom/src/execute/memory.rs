@@ -83,8 +83,7 @@ impl<P: Planner> Planner for RememberingPlanner<P> {
         let hash = hash(&(&situation.time, parts(&situation.state)));
         let known = self.memory.recall(hash, |known| known == situation);
         if let Some(answer) = known {
-            let seconds = None;
-            return PlannerAnswer { answer, seconds };
+            return PlannerAnswer::from(answer);
         }
         let planned = self.planner.plan(task, situation);
         if self::table(task) == table {

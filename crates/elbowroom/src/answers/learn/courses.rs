@@ -1,0 +1,271 @@
+//! What became of the facts in a run, and which of it nobody did: [`Course`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use elbowroom_execution::{Progression, Ticket};
+use elbowroom_learning::changes::Exposure;
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, Body, Change, Effect, FactId};
+use elbowroom_num::Rational;
+use elbowroom_pddl::read_problem;
+use elbowroom_report::trace::line::{GivenLine, ObservationLine};
+use elbowroom_report::trace::{Line, Stored};
+use elbowroom_sim::WorldModel;
+use elbowroom_text::Source;
+
+use crate::execute::RunSpec;
+
+/// The facts of one run, as its trace tells: what was true at the beginning, what the actions and
+/// timed initials have done, and what was reported besides.
+#[derive(Clone, Debug)]
+pub struct Course {
+    task: Arc<Task>,
+    flips: Vec<Flip>,
+    /// How long the run took, in seconds.
+    lasted: f64,
+}
+
+/// A fact has changed.
+#[derive(Clone, Copy, Debug)]
+struct Flip {
+    fact: FactId,
+    becomes: bool,
+    at: f64,
+    is_by_itself: bool,
+}
+
+impl Course {
+    /// `None` where the trace does not say what was executed.
+    pub(super) fn of(trace: &Stored) -> Option<Self> {
+        let spec: RunSpec = trace.header().ok()?;
+        let source = |text: &str| Source::new("trace", text);
+        let read = read_problem(&source(&spec.domain.text), &source(&spec.problem.text));
+        let task = Arc::new(Task::new(read.ok()?.0));
+        let mut follower = Follower {
+            state: Progression::new(Arc::clone(&task)),
+            task,
+            flips: Vec::new(),
+            commanded: BTreeMap::new(),
+            failed: (Rational::ZERO, BTreeSet::new()),
+        };
+        for line in &trace.lines {
+            follower.follow(line);
+        }
+        let lasted = follower.state.time().to_f64();
+        Some(Self {
+            task: follower.task,
+            flips: follower.flips,
+            lasted,
+        })
+    }
+
+    /// The predicates of which a fact has changed by itself.
+    pub(super) fn changing(&self) -> impl Iterator<Item = String> {
+        let flips = self.flips.iter().filter(|flip| flip.is_by_itself);
+        flips.map(|flip| {
+            let (predicate, _) = self.task.atom(flip.fact);
+            self.task.problem().predicates[predicate.index()]
+                .name
+                .clone()
+        })
+    }
+
+    /// For how long all facts of a predicate were true and false, and how often they changed by
+    /// themselves. Nothing of a predicate with more facts than a world file may have rates for.
+    pub(super) fn exposures(&self, predicate: &str) -> Vec<Exposure> {
+        let all = format!(
+            "format = \"elbowroom-world\"\nversion = 1\n[[hazard]]\nfact = \"{predicate}\"\n\
+             becomes_true_per_second = 1"
+        );
+        let problem = self.task.problem();
+        let Ok(model) = WorldModel::read(all.as_str(), problem) else {
+            return Vec::new();
+        };
+        let names = model.hazardous(problem).into_iter();
+        let known = names.filter_map(|(name, _)| Some((self.task.fact_named(&name)?, name)));
+        known
+            .flat_map(|(fact, name)| self.exposure(fact, &name))
+            .collect()
+    }
+
+    fn exposure(&self, fact: FactId, name: &str) -> [Exposure; 2] {
+        let mut both = [false, true].map(|becomes| Exposure {
+            fact: name.to_owned(),
+            becomes,
+            seconds: 0.0,
+            changes: 0,
+        });
+        let mut truth = self.task.initial().facts.contains(&fact);
+        let mut since = 0.0;
+        for flip in self.flips.iter().filter(|flip| flip.fact == fact) {
+            // While it is true it can become false.
+            both[usize::from(!truth)].seconds += flip.at - since;
+            both[usize::from(flip.becomes)].changes += u64::from(flip.is_by_itself);
+            (truth, since) = (flip.becomes, flip.at);
+        }
+        both[usize::from(!truth)].seconds += self.lasted - since;
+        both
+    }
+}
+
+/// A state that follows a trace.
+struct Follower {
+    task: Arc<Task>,
+    state: Progression,
+    flips: Vec<Flip>,
+    commanded: BTreeMap<u64, (Arc<Action>, Option<Rational>)>,
+    /// When an action has failed last, and the facts that its start has changed: what is undone has
+    /// not changed by itself.
+    failed: (Rational, BTreeSet<FactId>),
+}
+
+impl Follower {
+    fn follow(&mut self, line: &Line) {
+        match line {
+            Line::Command(line) => {
+                self.pass(&line.now.0);
+                if let GivenLine::Start {
+                    ticket,
+                    action,
+                    duration,
+                } = &line.command
+                    && let Some(action) = self.action(action)
+                {
+                    let duration = duration.as_ref().map(|duration| duration.0.clone());
+                    self.commanded.insert(*ticket, (Arc::new(action), duration));
+                }
+            }
+            Line::Passed(line) => self.pass(&line.now.0),
+            Line::Observed(line) if line.remark.is_none() => self.observe(&line.observation),
+            Line::Over(line) => self.pass(&line.time),
+            _ => {}
+        }
+    }
+
+    fn action(&self, name: &str) -> Option<Action> {
+        let mut words = name.trim_matches(['(', ')']).split_whitespace();
+        let problem = self.task.problem();
+        let schema = problem.schema(words.next()?)?;
+        let objects: Option<Vec<_>> = words.map(|word| problem.object(word)).collect();
+        self.task.instantiate(schema, &objects?).ok()
+    }
+
+    fn observe(&mut self, observation: &ObservationLine) {
+        match observation {
+            ObservationLine::Started { ticket, time, .. } => {
+                self.pass(&time.0);
+                let Some((action, planned)) = self.commanded.get(ticket).cloned() else {
+                    return;
+                };
+                let facts = changed(&action, true);
+                self.doing(&facts, |state| {
+                    let planned = planned.unwrap_or_default();
+                    let _ = state.start(Ticket(*ticket), &action, &planned, &[]);
+                });
+            }
+            ObservationLine::Ended {
+                ticket,
+                outcome,
+                time,
+                ..
+            } => {
+                self.pass(&time.0);
+                let Some((action, _)) = self.commanded.remove(ticket) else {
+                    return;
+                };
+                if outcome == "succeeded" {
+                    let facts = changed(&action, false);
+                    self.doing(&facts, |state| {
+                        let _ = state.end(Ticket(*ticket), &[]);
+                    });
+                    return;
+                }
+                self.state.stop(Ticket(*ticket));
+                if self.failed.0 != time.0 {
+                    self.failed = (time.0.clone(), BTreeSet::new());
+                }
+                self.failed.1.extend(changed(&action, true));
+            }
+            ObservationLine::Fact {
+                fact,
+                becomes,
+                time,
+            } => {
+                self.pass(&time.0);
+                let Some(fact) = self.task.fact_named(fact) else {
+                    return;
+                };
+                if self.state.fact(fact) == *becomes {
+                    return;
+                }
+                self.state.change_fact(fact, *becomes);
+                let is_undone = self.failed.0 == time.0 && self.failed.1.contains(&fact);
+                self.flip(fact, &time.0, !is_undone);
+            }
+            _ => {}
+        }
+    }
+
+    /// Time passes, and with it timed initials. A report that comes late counts as of now.
+    fn pass(&mut self, time: &Rational) {
+        while let Some(timed) = self.task.timed().get(self.state.timed_past())
+            && timed.time <= *time
+        {
+            let at = timed.time.clone();
+            let facts: Vec<FactId> = timed.changes.iter().filter_map(fact_of).collect();
+            self.doing_at(&facts, &at, |state| {
+                let _ = state.advance(&at);
+            });
+        }
+        if *time > *self.state.time() {
+            let _ = self.state.advance(time);
+        }
+    }
+
+    fn doing(&mut self, facts: &[FactId], what: impl FnOnce(&mut Progression)) {
+        let now = self.state.time().clone();
+        self.doing_at(facts, &now, what);
+    }
+
+    /// Notes which of these facts something changes.
+    fn doing_at(&mut self, facts: &[FactId], at: &Rational, what: impl FnOnce(&mut Progression)) {
+        let before: Vec<bool> = facts.iter().map(|fact| self.state.fact(*fact)).collect();
+        what(&mut self.state);
+        for (fact, before) in facts.iter().zip(before) {
+            if self.state.fact(*fact) != before {
+                self.flip(*fact, at, false);
+            }
+        }
+    }
+
+    fn flip(&mut self, fact: FactId, at: &Rational, is_by_itself: bool) {
+        let latest = self.flips.last().map_or(0.0, |flip| flip.at);
+        self.flips.push(Flip {
+            fact,
+            becomes: self.state.fact(fact),
+            at: at.to_f64().max(latest),
+            is_by_itself,
+        });
+    }
+}
+
+/// The facts that an action's start or end may change, each once.
+fn changed(action: &Action, is_start: bool) -> Vec<FactId> {
+    let effects: &[Effect] = match &action.body {
+        Body::Instantaneous(snap) if is_start => &snap.effects,
+        Body::Instantaneous(_) => &[],
+        Body::Durative(body) if is_start => &body.start.effects,
+        Body::Durative(body) => &body.end.effects,
+    };
+    let facts = effects.iter().filter_map(|effect| fact_of(&effect.change));
+    let facts: BTreeSet<FactId> = facts.collect();
+    facts.into_iter().collect()
+}
+
+fn fact_of(change: &Change) -> Option<FactId> {
+    match change {
+        Change::Add(fact) | Change::Delete(fact) => Some(*fact),
+        Change::Update { .. } => None,
+    }
+}
