@@ -5,6 +5,8 @@ mod control;
 mod spoiler;
 mod timed;
 
+pub(crate) use conflict::Seen;
+
 use elbowroom_envelope::obligations::Requirement;
 use elbowroom_envelope::soundness::{Broken, Counterexample};
 use elbowroom_envelope::{Limit, Objection, Oracle};
@@ -112,12 +114,22 @@ impl<'a> Explainer<'a> {
     /// The reason why an end of a parameter's interval cannot move further; `None` if there is
     /// none.
     pub fn limit(&self, id: ParameterId, side: Side, limit: &Limit) -> Option<String> {
+        self.limit_beside((id, side), limit, &mut Seen::default())
+    }
+
+    /// The same. What was `seen` of other ends' reasons is not worked out again.
+    pub(crate) fn limit_beside(
+        &self,
+        (id, side): (ParameterId, Side),
+        limit: &Limit,
+        seen: &mut Seen,
+    ) -> Option<String> {
         match limit {
             Limit::Unbounded => None,
             Limit::Range => Some(self.range(id, side)),
             Limit::Undecided => Some("there are too many cases to tell apart".to_owned()),
-            Limit::Objection { objection, .. } => Some(match objection {
-                Objection::NoSchedule(valuation) => self.no_schedule(valuation).reason,
+            Limit::Objection(objection) => Some(match objection {
+                Objection::NoSchedule(valuation) => seen.reason(self, id, valuation),
                 Objection::Broken(broken) => self.requirement(&broken.requirement),
                 Objection::Uncontrollable(conflict) => self.uncontrollable(conflict),
                 other => other.to_string(),

@@ -14,13 +14,13 @@ use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Relax, enve
 use elbowroom::answers::{EnvelopeOutcome, Halt, Unwatched, Watcher};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::Task;
-use elbowroom::num::Rational;
 use elbowroom::pddl::read_plan;
 use elbowroom::plan::ParametrizedPlan;
 use elbowroom::verify::{AnswerError, Flaw, verify_answer};
 use elbowroom::{AnyPlan, pddl};
 use serde_json::Value;
 use shared::case::Case;
+use shared::changed::{changed, numbers};
 use shared::instances::{Instance, figure_3, figure_4};
 
 const GUARANTEES: [Guarantee; 3] = [Guarantee::Weak, Guarantee::Dynamic, Guarantee::Strong];
@@ -130,38 +130,6 @@ const CLAIM: [&str; 5] = [
     "/best/bound",
     "/best/certificate",
 ];
-
-/// The places of all numbers inside a value; a number's decimal form is for people.
-fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
-    match value {
-        Value::Object(members) => {
-            for (name, member) in members {
-                if name != "decimal" {
-                    numbers(member, &format!("{path}/{name}"), found);
-                }
-            }
-        }
-        Value::Array(members) => {
-            for (index, member) in members.iter().enumerate() {
-                numbers(member, &format!("{path}/{index}"), found);
-            }
-        }
-        Value::String(text) if text.parse::<Rational>().is_ok() => found.push(path.to_owned()),
-        Value::Number(_) => found.push(path.to_owned()),
-        _ => {}
-    }
-}
-
-/// The same number, but not quite.
-fn changed(value: &Value) -> Value {
-    match value {
-        Value::String(text) => {
-            let number: Rational = text.parse().expect("a number");
-            Value::String((number + Rational::new(1, 7)).to_string())
-        }
-        number => Value::from(number.as_u64().expect("a position") + 1),
-    }
-}
 
 #[test]
 fn each_number_that_is_changed_in_turn_makes_a_certificate_refused() {

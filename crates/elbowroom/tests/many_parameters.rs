@@ -6,13 +6,13 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom::answers::envelope::{EnvelopeFinding, envelope};
-use elbowroom::answers::{EnvelopeRequest, Unwatched};
+use elbowroom::answers::{EnvelopeRequest, Halt, Unwatched, Watcher};
 use elbowroom::{AnyPlan, flow};
-use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
+use elbowroom_envelope::{Guarantee, Method, Oracle, Settings, irr};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan, read_problem};
-use elbowroom_plan::ParametrizedPlan;
+use elbowroom_plan::{ParameterId, ParametrizedPlan};
 use shared::chains::{Needs, chains};
 
 fn read(robots: usize, ways: usize, needs: Needs) -> (Arc<Task>, TimeTriggeredPlan) {
@@ -90,5 +90,59 @@ fn what_limits_each_end_is_told_in_a_plan_with_many_parameters() {
             assert!(!limit.contains(&format!("(go {other} ")), "{own}: {limit}");
         }
         assert!(room.lower_limit.is_some(), "{own}");
+    }
+}
+
+/// Wants no more after so many questions, and counts those that come all the same.
+struct Patience {
+    left: usize,
+    after: usize,
+}
+
+impl Watcher for Patience {
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        if let Some(left) = self.left.checked_sub(1) {
+            self.left = left;
+            ControlFlow::Continue(())
+        } else {
+            self.after += 1;
+            ControlFlow::Break(Halt::TimeLimit)
+        }
+    }
+}
+
+#[test]
+fn who_wants_no_more_is_not_asked_for_long_and_gets_what_has_been_found() {
+    for (needs, method) in [
+        (Needs::Time, Method::Irr),
+        (Needs::Charge, Method::Irr),
+        (Needs::Time, Method::Best),
+        (Needs::Charge, Method::Best),
+    ] {
+        let (task, plan) = read(2, 10, needs);
+        let mut request = EnvelopeRequest::new(&task, AnyPlan::TimeTriggered(plan));
+        request.search.method = method;
+        let mut widest = Rational::ZERO;
+        for left in [1, 2, 5, 20, 60, 100, 200, 500, 2_000, usize::MAX] {
+            let mut patience = Patience { left, after: 0 };
+            let outcome = envelope(&request, &mut patience);
+            let place = format!("{needs:?} {method} after {left}");
+            // Each part of the work that is left asks once.
+            assert!(patience.after <= 12, "{place}: {}", patience.after);
+            let outcome = outcome.expect(&place);
+            let found = outcome.envelope.expect(&place);
+            let width = (0..20).map(|index| {
+                let interval = found.interval(ParameterId::from(index));
+                let ends = (interval.upper.value(), interval.lower.value());
+                let (Some(upper), Some(lower)) = ends else {
+                    panic!("{place}: {interval}");
+                };
+                upper - lower
+            });
+            let width: Rational = width.sum();
+            assert!(width >= widest, "{place}: {width} {widest}");
+            widest = width;
+        }
+        assert!(widest.is_positive());
     }
 }

@@ -12,18 +12,24 @@
 //!   alternatives ([`branch`]).
 //! - [`Objective::Volume`]: the same, where each linear program is about tangents of the logarithm
 //!   ([`volume`]).
+//! - [`Objective::Probability`]: the same with the logarithm of a probability, and with cases for what
+//!   has a probability of its own ([`probability`]).
 
+mod approach;
 mod barrier;
 mod branch;
 mod fill;
 mod goal;
 mod master;
+mod probability;
+mod soft;
 mod volume;
 
 use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_num::chance::Chance;
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
 use serde::{Deserialize, Serialize};
@@ -36,8 +42,10 @@ use crate::oracle::Oracle;
 use crate::row::Row;
 
 use goal::Goal;
+use probability::Probability;
 use volume::Volume;
 
+pub use elbowroom_num::chance::Touch;
 pub use volume::foot as volume_foot;
 
 /// The objective of a largest box.
@@ -58,7 +66,14 @@ pub enum Objective {
     /// wherever one duration cannot deviate at all. The value is the logarithm of the product, and
     /// a box is the best one if no other has more than a millionth more.
     Volume,
+    /// The probability that independent durations, each with its distribution
+    /// ([`BestSettings::chances`]), all stay inside. The value is the logarithm; [`NEVER`] stands for a
+    /// probability of 0. A box is the best one if no other has more than a millionth more.
+    Probability,
 }
+
+/// What a box without any probability counts, in place of the logarithm.
+pub const NEVER: i64 = -1_000_000;
 
 impl Objective {
     /// Its name in documents and on the command line.
@@ -67,6 +82,7 @@ impl Objective {
             Self::LeastSlack => "least-slack",
             Self::Widths => "widths",
             Self::Volume => "volume",
+            Self::Probability => "probability",
         }
     }
 }
@@ -86,6 +102,9 @@ pub struct BestSettings {
     pub symmetric: bool,
     /// Ends count up to a deviation of so many times the nominal value.
     pub most: Rational,
+    /// For [`Objective::Probability`]: how each parameter is distributed, in their order. One without
+    /// a distribution, as are all that are missing, always has its nominal value.
+    pub chances: Vec<Option<Chance>>,
 }
 
 impl Default for BestSettings {
@@ -95,6 +114,7 @@ impl Default for BestSettings {
             objective: Objective::default(),
             symmetric: false,
             most: Rational::from(9),
+            chances: Vec::new(),
         }
     }
 }
@@ -194,10 +214,21 @@ pub enum Case {
         /// The bounds.
         multipliers: Vec<(Source, Rational)>,
         /// For an objective that is no sum, of each parameter the slope of the tangent that stands
-        /// for it.
+        /// for it; for a probability, that for its lower end and that for its upper one.
         slopes: Vec<Rational>,
+        /// For a probability, of each parameter where that tangent touches.
+        touches: Vec<Touch>,
         /// Whether there is no box in this case.
         is_impossible: bool,
+    },
+    /// The variable is less than this, or not: for each, the position of the case in the tree.
+    Split {
+        /// The variable.
+        variable: usize,
+        /// The value.
+        at: Rational,
+        /// The cases, by position in the tree.
+        cases: [usize; 2],
     },
 }
 
@@ -360,6 +391,11 @@ pub fn best(
         }
         Objective::Volume => {
             let goal = Goal::Volume(Volume::new(&plan, &variables));
+            branch::branch(oracle, &plan, &variables, goal, start, on_step)?
+        }
+        Objective::Probability => {
+            let probability = Probability::new(&plan, &variables, settings);
+            let goal = Goal::Probability(probability);
             branch::branch(oracle, &plan, &variables, goal, start, on_step)?
         }
     };

@@ -89,12 +89,16 @@ impl Ends {
         }
     }
 
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.constant += &other.constant;
+        for (end, factor) in &other.factors {
+            self.add_end(*end, factor);
+        }
+    }
+
     pub(crate) fn plus(&self, other: &Self) -> Self {
         let mut sum = self.clone();
-        sum.constant += &other.constant;
-        for (end, factor) in &other.factors {
-            sum.add_end(*end, factor);
-        }
+        sum.add(other);
         sum
     }
 

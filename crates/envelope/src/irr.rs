@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::obligations::Refusal;
 use elbowroom_num::Rational;
-use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParameterId, ParametrizedPlan, Side};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParametrizedPlan};
 
 use crate::frontier::{Frontier, Growth};
 use crate::objection::Objection;
@@ -107,12 +107,7 @@ pub enum Limit {
     /// The parameter's natural range.
     Range,
     /// The box with this end moved out is not inside the envelope, because of this.
-    Objection {
-        /// The box that was refused.
-        refused: DecoupledEnvelope,
-        /// The reason.
-        objection: Objection,
-    },
+    Objection(Objection),
     /// Whether the box with this end moved out is inside the envelope cannot be told.
     Undecided,
 }
@@ -186,31 +181,26 @@ pub fn irr(
     })
 }
 
-/// What keeps each end of a box where it is: lower and upper, parameter by parameter. An end that
-/// can still move by less than its parameter's `step` is asked what would stop it there. `flow` can
-/// end that at any end; nothing is known of those that come after.
+/// Tells what keeps each of these ends of a box where it is, if something does. An end that can still
+/// move by less than its parameter's `step` is asked what would stop it there. `flow` can end that at
+/// any end; nothing is said of those that come after.
 pub fn limits(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
-    steps: &[Rational],
+    (ends, steps): (&[BoxEnd], &[Rational]),
     flow: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Vec<[Option<Limit>; 2]> {
+    tell: &mut dyn FnMut(BoxEnd, &Limit),
+) {
     let plan = Arc::clone(oracle.plan());
-    let mut limits = Vec::with_capacity(plan.parameters.len());
-    for (index, parameter) in plan.parameters.iter().enumerate() {
-        let mut pair = [None, None];
-        for side in Side::BOTH {
-            let end = BoxEnd {
-                parameter: ParameterId::from(index),
-                side,
-            };
-            if flow().is_continue() {
-                pair[side.index()] = limit(oracle, envelope, parameter, end, &steps[index]);
-            }
+    for &end in ends {
+        if flow().is_break() {
+            break;
         }
-        limits.push(pair);
+        let (own, step) = (plan.parameter(end.parameter), &steps[end.parameter.index()]);
+        if let Some(limit) = limit(oracle, envelope, own, end, step) {
+            tell(end, &limit);
+        }
     }
-    limits
 }
 
 fn limit(
@@ -231,7 +221,7 @@ fn limit(
     let target = border.map_or(target.clone(), |border| border.min(target));
     match oracle.objection_beside(envelope, end, Some(target)) {
         Ok(None) => None,
-        Ok(Some((refused, objection))) => Some(Limit::Objection { refused, objection }),
+        Ok(Some(objection)) => Some(Limit::Objection(objection)),
         Err(_) => Some(Limit::Undecided),
     }
 }

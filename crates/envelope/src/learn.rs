@@ -272,7 +272,7 @@ impl Reader<'_> {
                 Part::Late(link) => self.link(*link, Side::Upper),
                 Part::Way(way) => self.flat(std::slice::from_ref(way))?,
             };
-            total = total.plus(&ends);
+            total.add(&ends);
         }
         Some(total)
     }

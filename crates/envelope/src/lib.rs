@@ -84,8 +84,8 @@ pub mod soundness;
 
 pub use balance::{Balance, Share, balance};
 pub use best::{
-    BestProof, BestRun, BestSettings, BestStep, Case, Moved, Objective, Reasons, Source, Stopped,
-    best, volume_foot,
+    BestProof, BestRun, BestSettings, BestStep, Case, Moved, NEVER, Objective, Reasons, Source,
+    Stopped, Touch, best, volume_foot,
 };
 pub use control::{ControlConflict, ControlGround};
 pub use cut::{Cut, Ground, ProofPart, ProofWay};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, Total};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 
 /// `Σ factor · reach(end) <= bound`, or `<` when strict: a half-space of boxes, each of which is
@@ -20,11 +20,11 @@ pub struct Row {
 impl Row {
     /// The left-hand side in a box; `None` if an infinite end counts.
     pub fn value(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
-        let mut value = Rational::ZERO;
+        let mut value = Total::default();
         for (end, factor) in &self.factors {
-            value += &end.reach(envelope)? * factor;
+            value.add_product(&end.reach(envelope)?, factor);
         }
-        Some(value)
+        Some(value.value())
     }
 
     /// Whether the row holds in a box.

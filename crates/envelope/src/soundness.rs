@@ -48,7 +48,7 @@ pub(crate) struct Soundness {
     is_in_ranges: bool,
     /// The numbers in all bounds but the ends of boxes; `None` if they are large.
     numbers: Option<Numbers>,
-    /// The case that broke last: the likeliest to break next.
+    /// The case that broke last: the likeliest to break next. At first, one after all others.
     suspect: usize,
     /// The number of bad cases refuted from scratch.
     refutations: usize,
@@ -170,7 +170,7 @@ impl Soundness {
             over_all,
             is_in_ranges: true,
             numbers,
-            suspect: 0,
+            suspect: usize::MAX - 1,
             refutations: 0,
         }))
     }
@@ -212,9 +212,15 @@ impl Soundness {
             refutations,
         } = self;
         let mut schedules = Lazy::Unmade(reduction, envelope, numbers.as_ref());
-        let first = (*suspect).min(direct.len());
+        // What deviates adds up, so in a box later conditions are the first to break, and the one that
+        // broke last is the likeliest. Of a single course of events the earliest is named.
+        let is_point = envelope.is_point();
+        let count = direct.len();
+        let first = (*suspect + 1).min(count);
         let mut found = None;
-        for index in (first..direct.len()).chain(0..first) {
+        let upwards = (0..count).filter(|_| is_point);
+        let downwards = (0..first).rev().chain((first..count).rev());
+        for index in upwards.chain(downwards.filter(|_| !is_point)) {
             let direct = &mut direct[index];
             let obligation = &obligations.direct[direct.obligation];
             let is_separation = matches!(obligation.requirement, Requirement::Separation { .. });
@@ -254,7 +260,11 @@ impl Soundness {
             *is_in_ranges = is_within;
             over_all.fill(None);
         }
-        for (over_all, proof) in obligations.over_all.iter().zip(over_all) {
+        let mut in_turn: Vec<_> = obligations.over_all.iter().zip(over_all).collect();
+        if !is_point {
+            in_turn.reverse();
+        }
+        for (over_all, proof) in in_turn {
             if proof
                 .as_ref()
                 .is_some_and(|proof| proof.holds_in(envelope, moved))

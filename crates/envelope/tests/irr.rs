@@ -227,10 +227,9 @@ fn objections(
             let found = found.expect("few cases");
             let expected = fresh.objection(&farther).expect("few cases");
             assert_eq!(found.is_some(), expected.is_some(), "{end:?} {envelope:?}");
-            let Some((refused, objection)) = found else {
+            let Some(objection) = found else {
                 continue;
             };
-            assert_eq!(refused, farther);
             count += 1;
             match objection {
                 Objection::NoSchedule(values) => {

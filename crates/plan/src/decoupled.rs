@@ -40,6 +40,12 @@ impl DecoupledEnvelope {
         }
     }
 
+    /// Whether it holds one valuation only.
+    pub fn is_point(&self) -> bool {
+        let mut intervals = self.intervals.iter();
+        intervals.all(|own| own.lower.value().is_some() && own.lower.value() == own.upper.value())
+    }
+
     /// One interval for each parameter, by position; ends are closed or infinite.
     pub fn intervals(&self) -> &[Interval] {
         &self.intervals

@@ -77,6 +77,14 @@ impl<W: Weight> ConsistentNetwork<W> {
         node
     }
 
+    /// A new time point, free of constraints, that happens at `time` in the present schedule: where
+    /// constraints that follow leave it, nothing has to move.
+    pub fn add_node_at(&mut self, time: W) -> NodeId {
+        let node = self.add_node();
+        self.schedule.set(node, time);
+        node
+    }
+
     /// Adds a constraint, unless it contradicts the others; then the network stays as it was.
     ///
     /// Takes time in proportion to what the constraint moves (Cotton & Maler, SAT 2006).

@@ -21,6 +21,7 @@ use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::parametrize::VarySpec;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+use elbowroom_sim::WorldModel;
 
 use super::{Event, Halt, RequestError, Watcher};
 use crate::explain::{Explainer, Explanation};
@@ -32,7 +33,7 @@ pub use answer::{
     Failing, Happening, LimitGroup, Makespans, Quantity, QuantityKind, Range, Room, Stop, Widened,
 };
 pub use balance::{Balance, Deviation};
-pub use best::Best;
+pub use best::{Best, Probability};
 pub use conditions::Conditions;
 pub use foresight::Foresight;
 pub use inequalities::{Inequalities, NetworkRow, RequirementRow};
@@ -62,6 +63,9 @@ pub struct EnvelopeRequest {
     pub contains: Option<String>,
     /// How to search.
     pub search: Search,
+    /// The world in which durations are to stay inside most likely, with
+    /// [`Objective::Probability`](elbowroom_envelope::Objective::Probability).
+    pub world: Option<Arc<WorldModel>>,
 }
 
 /// Parameters of the search for an envelope.
@@ -137,6 +141,7 @@ impl EnvelopeRequest {
             enforce: false,
             contains: None,
             search: Search::default(),
+            world: None,
         }
     }
 
@@ -149,6 +154,7 @@ impl EnvelopeRequest {
         self.search.relative.clone_from(&settings.search.relative);
         self.search.growth = settings.search.growth;
         self.search.most_checks = settings.search.most_checks;
+        self.world.clone_from(&settings.world);
         if let Some(objective) = settings.objective {
             self.search.method = Method::Best;
             self.search.best.objective = objective;

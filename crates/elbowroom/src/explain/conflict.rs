@@ -1,7 +1,11 @@
 //! Why a plan has no schedule: what takes too long, and what it must fit into.
 
-use elbowroom_num::Rational;
-use elbowroom_plan::{Bound, Constraint, NodeId, Origin, Reason, Side, StnPlan, Valuation};
+use std::collections::BTreeMap;
+
+use elbowroom_num::{Rational, Total};
+use elbowroom_plan::{
+    Bound, Constraint, NodeId, Origin, ParameterId, Reason, Side, StnPlan, Valuation,
+};
 
 use super::Explainer;
 
@@ -11,6 +15,67 @@ pub(super) struct Conflict {
     pub(super) reason: String,
     /// By how much it is too long.
     pub(super) excess: Rational,
+    /// The bounds that follow each other in a circle.
+    cycle: Vec<Origin>,
+}
+
+/// Conflicts that have come up in a plan: one is mostly what limits many ends.
+#[derive(Debug, Default)]
+pub(crate) struct Seen {
+    conflicts: Vec<SeenConflict>,
+    /// By parameter: the conflicts that it is part of.
+    of: BTreeMap<ParameterId, Vec<usize>>,
+}
+
+/// A conflict of which the words do not depend on the values.
+#[derive(Debug)]
+struct SeenConflict {
+    cycle: Vec<Origin>,
+    reason: String,
+}
+
+impl Seen {
+    /// Why the plan has no schedule at these values, while it has one if the parameter does not
+    /// deviate so far. If it has one, that is empty.
+    pub(super) fn reason(
+        &mut self,
+        explainer: &Explainer<'_>,
+        id: ParameterId,
+        valuation: &Valuation,
+    ) -> String {
+        let plan = &explainer.plan.plan;
+        let own = self.of.get(&id).into_iter().flatten();
+        let seen = own.map(|index| &self.conflicts[*index]);
+        for seen in seen {
+            if is_too_long(plan, &seen.cycle, valuation) {
+                return seen.reason.clone();
+            }
+        }
+        let Some(Conflict { reason, cycle, .. }) = find(explainer, valuation) else {
+            return String::new();
+        };
+        let mut parameters = Vec::new();
+        for edge in cycle.iter().map(|origin| Edge::of(plan, *origin)) {
+            match edge.bound() {
+                Some((constraint, Bound::Parameter(id)))
+                    if plan.duration_of(constraint).is_some() =>
+                {
+                    parameters.push(*id);
+                }
+                // The value is in the words.
+                Some((_, Bound::Parameter(_))) => return reason,
+                Some(_) | None => {}
+            }
+        }
+        for id in parameters {
+            self.of.entry(id).or_default().push(self.conflicts.len());
+        }
+        self.conflicts.push(SeenConflict {
+            cycle,
+            reason: reason.clone(),
+        });
+        reason
+    }
 }
 
 /// The origin of an edge of the network.
@@ -32,18 +97,48 @@ impl<'a> Edge<'a> {
             Origin::AtMost(index) => Self::AtMost(&plan.constraints[index]),
         }
     }
+
+    /// The constraint, and the bound of it.
+    fn bound(self) -> Option<(&'a Constraint, &'a Bound)> {
+        match self {
+            Self::Beginning => None,
+            Self::AtLeast(constraint) => Some((constraint, &constraint.lower)),
+            Self::AtMost(constraint) => Some((constraint, &constraint.upper)),
+        }
+    }
+}
+
+/// Whether a cycle of bounds, each of which there is, leaves no room for a schedule at these values.
+fn is_too_long(plan: &StnPlan, cycle: &[Origin], valuation: &Valuation) -> bool {
+    let mut room = Total::default();
+    for edge in cycle.iter().map(|origin| Edge::of(plan, *origin)) {
+        let Some((_, bound)) = edge.bound() else {
+            continue;
+        };
+        let value = match bound {
+            Bound::Infinite => return false,
+            Bound::Finite(value) => value,
+            Bound::Parameter(id) => &valuation[*id],
+        };
+        match edge {
+            Edge::AtLeast(_) => room.add(&-value),
+            Edge::AtMost(_) | Edge::Beginning => room.add(value),
+        }
+    }
+    room.value().is_negative()
 }
 
 /// The contradiction in the plan's constraints at these values; `None` if there is none.
 pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<Conflict> {
     let plan = &explainer.plan.plan;
     let (network, origins) = plan.network_with_origins(valuation);
-    let cycle = network.consistency().err()?;
-    let mut walked: Vec<Edge<'_>> = cycle
+    let negative = network.consistency().err()?;
+    let cycle: Vec<Origin> = negative
         .constraints
         .iter()
-        .map(|id| Edge::of(plan, origins[id.index()]))
+        .map(|id| origins[id.index()])
         .collect();
+    let mut walked: Vec<Edge<'_>> = cycle.iter().map(|id| Edge::of(plan, *id)).collect();
     // Walking a cycle goes back in time along what takes long; people read forwards, from the
     // first of what must fit to the last.
     let first_room = walked.iter().position(|o| matches!(o, Edge::AtMost(_)));
@@ -71,7 +166,8 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
     };
     Some(Conflict {
         reason,
-        excess: -cycle.total,
+        excess: -negative.total,
+        cycle,
     })
 }
 

@@ -4,6 +4,7 @@
 
 pub(crate) mod case;
 pub(crate) mod chains;
+pub(crate) mod changed;
 pub(crate) mod draw;
 pub(crate) mod instances;
 pub(crate) mod rounds;

@@ -12,6 +12,10 @@ const LOOSE: f64 = 1e-10;
 const GAP: f64 = 2e-8;
 /// By how much the barriers count less in each round.
 const SHARPER: f64 = 20.0;
+/// Full steps are taken without measuring what they gain once they promise so little.
+const NEAR: f64 = 0.05;
+/// The limit on Newton steps in one round.
+const MOST_IN_ROUND: usize = 60;
 /// The limit on Newton steps in all rounds together.
 const MOST_STEPS: usize = 600;
 
@@ -27,9 +31,10 @@ pub(super) trait Concave {
     fn value(&self, at: &[f64]) -> f64;
 }
 
-/// `Σ factor · variable <= bound` for each row, and `0 <= variable <= most`.
+/// `Σ factor · variable <= bound` for each row, and `least <= variable <= most`.
 pub(super) struct Polytope {
     pub(super) rows: Vec<(Vec<(usize, f64)>, f64)>,
+    pub(super) least: Vec<f64>,
     pub(super) most: Vec<f64>,
 }
 
@@ -40,9 +45,11 @@ impl Polytope {
             let sum: f64 = factors.iter().map(|(index, f)| f * at[*index]).sum();
             bound + LOOSE - sum
         });
-        let own = at.iter().zip(&self.most);
-        rows.chain(own.flat_map(|(value, most)| [value + LOOSE, most + LOOSE - value]))
-            .collect()
+        let own = at.iter().zip(self.least.iter().zip(&self.most));
+        rows.chain(
+            own.flat_map(|(value, (least, most))| [value + LOOSE - least, most + LOOSE - value]),
+        )
+        .collect()
     }
 
     fn least_slack(&self, at: &[f64]) -> f64 {
@@ -70,7 +77,8 @@ impl Polytope {
         let work = at.len().pow(3) / 6 + in_rows.sum::<usize>();
         let (mut sharpness, mut steps, mut worked) = (1.0_f64, 0, 0_usize);
         loop {
-            while steps < MOST_STEPS && self.newton(function, sharpness, &mut at) {
+            let most = MOST_STEPS.min(steps + MOST_IN_ROUND);
+            while steps < most && self.newton(function, sharpness, &mut at) {
                 steps += 1;
                 worked += work;
                 if worked > ASKED_AFTER {
@@ -127,17 +135,26 @@ impl Polytope {
         };
         let promise: f64 = direction.iter().zip(&gradient).map(|(d, g)| d * g).sum();
         // Half of it is what the step would gain if the function were quadratic.
-        if promise.is_nan() || promise < 1e-7 {
+        if promise.is_nan() || promise < 1e-9 {
             return false;
+        }
+        let moved = |length: f64| -> Vec<f64> {
+            let moved = at.iter().zip(&direction);
+            moved.map(|(value, step)| value + length * step).collect()
+        };
+        if promise < NEAR {
+            // So near, full steps converge, whose gains are too small to be measured.
+            let full = moved(1.0);
+            let is_inside = self.least_slack(&full) > 0.0;
+            if is_inside {
+                *at = full;
+            }
+            return is_inside;
         }
         let before = self.merit(function, sharpness, at);
         let mut length = 1.0;
         while length > 1e-12 {
-            let moved: Vec<f64> = at
-                .iter()
-                .zip(&direction)
-                .map(|(value, step)| value + length * step)
-                .collect();
+            let moved = moved(length);
             if self.merit(function, sharpness, &moved) >= before + 0.1 * length * promise {
                 *at = moved;
                 return true;
@@ -217,6 +234,7 @@ mod tests {
         // x + 2 y + 4 z <= 12 and z <= 1/2: z takes its most, the others half of the rest each.
         let polytope = Polytope {
             rows: vec![(vec![(0, 1.0), (1, 2.0), (2, 4.0)], 12.0)],
+            least: vec![0.0; 3],
             most: vec![100.0, 100.0, 0.5],
         };
         let found = polytope
@@ -233,6 +251,7 @@ mod tests {
     fn who_does_not_want_to_wait_is_asked_in_time() {
         let polytope = Polytope {
             rows: vec![((0..500).map(|index| (index, 1.0)).collect(), 1.0)],
+            least: vec![0.0; 500],
             most: vec![9.0; 500],
         };
         let mut asked = 0;
@@ -247,6 +266,7 @@ mod tests {
     fn a_variable_that_cannot_move_does_not_keep_the_others_from_moving() {
         let polytope = Polytope {
             rows: vec![(vec![(0, 1.0)], 0.0), (vec![(1, 1.0), (2, 1.0)], 1.0)],
+            least: vec![0.0; 3],
             most: vec![9.0; 3],
         };
         let found = polytope

@@ -6,9 +6,10 @@ use std::ops::ControlFlow;
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
+use super::approach::InCase;
 use super::goal::{Goal, Outcome};
-use super::master::Master;
-use super::{BestProof, BestRun, BestStep, Case, Reasons, Variables};
+use super::master::{Master, Span};
+use super::{BestProof, BestRun, BestStep, Case, Reasons, Touch, Variables};
 use crate::cut::{Cut, Ground};
 use crate::learn::Learnt;
 use crate::obligations::Refusal;
@@ -27,11 +28,15 @@ struct Leaf {
     case: usize,
     /// The rows that hold in it.
     chosen: Vec<(usize, usize)>,
+    /// Between which numbers the variables lie in it; none if they may have all values.
+    spans: Vec<Span>,
     /// An upper bound on the objective.
     bound: Rational,
     /// Whether the bound was worked out from all cuts that are known.
     is_fresh: bool,
     values: Vec<Rational>,
+    /// For a probability, where its bound touches.
+    touches: Vec<Touch>,
 }
 
 struct Search<'a> {
@@ -77,7 +82,8 @@ pub(super) fn branch(
     if let Some(start) = start {
         search.take(search.values_in(start));
     }
-    search.open(Vec::new(), search.goal.most(variables));
+    let spans = search.goal.spans(variables);
+    search.open((Vec::new(), spans), search.goal.most(variables));
     let mut steps = 0_u64;
     // What is left of cases in which nothing more could be told.
     let mut left: Option<Rational> = None;
@@ -101,7 +107,7 @@ pub(super) fn branch(
         match search.oracle.learn(&candidate)? {
             Learnt::Nothing => {
                 search.take(values);
-                if search.leaves[at].bound > &search.best.0 + &tolerance {
+                if search.leaves[at].bound > &search.best.0 + &tolerance && !search.divide(at) {
                     // As close as this case can be approached.
                     let leaf = search.leaves.remove(at);
                     left = left.max(Some(leaf.bound));
@@ -178,19 +184,26 @@ impl Search<'_> {
     }
 
     /// A new case; its bound is that of the one it comes from until it is worked out.
-    fn open(&mut self, chosen: Vec<(usize, usize)>, bound: Rational) -> usize {
+    fn open(
+        &mut self,
+        (chosen, spans): (Vec<(usize, usize)>, Vec<Span>),
+        bound: Rational,
+    ) -> usize {
         let case = self.tree.len();
         self.tree.push(Case::Bounded {
             multipliers: Vec::new(),
             slopes: Vec::new(),
+            touches: Vec::new(),
             is_impossible: false,
         });
         self.leaves.push(Leaf {
             case,
             chosen,
+            spans,
             bound,
             is_fresh: false,
             values: Vec::new(),
+            touches: Vec::new(),
         });
         let last = self.leaves.len() - 1;
         self.work_out(last);
@@ -219,23 +232,28 @@ impl Search<'_> {
             checks: self.oracle.checks(),
         };
         let mut flow = || (self.on_step)(&step);
-        match self
-            .goal
-            .solve(master, variables, (&leaf.chosen, known), &mut flow)
-        {
+        let case = InCase {
+            chosen: &leaf.chosen,
+            spans: &leaf.spans,
+            known,
+        };
+        match self.goal.solve(master, variables, case, &mut flow) {
             Outcome::Unknown => self.is_cancelled = true,
             Outcome::Best {
                 values,
                 bound,
                 proof,
                 slopes,
+                touches,
             } => {
                 leaf.bound = bound;
                 leaf.values = values;
+                leaf.touches.clone_from(&touches);
                 leaf.is_fresh = true;
                 self.tree[leaf.case] = Case::Bounded {
                     multipliers: proof,
                     slopes,
+                    touches,
                     is_impossible: false,
                 };
             }
@@ -243,6 +261,7 @@ impl Search<'_> {
                 self.tree[leaf.case] = Case::Bounded {
                     multipliers: proof,
                     slopes: Vec::new(),
+                    touches: Vec::new(),
                     is_impossible: true,
                 };
                 self.leaves.remove(at);
@@ -269,9 +288,33 @@ impl Search<'_> {
         for row in 0..self.cuts[cut].rows.len() {
             let mut chosen = leaf.chosen.clone();
             chosen.push((cut, row));
-            cases.push(self.open(chosen, leaf.bound.clone()));
+            cases.push(self.open((chosen, leaf.spans.clone()), leaf.bound.clone()));
         }
         self.tree[leaf.case] = Case::Either { cut, cases };
+        true
+    }
+
+    /// Splits a case in two parts in which the objective can be bounded more closely; whether there
+    /// are any.
+    fn divide(&mut self, at: usize) -> bool {
+        let leaf = &self.leaves[at];
+        let Some((variable, place)) = self.goal.divide(&leaf.spans, &leaf.touches) else {
+            return false;
+        };
+        let leaf = self.leaves.remove(at);
+        let (mut nearer, mut farther) = (leaf.spans.clone(), leaf.spans);
+        let own = &mut nearer[variable];
+        own.most = own.most.clone().min(place.clone());
+        own.far.clone_from(&place);
+        nearer[variable].is_open = true;
+        farther[variable].least.clone_from(&place);
+        let cases = [nearer, farther]
+            .map(|spans| self.open((leaf.chosen.clone(), spans), leaf.bound.clone()));
+        self.tree[leaf.case] = Case::Split {
+            variable,
+            at: place,
+            cases,
+        };
         true
     }
 

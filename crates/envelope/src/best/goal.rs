@@ -5,9 +5,11 @@ use std::ops::ControlFlow;
 use elbowroom_num::Rational;
 use elbowroom_plan::ParametrizedPlan;
 
-use super::master::{Master, Solved};
+use super::approach::InCase;
+use super::master::{Master, Solved, Span};
+use super::probability::Probability;
 use super::volume::Volume;
-use super::{Source, Variables};
+use super::{Source, Touch, Variables};
 
 /// An objective over the ends of a box.
 pub(super) enum Goal {
@@ -15,6 +17,8 @@ pub(super) enum Goal {
     Sum(Vec<Rational>),
     /// The product of the widths.
     Volume(Volume),
+    /// The product of the probabilities of the intervals.
+    Probability(Probability),
 }
 
 /// The best values of a case, or about the best ones.
@@ -29,6 +33,8 @@ pub(super) enum Outcome {
         /// Of each parameter the slope of the tangent that the proof is about; none if the
         /// objective is linear itself.
         slopes: Vec<Rational>,
+        /// For probabilities, where these touch.
+        touches: Vec<Touch>,
     },
     /// There are none, because of this.
     Impossible(Vec<(Source, Rational)>),
@@ -50,7 +56,7 @@ impl Goal {
     pub(super) fn tolerance(&self) -> Rational {
         match self {
             Self::Sum(_) => Rational::ZERO,
-            Self::Volume(_) => super::tolerance(),
+            Self::Volume(_) | Self::Probability(_) => super::tolerance(),
         }
     }
 
@@ -59,6 +65,7 @@ impl Goal {
         match self {
             Self::Sum(worths) => worths.iter().zip(values).map(|(w, v)| w * v).sum(),
             Self::Volume(volume) => volume.worth(values),
+            Self::Probability(probability) => probability.worth(values),
         }
     }
 
@@ -67,19 +74,39 @@ impl Goal {
         match self {
             Self::Sum(_) => self.worth(&variables.most),
             Self::Volume(volume) => volume.most(&variables.most),
+            // No probability is more than 1.
+            Self::Probability(_) => Rational::ZERO,
         }
     }
 
-    /// The best values in a case; `known` are those of a box inside the envelope.
+    /// Between which numbers the variables lie where the objective can be told, or gains anything;
+    /// none if that is everywhere.
+    pub(super) fn spans(&self, variables: &Variables) -> Vec<Span> {
+        match self {
+            Self::Sum(_) | Self::Volume(_) => Vec::new(),
+            Self::Probability(probability) => probability.spans(variables),
+        }
+    }
+
+    /// The variable, and at which of its values, by which a case is split, in two parts in which the
+    /// objective can be bounded more closely; `None` if there is none.
+    pub(super) fn divide(&self, spans: &[Span], touches: &[Touch]) -> Option<(usize, Rational)> {
+        match self {
+            Self::Sum(_) | Self::Volume(_) => None,
+            Self::Probability(probability) => probability.divide(spans, touches),
+        }
+    }
+
+    /// The best values in a case.
     pub(super) fn solve(
         &self,
         master: &mut Master,
         variables: &Variables,
-        (chosen, known): (&[(usize, usize)], &[Rational]),
+        case: InCase<'_>,
         flow: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Outcome {
         match self {
-            Self::Sum(worths) => match master.solve(chosen, worths) {
+            Self::Sum(worths) => match master.solve(case.chosen, &[], worths) {
                 Solved::Impossible(proof) => Outcome::Impossible(proof),
                 Solved::Best {
                     values,
@@ -90,9 +117,11 @@ impl Goal {
                     bound,
                     proof,
                     slopes: Vec::new(),
+                    touches: Vec::new(),
                 },
             },
-            Self::Volume(volume) => volume.solve(master, variables, (chosen, known), flow),
+            Self::Volume(volume) => volume.solve(master, variables, case, flow),
+            Self::Probability(probability) => probability.solve(master, variables, case, flow),
         }
     }
 }

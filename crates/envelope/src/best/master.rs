@@ -6,8 +6,20 @@ use elbowroom_num::simplex::{Optimum, Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
 use elbowroom_plan::{ParametrizedPlan, Side};
 
+use super::approach::InCase;
 use super::{Source, Variables};
 use crate::cut::Cut;
+
+/// Between which two numbers a variable lies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Span {
+    pub(super) least: Rational,
+    pub(super) most: Rational,
+    /// The same for what the objective has there, whatever the range of the parameter.
+    pub(super) far: Rational,
+    /// Whether it is less than `far`; linear programs let it be `most`.
+    pub(super) is_open: bool,
+}
 
 /// The best values of the variables in a case, or the proof that there are none.
 pub(super) enum Solved {
@@ -116,6 +128,19 @@ impl Master {
         all.filter_map(|place| self.rows.get(place))
     }
 
+    /// Asserts between which numbers the variables lie.
+    fn assert_spans(&mut self, spans: &[Span]) {
+        for (index, (id, span)) in self.variables.iter().zip(spans).enumerate() {
+            let tag = self.sources.len();
+            self.simplex
+                .assert_lower(*id, Delta::from(span.least.clone()), tag);
+            self.simplex
+                .assert_upper(*id, Delta::from(span.most.clone()), tag + 1);
+            self.sources
+                .extend([Source::Least(index), Source::Most(index)]);
+        }
+    }
+
     /// Asserts a row; `false` if it cannot hold.
     fn assert(&mut self, cut: usize, row: usize) -> bool {
         let Some(known) = self.rows.get(&(cut, row)) else {
@@ -131,10 +156,17 @@ impl Master {
         true
     }
 
-    /// The best values in the case in which these rows hold, too.
-    pub(super) fn solve(&mut self, chosen: &[(usize, usize)], worths: &[Rational]) -> Solved {
+    /// The best values in the case in which these rows hold, too, and the variables lie between
+    /// these numbers, if there are any.
+    pub(super) fn solve(
+        &mut self,
+        chosen: &[(usize, usize)],
+        spans: &[Span],
+        worths: &[Rational],
+    ) -> Solved {
         self.simplex.push();
         let tags = self.sources.len();
+        self.assert_spans(spans);
         let mut solved = None;
         for &(cut, row) in chosen {
             if !self.assert(cut, row) {
@@ -155,14 +187,16 @@ impl Master {
     /// kept with a little to spare. `None` if there are none.
     pub(super) fn beside(
         &mut self,
-        chosen: &[(usize, usize)],
+        case: InCase<'_>,
         (side, limits): (Side, &[Rational]),
         worths: &[Rational],
     ) -> Option<Vec<Rational>> {
         // As a share of the bound.
         let spared = Rational::new(1, 1_000_000_000);
+        let chosen = case.chosen;
         self.simplex.push();
         let tags = self.sources.len();
+        self.assert_spans(case.spans);
         let mut is_possible = true;
         for &(cut, row) in chosen {
             is_possible &= self.assert(cut, row);

@@ -13,10 +13,11 @@ use std::ops::ControlFlow;
 use elbowroom_num::{Rational, enclosed};
 use elbowroom_plan::{ParametrizedPlan, Side};
 
-use super::Variables;
-use super::barrier::{Concave, Polytope};
+use super::approach::{InCase, guess, power_of_ten, tidied};
+use super::barrier::Concave;
 use super::goal::Outcome;
 use super::master::{Master, Solved};
+use super::{Source, Variables};
 
 /// One parameter.
 struct Width {
@@ -25,6 +26,9 @@ struct Width {
     weight: Rational,
     scale: Rational,
 }
+
+/// Sources of bounds, each with its multiplier.
+type Proof = Vec<(Source, Rational)>;
 
 /// `Σ weight · ln(width / scale + foot)`.
 pub(super) struct Volume {
@@ -104,42 +108,57 @@ impl Volume {
         &self,
         master: &mut Master,
         variables: &Variables,
-        (chosen, known): (&[(usize, usize)], &[Rational]),
+        case: InCase<'_>,
         flow: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Outcome {
+        let InCase { chosen, known, .. } = case;
         let mut is_over = false;
         let mut goes_on = || {
             let flow = flow();
             is_over |= flow.is_break();
             flow
         };
-        let guess = self.guess(master, variables, (chosen, known), &mut goes_on);
+        let guess = guess(&InScale(self), master, variables, case, &mut goes_on);
         if is_over {
             return Outcome::Unknown;
         }
         let guess = guess.unwrap_or_else(|| known.to_vec());
         let near = self.slopes(&guess);
         let worths = self.worths(variables, &near);
-        let values = master.beside(chosen, (Side::Upper, &guess), &worths);
+        let values = master.beside(case, (Side::Upper, &guess), &worths);
         let values = values.map(|values| {
-            let values = self.tidied(values, master, variables, chosen);
+            let values = tidied(values, master, variables, case, &|own| self.worth(own));
             // What is left by rounding, and where the objective is flat.
-            let filled = master.beside(chosen, (Side::Lower, &values), &worths);
+            let filled = master.beside(case, (Side::Lower, &values), &worths);
             filled.unwrap_or(values)
         });
-        let slopes = values.as_ref().map_or(near, |values| self.slopes(values));
-        match master.solve(chosen, &self.worths(variables, &slopes)) {
-            Solved::Impossible(proof) => Outcome::Impossible(proof),
-            Solved::Best {
-                values: corner,
-                worth,
-                proof,
-            } => Outcome::Best {
-                values: values.unwrap_or(corner),
-                bound: self.bound(&slopes, worth),
-                proof,
-                slopes,
-            },
+        // Rounding makes boxes simpler, but slopes are best where nothing has been rounded.
+        let rounded = values.as_ref().map(|values| self.slopes(values));
+        let mut best: Option<(Rational, Vec<Rational>, Proof, Vec<Rational>)> = None;
+        for slopes in std::iter::once(near).chain(rounded) {
+            match master.solve(chosen, &[], &self.worths(variables, &slopes)) {
+                Solved::Impossible(proof) => return Outcome::Impossible(proof),
+                Solved::Best {
+                    values: corner,
+                    worth,
+                    proof,
+                } => {
+                    let bound = self.bound(&slopes, worth);
+                    if best.as_ref().is_none_or(|known| bound < known.0) {
+                        best = Some((bound, corner, proof, slopes));
+                    }
+                }
+            }
+        }
+        let Some((bound, corner, proof, slopes)) = best else {
+            return Outcome::Unknown;
+        };
+        Outcome::Best {
+            values: values.unwrap_or(corner),
+            bound,
+            proof,
+            slopes,
+            touches: Vec::new(),
         }
     }
 
@@ -176,104 +195,6 @@ impl Volume {
         }
         worths
     }
-
-    /// About the best values.
-    fn guess(
-        &self,
-        master: &mut Master,
-        variables: &Variables,
-        (chosen, known): (&[(usize, usize)], &[Rational]),
-        flow: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Option<Vec<Rational>> {
-        let scales: Vec<f64> = variables.scales.iter().map(Rational::to_f64).collect();
-        let rows = master.rows(chosen).map(|row| {
-            let factors: Vec<(usize, f64)> = row
-                .factors
-                .iter()
-                .map(|(variable, factor)| (*variable, factor.to_f64() * scales[*variable]))
-                .collect();
-            let size = factors.iter().map(|own| own.1.abs()).fold(0.0, f64::max);
-            let factors = factors.into_iter().map(|(v, factor)| (v, factor / size));
-            (factors.collect(), row.bound.to_f64() / size)
-        });
-        let rows = rows.filter(|(factors, _): &(Vec<_>, _)| !factors.is_empty());
-        let in_scale = |values: &[Rational]| -> Vec<f64> {
-            let values = values.iter().zip(&scales);
-            values
-                .map(|(value, scale)| value.to_f64() / scale)
-                .collect()
-        };
-        let polytope = Polytope {
-            rows: rows.collect(),
-            most: in_scale(&variables.most),
-        };
-        let inner: Vec<f64> = in_scale(known).iter().map(|value| value * 0.9).collect();
-        let mut starts = vec![inner, vec![0.0; scales.len()]];
-        if !chosen.is_empty() {
-            // The alternative may hold nowhere near the boxes that are known.
-            let even: Vec<Rational> = vec![Rational::ONE; scales.len()];
-            if let Solved::Best { values, .. } = master.solve(chosen, &even) {
-                starts.push(in_scale(&values));
-            }
-        }
-        let found = polytope.maximize(&InScale(self), &starts, flow)?;
-        let rounded = found.iter().zip(&variables.scales).zip(&variables.most);
-        let rounded = rounded.map(|((value, scale), most)| {
-            let fine = Rational::new(1, 1_000_000_000_000);
-            let value = Rational::from_f64_rounded(*value, &fine)?;
-            let near = Rational::new(1, 100_000_000);
-            Some(if value < near {
-                Rational::ZERO
-            } else if &(&value + &near) * scale >= *most {
-                most.clone()
-            } else {
-                let grid = power_of_ten(&(&fine * scale));
-                ((value * scale) / &grid).floor() * &grid
-            })
-        });
-        rounded.collect()
-    }
-
-    /// The same values with fewer digits, if they are as good.
-    fn tidied(
-        &self,
-        values: Vec<Rational>,
-        master: &Master,
-        variables: &Variables,
-        chosen: &[(usize, usize)],
-    ) -> Vec<Rational> {
-        let tidy = values.iter().zip(&variables.scales).zip(&variables.most);
-        let tidy: Vec<Rational> = tidy
-            .map(|((value, scale), most)| {
-                let grid = power_of_ten(&(scale / &Rational::from(100_000)));
-                let steps = value / &grid + Rational::new(1, 2);
-                (steps.floor() * &grid).min(most.clone())
-            })
-            .collect();
-        let loss = Rational::new(1, 100_000_000);
-        let holds = master.rows(chosen).all(|row| row.holds(&tidy));
-        if holds && self.worth(&tidy) + loss >= self.worth(&values) {
-            tidy
-        } else {
-            values
-        }
-    }
-}
-
-/// The greatest power of ten that is at most this number; 1 for what is not positive.
-fn power_of_ten(number: &Rational) -> Rational {
-    let ten = Rational::from(10);
-    let mut power = Rational::ONE;
-    if !number.is_positive() {
-        return power;
-    }
-    while power > *number {
-        power = power / &ten;
-    }
-    while &power * &ten <= *number {
-        power *= &ten;
-    }
-    power
 }
 
 /// The same for values in relation to their scales, in floating-point numbers.

@@ -92,6 +92,8 @@ impl Halfspace {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Polyhedron {
     rows: Vec<Halfspace>,
+    /// For each row, whether it is known not to follow from the others.
+    is_needed: Vec<bool>,
     /// Whether a row without coordinates cannot hold.
     is_absurd: bool,
 }
@@ -102,15 +104,29 @@ impl Polyhedron {
     }
 
     pub(super) fn push(&mut self, row: Halfspace) {
+        // Any row may follow from the new one.
+        self.is_needed.fill(false);
+        self.add(row);
+    }
+
+    /// Adds a row from which none that is known to be needed follows, together with the others.
+    fn add(&mut self, row: Halfspace) {
         if row.factors.is_empty() {
             self.is_absurd |= row.bound.is_negative() || (row.bound.is_zero() && row.is_strict);
             return;
         }
         let row = row.normalized();
-        match self.rows.iter_mut().find(|own| own.factors == row.factors) {
-            Some(own) if row.is_tighter(own) => *own = row,
+        let own = self.rows.iter().position(|own| own.factors == row.factors);
+        match own {
+            Some(own) if row.is_tighter(&self.rows[own]) => {
+                self.rows[own] = row;
+                self.is_needed[own] = false;
+            }
             Some(_) => {}
-            None => self.rows.push(row),
+            None => {
+                self.rows.push(row);
+                self.is_needed.push(false);
+            }
         }
     }
 
@@ -121,7 +137,15 @@ impl Polyhedron {
     }
 
     pub(super) fn retain(&mut self, keep: impl FnMut(&Halfspace) -> bool) {
-        self.rows.retain(keep);
+        let is_kept: Vec<bool> = self.rows.iter().map(keep).collect();
+        self.keep(&is_kept);
+    }
+
+    fn keep(&mut self, is_kept: &[bool]) {
+        let mut kept = is_kept.iter();
+        self.rows.retain(|_| kept.next() == Some(&true));
+        let mut kept = is_kept.iter();
+        self.is_needed.retain(|_| kept.next() == Some(&true));
     }
 
     /// Whether there is a point in it.
@@ -196,10 +220,15 @@ impl Polyhedron {
     fn eliminate(&mut self, coordinate: usize) {
         let equality = self.equality(coordinate);
         let rows = std::mem::take(&mut self.rows);
+        let was_needed = std::mem::take(&mut self.is_needed);
         let (mut above, mut below) = (Vec::new(), Vec::new());
         for (index, row) in rows.iter().enumerate() {
             match row.factors.get(&coordinate) {
-                None => self.push(row.clone()),
+                None => {
+                    self.rows.push(row.clone());
+                    // A point that breaks this row only has a shadow that breaks this row only.
+                    self.is_needed.push(was_needed[index]);
+                }
                 Some(factor) if factor.is_positive() => above.push(index),
                 Some(_) => below.push(index),
             }
@@ -212,7 +241,7 @@ impl Polyhedron {
                     Some((up, down)) => (upper == up) != (lower == down),
                 };
                 if is_needed {
-                    self.push(rows[upper].combined(&rows[lower], coordinate));
+                    self.add(rows[upper].combined(&rows[lower], coordinate));
                 }
             }
         }
@@ -229,7 +258,8 @@ impl Polyhedron {
         let mut program = Program::new(&self.rows);
         let mut is_kept = vec![true; self.rows.len()];
         // Those from most sources first: what is left is told by what it comes from.
-        let mut order: Vec<usize> = (0..self.rows.len()).collect();
+        let is_open = |index: &usize| !self.is_needed[*index];
+        let mut order: Vec<usize> = (0..self.rows.len()).filter(is_open).collect();
         order.sort_by_key(|&index| std::cmp::Reverse(self.rows[index].sources.len()));
         for candidate in order {
             if flow().is_break() {
@@ -244,8 +274,8 @@ impl Polyhedron {
             });
             is_kept[candidate] = needed;
         }
-        let mut kept = is_kept.into_iter();
-        self.rows.retain(|_| kept.next().unwrap_or(true));
+        self.keep(&is_kept);
+        self.is_needed.fill(true);
         Ok(())
     }
 

@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan, Side};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
 use super::{MOST_UNDECIDED, Settings, StopReason, Widening, farthest};
 use crate::frontier::Frontier;
@@ -312,9 +312,5 @@ enum Confirmed {
 /// How far an end would reach after a step; `None` if that is outside its parameter's range.
 fn wanted(from: &Rational, end: BoxEnd, range: &Interval, step: &Rational) -> Option<Rational> {
     let reach = from + step;
-    let value = match end.side {
-        Side::Lower => -&reach,
-        Side::Upper => reach.clone(),
-    };
-    range.contains(&value).then_some(reach)
+    range.contains(&end.side.at_reach(&reach)).then_some(reach)
 }

@@ -116,8 +116,7 @@ impl Oracle {
         self.known = known;
     }
 
-    /// Like [`objection`](Self::objection), of a box with one end moved, which is in the answer, too.
-    /// Where a search has come across a reason that refuses that box as well, it is not looked for
+    /// Like [`objection`](Self::objection), of a box with one end moved out. Where a search has come across a reason that refuses that box as well, it is not looked for
     /// again.
     ///
     /// # Errors
@@ -127,24 +126,29 @@ impl Oracle {
         envelope: &DecoupledEnvelope,
         end: BoxEnd,
         reach: Option<Rational>,
-    ) -> Result<Option<(DecoupledEnvelope, Objection)>, Refusal> {
-        let farther = end.with_reach(envelope, reach.clone());
+    ) -> Result<Option<Objection>, Refusal> {
         if envelope.contains(&self.around)
-            && let (Some(from), Some(to)) = (end.reach(envelope), reach)
+            && let (Some(from), Some(to)) = (end.reach(envelope), &reach)
         {
             self.known.look_at(envelope);
-            let cut = self.known.against(end, &from, Some(&to));
-            if let Some(objection) = cut.and_then(|cut| self.objection_by(cut, &farther)) {
+            let cut = self.known.against(end, &from, Some(to));
+            if let Some(objection) = cut.and_then(|cut| self.objection_by(cut, envelope, (end, to)))
+            {
                 self.checks += 1;
-                return Ok(Some((farther, objection)));
+                return Ok(Some(objection));
             }
         }
-        let objection = self.objection(&farther)?;
-        Ok(objection.map(|objection| (farther, objection)))
+        self.objection(&end.with_reach(envelope, reach))
     }
 
-    /// The objection that a cut is to a box; `None` if it has to be worked out.
-    fn objection_by(&self, cut: &Cut, envelope: &DecoupledEnvelope) -> Option<Objection> {
+    /// The objection that a cut is to a box with one end moved out so far; `None` if it has to be
+    /// worked out.
+    fn objection_by(
+        &self,
+        cut: &Cut,
+        envelope: &DecoupledEnvelope,
+        (moved, reach): (BoxEnd, &Rational),
+    ) -> Option<Objection> {
         let [row] = &cut.rows[..] else {
             return None;
         };
@@ -154,8 +158,12 @@ impl Oracle {
             Ground::Cycle(_) | Ground::Semireducible(_) => {
                 let mut values = envelope.nearest(&self.plan.nominal());
                 for end in row.factors.keys() {
-                    let interval = envelope.interval(end.parameter);
-                    values[end.parameter] = end.side.of(interval).value()?.clone();
+                    values[end.parameter] = if *end == moved {
+                        end.side.at_reach(reach)
+                    } else {
+                        let interval = envelope.interval(end.parameter);
+                        end.side.of(interval).value()?.clone()
+                    };
                 }
                 Some(Objection::NoSchedule(values))
             }

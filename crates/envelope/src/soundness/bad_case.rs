@@ -15,7 +15,7 @@ use super::scale::{Exactly, Scale};
 use crate::linear::Linear;
 use crate::obligations::{BadCase, Difference, Inequality};
 use crate::reduction::Reduction;
-use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side, Valuation};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, Side, Valuation};
 
 /// The schedules of a box: a network that can be tightened for a while.
 pub(crate) struct Schedules<'a, S: Scale> {
@@ -23,7 +23,8 @@ pub(crate) struct Schedules<'a, S: Scale> {
     pub(crate) envelope: &'a DecoupledEnvelope,
     network: ConsistentNetwork<S::Weight>,
     scale: S,
-    /// A schedule without assumptions.
+    /// A schedule without assumptions: where questions begin. Those of a plan resemble each other, so
+    /// it is one at which the last one that was answered by a flow came out greatest.
     base: Schedule<S::Weight>,
     /// For the first constraints of the network, a position in [`Reduction::edges`].
     edges: Vec<usize>,
@@ -127,13 +128,20 @@ impl<'a, S: Scale> Schedules<'a, S> {
 
     /// Forgets what has been assumed since.
     pub(crate) fn undo_to(&mut self, before: &Before<S::Weight>) {
-        self.network.undo_with(before.checkpoint, &before.schedule);
         self.assumed.truncate(before.assumed);
+        let schedule = match before.assumed {
+            0 => &self.base,
+            _ => &before.schedule,
+        };
+        self.network.undo_with(before.checkpoint, schedule);
     }
 
-    /// Adds a time point: the moment of an over-all condition.
-    pub(crate) fn add_moment(&mut self) {
-        self.network.add_node();
+    /// Adds a time point: the moment of an over-all condition, which ends with this node.
+    pub(crate) fn add_moment(&mut self, end: NodeId) {
+        let (class, offset) = self.reduction.place(end);
+        let offset = self.scale.weight(&Delta::from(offset));
+        let time = self.network.schedule()[class].plus(&offset);
+        self.network.add_node_at(time);
     }
 
     /// The proof a negative cycle is; its first constraint, with bound `added`, was refused.
@@ -152,7 +160,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
                 Some(None) => certificate.add_constant(added, &Rational::ONE),
             }
         }
-        certificate
+        certificate.complete()
     }
 
     /// Whether all of the case can be at once.
@@ -166,11 +174,23 @@ impl<'a, S: Scale> Schedules<'a, S> {
             }
         }
         let outcome = refuted.unwrap_or_else(|| self.inequalities_possible(case));
-        if !self.assumed.is_empty() {
-            self.network.undo_with(checkpoint, &self.base);
-            self.assumed.clear();
-        }
+        self.network.undo_with(checkpoint, &self.base);
+        self.assumed.clear();
         outcome
+    }
+
+    /// Begins at a schedule from now on. Its times count from the beginning of the plan; one in which
+    /// they are so large that sums might not fit is not taken.
+    fn begin_at(&mut self, mut times: Vec<S::Weight>) {
+        // The nodes of assumptions come last.
+        times.truncate(self.base.times().len());
+        let zero = times[0].clone();
+        for time in &mut times {
+            *time = time.minus(&zero);
+        }
+        if times.iter().all(|time| self.scale.is_moderate(time)) {
+            self.base = Schedule::new(times);
+        }
     }
 
     /// Whether the inequalities can hold in the network as it is now, differences included.
@@ -254,7 +274,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
     }
 
     /// The proof that `expression <= 0` fails in all schedules, if it does.
-    fn flow_certificate(&self, inequality: &Inequality) -> Option<Certificate> {
+    fn flow_certificate(&mut self, inequality: &Inequality) -> Option<Certificate> {
         // It can hold exactly if the greatest value of `-expression` is at least zero.
         let negated = inequality.expression.scaled(&Rational::from(-1));
         let (constant, demand) = self.by_class(&negated);
@@ -271,7 +291,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
             };
             certificate.add_end(BoxEnd { parameter, side }, &coefficient.abs());
         }
-        let flow = flow::cheapest(&self.network, &demand)?;
+        let (flow, greatest_at) = flow::cheapest(&self.network, &demand)?;
+        self.begin_at(greatest_at);
         for (index, amount) in flow
             .iter()
             .enumerate()
@@ -284,6 +305,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
                 certificate.add_constant(&assumed.bound, amount);
             }
         }
+        let certificate = certificate.complete();
         certificate
             .holds_in(self.envelope, None)
             .then_some(certificate)

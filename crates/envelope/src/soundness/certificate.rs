@@ -1,8 +1,6 @@
 //! Proofs that a bad case cannot be, and how they depend on a box.
 
-use std::collections::BTreeMap;
-
-use elbowroom_num::{Delta, Rational};
+use elbowroom_num::{Delta, Rational, Total};
 
 use crate::reduction::Edge;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
@@ -15,8 +13,8 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Certificate {
     base: Delta,
-    /// Positive factors.
-    ends: BTreeMap<BoxEnd, Rational>,
+    /// Positive factors. Once it is [complete](Self::complete), in the order of the ends.
+    ends: Vec<(BoxEnd, Rational)>,
     /// Ends on which the factors themselves depend: once one moves, the proof is void.
     pub(crate) fixed: Vec<BoxEnd>,
 }
@@ -37,21 +35,40 @@ impl Certificate {
 
     /// Adds `factor` times an end's reach.
     pub(crate) fn add_end(&mut self, end: BoxEnd, factor: &Rational) {
-        *self.ends.entry(end).or_default() += factor;
+        self.ends.push((end, factor.clone()));
+    }
+
+    /// The certificate, when all is added.
+    #[must_use]
+    pub(crate) fn complete(mut self) -> Self {
+        self.ends.sort_by_key(|(end, _)| *end);
+        self.ends.dedup_by(|(end, factor), (before, sum)| {
+            let is_same = end == before;
+            if is_same {
+                *sum += &*factor;
+            }
+            is_same
+        });
+        self
     }
 
     /// Whether the proof uses the end.
     pub(crate) fn depends_on(&self, end: BoxEnd) -> bool {
-        self.ends.contains_key(&end) || self.fixed.contains(&end)
+        let known = self.ends.binary_search_by_key(&end, |(own, _)| *own);
+        known.is_ok() || self.fixed.contains(&end)
     }
 
     /// The value in the box; `None` for infinity.
     pub(crate) fn value(&self, envelope: &DecoupledEnvelope) -> Option<Delta> {
-        let mut value = self.base.clone();
+        let mut real = Total::default();
+        real.add(&self.base.real);
         for (end, factor) in &self.ends {
-            value.real += &end.reach(envelope)? * factor;
+            real.add_product(&end.reach(envelope)?, factor);
         }
-        Some(value)
+        Some(Delta {
+            real: real.value(),
+            infinitesimal: self.base.infinitesimal.clone(),
+        })
     }
 
     /// Whether the proof stands in the box, which differs from the one it was made for in `moved`;

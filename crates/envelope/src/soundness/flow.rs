@@ -15,11 +15,15 @@ use elbowroom_stn::{ConsistentNetwork, ConstraintId, NodeId, Weight};
 pub(crate) type Flow = Vec<Rational>;
 
 /// The cheapest flow that brings `demand[k]` units net into each node `k` (the demands add up to
-/// zero), or `None` if there is none: then the expression has no greatest value.
+/// zero), and a schedule at which the expression is greatest; `None` if there is none: then it has
+/// no greatest value.
+///
+/// The search begins at the network's present schedule. The nearer that is to such a one, the
+/// shorter are the paths.
 pub(crate) fn cheapest<W: Weight>(
     network: &ConsistentNetwork<W>,
     demand: &[Rational],
-) -> Option<Flow> {
+) -> Option<(Flow, Vec<W>)> {
     let mut search = Search {
         network,
         flow: vec![Rational::ZERO; network.network().constraints().len()],
@@ -51,7 +55,8 @@ pub(crate) fn cheapest<W: Weight>(
         demand[source] += &amount;
         demand[sink.index()] -= &amount;
     }
-    Some(search.flow)
+    // No constraint is cheaper than the difference of its nodes' potentials.
+    Some((search.flow, search.potential))
 }
 
 /// One step of a path in the residual network.
@@ -158,12 +163,20 @@ impl<W: Weight> Search<'_, W> {
                     self.touched.push(far);
                 }
                 if known.as_ref().is_none_or(|old| candidate < old.distance) {
-                    queue.push(Reverse((candidate.clone(), far)));
+                    // Nothing is nearer than what is no farther than the nearest of the queue: from
+                    // a good schedule, many nodes are as near, and need not be looked at.
+                    let is_nearest = candidate == distance && demand[far.index()].is_positive();
+                    if !is_nearest {
+                        queue.push(Reverse((candidate.clone(), far)));
+                    }
                     *known = Some(Reached {
                         distance: candidate,
                         step: Some((step, node)),
                         is_final: false,
                     });
+                    if is_nearest {
+                        return Some((far, distance));
+                    }
                 }
             }
         }

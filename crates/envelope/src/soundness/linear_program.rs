@@ -51,7 +51,7 @@ pub(crate) fn refute(
             Meaning::Constant(constant) => certificate.add_constant(constant, &factor),
         }
     }
-    Some(certificate)
+    Some(certificate.complete())
 }
 
 /// Times of all classes and values of the parameters that satisfy everything, if there are any;

@@ -80,7 +80,7 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
         moved: Option<BoxEnd>,
     ) -> Result<Attempt, Refusal> {
         let before = self.schedules.before();
-        self.schedules.add_moment();
+        self.schedules.add_moment(self.over_all.end);
         let inside = [
             Difference::before(self.over_all.start, self.over_all.moment),
             Difference::before(self.over_all.moment, self.over_all.end),

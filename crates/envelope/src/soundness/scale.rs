@@ -16,6 +16,9 @@ pub(crate) trait Scale {
 
     /// The bound's weight.
     fn weight(&self, bound: &Delta) -> Self::Weight;
+
+    /// Whether a time is one that paths can add up to, so that sums with it fit.
+    fn is_moderate(&self, time: &Self::Weight) -> bool;
 }
 
 /// Bounds are their own weights.
@@ -27,6 +30,10 @@ impl Scale for Exactly {
 
     fn weight(&self, bound: &Delta) -> Delta {
         bound.clone()
+    }
+
+    fn is_moderate(&self, _time: &Delta) -> bool {
+        true
     }
 }
 
@@ -55,6 +62,10 @@ impl Scale for Whole {
             return i128::from(infinitesimal);
         }
         whole(&bound.real) * UNIT + i128::from(infinitesimal)
+    }
+
+    fn is_moderate(&self, time: &i128) -> bool {
+        time.abs() <= LARGEST_PATH * UNIT
     }
 }
 

@@ -4,10 +4,8 @@ use elbowroom_envelope::{Oracle, Share, balance as shares};
 use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
 
-use super::Subject;
 use super::search::flow;
-use crate::answers::{RequestError, Watcher, exact};
-use crate::flow::FlowError;
+use crate::answers::{Watcher, exact};
 
 /// By how much everything that is left open may deviate from its nominal value at once, as shares
 /// of these.
@@ -43,18 +41,12 @@ impl From<Share> for Deviation {
 }
 
 /// By how much everything may deviate at once, unless the watcher wants no more or there are too
-/// many cases to tell apart.
-pub(super) fn balance(
-    subject: &Subject<'_>,
-    watcher: &mut dyn Watcher,
-) -> Result<Option<Balance>, RequestError> {
-    let request = subject.request;
-    let oracle = Oracle::new(&request.task, subject.plan, request.guarantee);
-    let mut oracle = oracle.map_err(FlowError::Refused)?;
+/// many cases to tell apart. The oracle brings the proofs that it has found for other boxes.
+pub(super) fn balance(mut oracle: Oracle, watcher: &mut dyn Watcher) -> Option<Balance> {
     let shares = shares(&mut oracle, &mut || flow(watcher));
-    Ok(shares.unwrap_or_default().map(|shares| Balance {
+    shares.unwrap_or_default().map(|shares| Balance {
         more: shares.more.into(),
         less: shares.less.into(),
         either: shares.either.into(),
-    }))
+    })
 }

@@ -2,16 +2,17 @@
 
 use std::ops::ControlFlow;
 
-use elbowroom_envelope::{Objection, Objective, Oracle, Reasons};
-use elbowroom_num::Rational;
+use elbowroom_envelope::{BestRun, BestSettings, NEVER, Objection, Objective, Oracle, Reasons};
+use elbowroom_num::{End, Rational, enclosed};
 use elbowroom_plan::DecoupledEnvelope;
-use elbowroom_verify::Certificate;
+use elbowroom_verify::{Certificate, Chance};
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
 use super::certificate::certificate;
 use super::worth::{Worth, worths};
 use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher, exact};
+use crate::chances::{ChanceError, chances};
 use crate::flow::FlowError;
 
 /// The objective of a box, and how much better another box could be.
@@ -38,9 +39,58 @@ pub struct Best {
     /// was ended before it was done, or if that could not be told of all ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certificate: Option<Certificate>,
+    /// How likely all durations stay inside, if that is the objective.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub probability: Option<Probability>,
+    /// With that, how each parameter is distributed; `None` for one that always is as planned.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub chances: Vec<Option<Chance>>,
     /// What it would be worth to relax bounds of the plan, the most first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub worth: Vec<Worth>,
+}
+
+/// How likely all durations stay inside a box, as a simulation rounds them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Probability {
+    /// For the box of the answer: at least this, rounded down to a billionth.
+    #[serde(with = "exact")]
+    pub least: Rational,
+    /// For all boxes: at most this, rounded up to a billionth.
+    #[serde(with = "exact")]
+    pub most: Rational,
+}
+
+impl Probability {
+    fn new(subject: &Subject<'_>, settings: &BestSettings, run: &BestRun) -> Self {
+        /// Longer than anything lasts, for ends that are infinite.
+        const EVER: i64 = 1_000_000_000_000;
+        let resolution = subject.request.world.as_ref();
+        let resolution = resolution.map_or(Rational::ONE, |world| world.resolution.clone());
+        let mut least = Rational::ONE;
+        if let Ok(envelope) = &run.envelope {
+            for (interval, chance) in envelope.intervals().iter().zip(&settings.chances) {
+                let Some(chance) = chance else { continue };
+                let end = |end: &End, sign| {
+                    end.value()
+                        .cloned()
+                        .unwrap_or_else(|| Rational::from(sign * EVER))
+                };
+                let ends = [end(&interval.lower, -1), end(&interval.upper, 1)];
+                least *= &chance.inside([&ends[0], &ends[1]], &resolution);
+                least = enclosed::billionths_below(&least);
+            }
+        } else {
+            least = Rational::ZERO;
+        }
+        let most = if run.bound <= Rational::from(NEVER) {
+            Rational::ZERO
+        } else {
+            let [_, most] = enclosed::exp_of_minus(&(-&run.bound).max(Rational::ZERO));
+            enclosed::billionths_above(&most).min(Rational::ONE)
+        };
+        Self { least, most }
+    }
 }
 
 /// The best box, or why the plan does not even work as planned; what the box is the best of; and
@@ -54,7 +104,12 @@ pub(super) fn best(
     start: Option<&DecoupledEnvelope>,
     watcher: &mut dyn Watcher,
 ) -> Result<Found, RequestError> {
-    let settings = &subject.request.search.best;
+    let mut settings = subject.request.search.best.clone();
+    if settings.objective == Objective::Probability {
+        let world = subject.request.world.as_ref();
+        settings.chances = chances(subject.plan, world.ok_or(ChanceError::NoWorld)?)?;
+    }
+    let settings = &settings;
     let mut halt = None;
     let mut steps = 0;
     let run = elbowroom_envelope::best(oracle, settings, start, &mut |step| {
@@ -87,6 +142,13 @@ pub(super) fn best(
         certificate: has_certificate
             .then(|| certificate(subject, settings, &run.proof))
             .flatten(),
+        probability: (settings.objective == Objective::Probability)
+            .then(|| Probability::new(subject, settings, &run)),
+        chances: settings
+            .chances
+            .iter()
+            .map(|own| own.as_ref().map(Into::into))
+            .collect(),
         objective: settings.objective,
         symmetric: settings.symmetric,
         most: settings.most.clone(),

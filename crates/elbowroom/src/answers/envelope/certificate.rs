@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_envelope::{BestProof, BestSettings, Cut, Ground, Guarantee, Objective};
+use elbowroom_envelope::{BestProof, BestSettings, Cut, Ground, Guarantee, Moved, Objective};
 use elbowroom_envelope::{Case as KnownCase, Reasons as KnownReasons, Source as KnownSource};
 use elbowroom_envelope::{ProofPart, ProofWay, volume_foot};
 use elbowroom_num::Rational;
@@ -43,6 +43,7 @@ pub(super) fn certificate(
                     foot: volume_foot(),
                     cases,
                 },
+                Objective::Probability => Reasons::Probability(cases),
                 _ => Reasons::Widths(cases),
             }
         }
@@ -63,7 +64,9 @@ pub(super) fn certificate(
             .variables
             .iter()
             .position(|own| own.ends.iter().any(moves))?;
-        is_used[variable].then(|| Exact(proof.variables[variable].most.clone()))
+        let own = &proof.variables[variable];
+        let is_limit = greatest_gain(plan, settings, own).is_none_or(|gains| own.most < gains);
+        (is_used[variable] && is_limit).then(|| Exact(own.most.clone()))
     };
     let scale = |parameter: usize| {
         let moves = |end: &BoxEnd| end.parameter.index() == parameter;
@@ -81,6 +84,10 @@ pub(super) fn certificate(
             weight: own.weight.clone(),
             most_below: limit(Side::Lower, index),
             most_above: limit(Side::Upper, index),
+            chance: settings
+                .chances
+                .get(index)
+                .and_then(|own| own.as_ref().map(Into::into)),
         })
     });
     let certificate = Certificate {
@@ -112,6 +119,30 @@ pub(super) fn certificate(
         reasons,
     };
     added_up(certificate).ok()
+}
+
+/// How far out an end of the variable can gain anything; `None` without limit. Where more gains nothing,
+/// that is what limits it.
+fn greatest_gain(
+    plan: &ParametrizedPlan,
+    settings: &BestSettings,
+    variable: &Moved,
+) -> Option<Rational> {
+    let gains = variable.ends.iter().map(|end| {
+        let place = end.parameter.index();
+        let nominal = &plan.parameters[place].nominal;
+        let chance = settings.chances.get(place)?.as_ref();
+        let [below, above] = chance.map_or_else(
+            || [const { (Rational::ZERO, Some(Rational::ZERO)) }; 2],
+            |chance| chance.limits(nominal),
+        );
+        match end.side {
+            Side::Lower => below.1,
+            Side::Upper => above.1,
+        }
+    });
+    let gains: Option<Vec<Rational>> = gains.collect();
+    gains.and_then(|own| own.into_iter().max())
 }
 
 /// Which variables the reasons need to know a limit of.
@@ -307,9 +338,19 @@ impl Cuts {
                 proof: self.place(*cut),
                 cases: cases.clone(),
             },
+            KnownCase::Split {
+                variable,
+                at,
+                cases,
+            } => Case::Split {
+                variable: *variable,
+                at: at.clone(),
+                cases: *cases,
+            },
             KnownCase::Bounded {
                 multipliers,
                 slopes,
+                touches,
                 is_impossible,
             } => {
                 let used = multipliers.iter().filter(|(_, factor)| !factor.is_zero());
@@ -325,6 +366,8 @@ impl Cuts {
                     of: multipliers.collect(),
                     bound: Rational::ZERO,
                     slopes: slopes.iter().cloned().map(Exact).collect(),
+                    touches: touches.iter().map(Into::into).collect(),
+                    most: None,
                 };
                 if *is_impossible {
                     Case::Impossible(total)

@@ -87,13 +87,18 @@ fn unknown(
             let Some(reach) = end.reach(envelope) else {
                 continue;
             };
+            // Where its range ends, nothing else stops it.
+            let border = side.reach(&oracle.plan().parameters[index].range);
+            if border.is_some_and(|border| reach >= border) {
+                continue;
+            }
             // An end that has room for one step may still be stopped by the next larger one.
             let mut distance = step.clone();
             for _ in 0..=FARTHER {
                 let farther = oracle.objection_beside(envelope, end, Some(&reach + &distance));
                 match farther.map_err(FlowError::Refused)? {
                     None => distance = &distance + &distance,
-                    Some((_, Objection::Uncontrollable(conflict))) => {
+                    Some(Objection::Uncontrollable(conflict)) => {
                         unknown.extend(conflict.ends().iter().map(|end| end.parameter));
                         break;
                     }

@@ -2,11 +2,12 @@
 
 use elbowroom_envelope::{Limit, Method, Oracle, limits};
 use elbowroom_num::Rational;
-use elbowroom_plan::{DecoupledEnvelope, ParameterId, Side};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 
 use super::Subject;
 use super::search::flow;
 use crate::answers::Watcher;
+use crate::explain::Seen;
 
 /// By what part of the precision a sharpened end is moved to see what it touches.
 const SHARP: i64 = 1_000_000_000;
@@ -24,9 +25,6 @@ pub(super) fn what_limits(
     watcher: &mut dyn Watcher,
 ) -> Vec<[Option<String>; 2]> {
     let how = &subject.request.search;
-    if flow(watcher).is_break() {
-        return vec![[None, None]; subject.plan.parameters.len()];
-    }
     let mut distances = how.settings().precisions(subject.plan);
     for (distance, parameter) in distances.iter_mut().zip(&subject.plan.parameters) {
         let nominal = parameter.nominal.abs();
@@ -39,48 +37,25 @@ pub(super) fn what_limits(
             *distance = near.min(distance.clone());
         }
     }
-    let mut words = at_distance(subject, oracle, envelope, &distances, watcher);
-    for _ in 0..FARTHER {
+    let mut words = vec![[None, None]; subject.plan.parameters.len()];
+    let mut seen = Seen::default();
+    for _ in 0..=FARTHER {
         // An end that has room for this step may still be stopped by the next larger one.
-        if flow(watcher).is_break() || words.iter().flatten().all(Option::is_some) {
+        let is_open = |end: &BoxEnd| words[end.parameter.index()][end.side.index()].is_none();
+        let open: Vec<BoxEnd> = BoxEnd::all(words.len()).filter(is_open).collect();
+        let mut tell = |end: BoxEnd, limit: &Limit| {
+            let own = (end.parameter, end.side);
+            let reason = subject.explainer.limit_beside(own, limit, &mut seen);
+            words[end.parameter.index()][end.side.index()] = reason;
+        };
+        let which = (&open[..], &distances[..]);
+        limits(oracle, envelope, which, &mut || flow(watcher), &mut tell);
+        if flow(watcher).is_break() {
             break;
         }
         for distance in &mut distances {
             *distance = &*distance + &*distance;
         }
-        let farther = at_distance(subject, oracle, envelope, &distances, watcher);
-        for (known, found) in words
-            .iter_mut()
-            .flatten()
-            .zip(farther.into_iter().flatten())
-        {
-            if known.is_none() {
-                *known = found;
-            }
-        }
     }
     words
-}
-
-/// The objections to each end, that far out.
-fn at_distance(
-    subject: &Subject<'_>,
-    oracle: &mut Oracle,
-    envelope: &DecoupledEnvelope,
-    distances: &[Rational],
-    watcher: &mut dyn Watcher,
-) -> Vec<[Option<String>; 2]> {
-    let limits = limits(oracle, envelope, distances, &mut || flow(watcher));
-    let words = |id, side, limit: &Option<Limit>| {
-        let limit = limit.as_ref()?;
-        subject.explainer.limit(id, side, limit)
-    };
-    limits
-        .iter()
-        .enumerate()
-        .map(|(index, limits)| {
-            let id = ParameterId::from(index);
-            Side::BOTH.map(|side| words(id, side, &limits[side.index()]))
-        })
-        .collect()
 }

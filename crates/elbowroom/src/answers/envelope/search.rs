@@ -80,7 +80,7 @@ pub(super) fn search(
     }
     let seconds = watcher.elapsed().saturating_sub(begun).as_secs_f64();
     let checks = oracle.checks();
-    let balance = balance(subject, watcher)?;
+    let balance = balance(oracle.clone(), watcher);
     let conditions = Conditions::new(oracle.conditions(), subject.enforced);
     let limits = what_limits(subject, &mut oracle, &envelope, watcher);
     let foresight = match stop {

@@ -1,0 +1,143 @@
+//! How the durations of a plan are distributed in a world, for the box in which they most likely stay.
+
+use elbowroom_num::Rational;
+use elbowroom_num::chance::{Chance, Density};
+use elbowroom_plan::{ParameterKind, ParametrizedPlan};
+use elbowroom_sim::{Distribution, Rule, WorldModel};
+
+/// Why it cannot be said how likely the durations of a plan stay inside a box.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ChanceError {
+    /// Nothing is known of the world.
+    #[error(
+        "the objective `probability` needs a world file, which says how long actions take; give one, or \
+         choose another objective"
+    )]
+    NoWorld,
+    /// Something that varies is no duration.
+    #[error(
+        "the objective `probability` is about durations, and {0} is none; leave it out of what may \
+         deviate, or choose another objective"
+    )]
+    NoDuration(String),
+    /// The distribution of a duration is beyond what boxes can be proved to be the best for.
+    #[error(
+        "the objective `probability` cannot be told for a gamma distribution, which the world has for the \
+         duration of {0}; use a normal or lognormal one, measured `values`, or another objective"
+    )]
+    Gamma(String),
+    /// A number of a distribution is none.
+    #[error("the world file has a number for the duration of {0} that is not finite")]
+    NoNumber(String),
+}
+
+/// How each parameter of a plan is distributed in a world; `None` for one that always is as planned.
+///
+/// Durations are counted as a simulation rounds and cuts them. Whatever else a world does (delays,
+/// failures, events) is not counted.
+///
+/// # Errors
+/// When a parameter is no duration, or its distribution is none that boxes can be proved to be the best
+/// for.
+pub fn chances(
+    plan: &ParametrizedPlan,
+    world: &WorldModel,
+) -> Result<Vec<Option<Chance>>, ChanceError> {
+    let chances = plan.parameters.iter().map(|parameter| {
+        let ParameterKind::Duration(instance) = parameter.kind else {
+            return Err(ChanceError::NoDuration(parameter.name.clone()));
+        };
+        let action = &plan.plan.instance(instance).action.name;
+        let Some(rule) = world.duration_rule(action) else {
+            return Ok(None);
+        };
+        if matches!(rule.distribution, Distribution::Gamma { .. }) {
+            return Err(ChanceError::Gamma(action.clone()));
+        }
+        let chance = distributed(rule, &parameter.nominal, &world.resolution);
+        chance
+            .ok_or_else(|| ChanceError::NoNumber(action.clone()))
+            .map(Some)
+    });
+    chances.collect()
+}
+
+/// How a duration is distributed by a rule; `None` if a number of it is not finite.
+fn distributed(rule: &Rule, planned: &Rational, resolution: &Rational) -> Option<Chance> {
+    let exact = Rational::from_f64_as_written;
+    let scale = if rule.is_relative {
+        planned.clone()
+    } else {
+        Rational::ONE
+    };
+    // An action that is planned to take time takes some.
+    let floor = planned.min(resolution).clone();
+    let cut = |value: Option<f64>| value.map_or(Some(None), |own| Some(Some(exact(own)? * &scale)));
+    let (minimum, maximum) = (cut(rule.minimum)?, cut(rule.maximum)?);
+    let always = |value: f64| -> Option<Rational> {
+        let mut value = exact(value)? * &scale;
+        if let Some(minimum) = &minimum {
+            value = value.max(minimum.clone());
+        }
+        if let Some(maximum) = &maximum {
+            value = value.min(maximum.clone());
+        }
+        let steps = value.checked_div(resolution)? + Rational::new(1, 2);
+        Some((steps.floor() * resolution).max(floor.clone()))
+    };
+    let constant = |value: f64| Chance::values(vec![always(value)?]);
+    let scaled = |value: f64| Some(exact(value)? * &scale);
+    if !scale.is_positive() {
+        return constant(0.0);
+    }
+    let density = match &rule.distribution {
+        Distribution::Constant(value) => return constant(*value),
+        Distribution::Empirical(values) => {
+            let values: Option<Vec<Rational>> = values.iter().map(|own| always(*own)).collect();
+            return Chance::values(values?);
+        }
+        Distribution::Normal { mean, deviation } | Distribution::LogNormal { mean, deviation }
+            if *deviation <= 0.0 =>
+        {
+            return constant(*mean);
+        }
+        Distribution::Uniform { from, to } | Distribution::Triangular { from, to, .. }
+            if from >= to =>
+        {
+            return constant(*from);
+        }
+        Distribution::Exponential { from, mean } if *mean <= 0.0 => return constant(*from),
+        Distribution::Normal { mean, deviation } => Density::Normal {
+            mean: scaled(*mean)?,
+            deviation: scaled(*deviation)?,
+        },
+        Distribution::LogNormal { mean, deviation } => {
+            let variance = (deviation / mean).powi(2).ln_1p();
+            let location = (mean * scale.to_f64()).ln() - variance / 2.0;
+            Density::Lognormal {
+                location: exact(location)?,
+                spread: exact(variance.sqrt())?,
+            }
+        }
+        Distribution::Uniform { from, to } => Density::Uniform {
+            from: scaled(*from)?,
+            to: scaled(*to)?,
+        },
+        Distribution::Triangular { from, mode, to } => Density::Triangular {
+            from: scaled(*from)?,
+            mode: scaled(*mode)?,
+            to: scaled(*to)?,
+        },
+        Distribution::Exponential { from, mean } => Density::Exponential {
+            from: scaled(*from)?,
+            mean: scaled(*mean)?,
+        },
+        Distribution::Gamma { .. } => return None,
+    };
+    if maximum.as_ref().is_some_and(|maximum| *maximum <= floor) {
+        return Chance::values(vec![floor]);
+    }
+    let minimum = minimum.map_or(floor.clone(), |minimum| minimum.max(floor));
+    Chance::dense(density, Some(minimum), maximum, resolution)
+}

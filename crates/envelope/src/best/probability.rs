@@ -1,0 +1,383 @@
+//! The box in which independent durations most likely stay.
+//!
+//! The logarithm of the probability is a sum over the parameters. Each term is a jointly concave
+//! function of the ends of an interval if the logarithm of the density is concave (Prékopa 1973), so it
+//! lies below its tangents, as that of a volume does. What has a probability of its own (where values
+//! are cut, and values that were measured) is inside or not: a case counts it as a share of the way
+//! there, and is split where that is too much. The numbers are those of [`elbowroom_num::chance`].
+
+use std::ops::ControlFlow;
+
+use elbowroom_num::chance::{Cell, Chance, Cut, Dense, Reach, Steps, Touch};
+use elbowroom_num::{Rational, Side, enclosed};
+use elbowroom_plan::ParametrizedPlan;
+
+use super::approach::{InCase, guess, power_of_ten, tidied};
+use super::goal::Outcome;
+use super::master::{Master, Solved, Span};
+use super::soft::Soft;
+use super::{BestSettings, NEVER, Source, Variables};
+
+/// One parameter.
+struct Term {
+    nominal: Rational,
+    scale: Rational,
+    /// The variables that move its lower and its upper end.
+    ends: [usize; 2],
+    chance: Option<Chance>,
+}
+
+/// What follows from tangents that touch at one place.
+struct Bounded {
+    bound: Rational,
+    /// Where their sum is greatest.
+    corner: Vec<Rational>,
+    proof: Vec<(Source, Rational)>,
+    slopes: Vec<Rational>,
+    touches: Vec<Touch>,
+}
+
+/// `Σ ln P(the duration is inside its interval)`.
+pub(super) struct Probability {
+    terms: Vec<Term>,
+    /// What gains nothing is moved out by this measure.
+    even: Vec<Rational>,
+    /// How far each variable counts at most, whatever its parameter's range.
+    counted: Vec<Rational>,
+}
+
+impl Probability {
+    pub(super) fn new(
+        plan: &ParametrizedPlan,
+        variables: &Variables,
+        settings: &BestSettings,
+    ) -> Self {
+        let chances = &settings.chances;
+        let mut terms: Vec<Term> = plan
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(index, parameter)| Term {
+                nominal: parameter.nominal.clone(),
+                scale: Rational::ONE,
+                ends: [0; 2],
+                chance: chances.get(index).cloned().flatten(),
+            })
+            .collect();
+        for (index, (ends, scale)) in variables.ends.iter().zip(&variables.scales).enumerate() {
+            for end in ends {
+                let term = &mut terms[end.parameter.index()];
+                term.ends[end.side.index()] = index;
+                term.scale = scale.clone();
+            }
+        }
+        let even = variables.scales.iter().map(Rational::reciprocal);
+        let counted = variables.scales.iter().map(|scale| scale * &settings.most);
+        Self {
+            terms,
+            counted: counted.collect(),
+            even: even.map(Option::unwrap_or_default).collect(),
+        }
+    }
+
+    /// Between which numbers the variables lie where there is any probability, and where they gain any.
+    pub(super) fn spans(&self, variables: &Variables) -> Vec<Span> {
+        let mut limits: Vec<(Rational, Option<Option<Rational>>)> =
+            vec![(Rational::ZERO, None); variables.count()];
+        for term in &self.terms {
+            let own = match &term.chance {
+                Some(chance) => chance.limits(&term.nominal),
+                None => [const { (Rational::ZERO, Some(Rational::ZERO)) }; 2],
+            };
+            for (variable, (least, most)) in term.ends.into_iter().zip(own) {
+                let limit = &mut limits[variable];
+                limit.0 = limit.0.clone().max(least);
+                // Where one variable moves both ends, it gains as long as one of them does.
+                limit.1 = Some(match limit.1.take() {
+                    None => most,
+                    Some(other) => other.zip(most).map(|(one, other)| one.max(other)),
+                });
+            }
+        }
+        let spans = limits.into_iter().zip(&variables.most).zip(&self.counted);
+        spans
+            .map(|(((least, most), limit), counted)| {
+                let gains = most.flatten().unwrap_or_else(|| counted.clone());
+                Span {
+                    most: gains.clone().min(limit.clone()),
+                    far: gains.min(counted.clone()),
+                    least,
+                    is_open: false,
+                }
+            })
+            .collect()
+    }
+
+    fn reach(term: &Term, values: &[Rational]) -> Reach {
+        term.ends.map(|variable| values[variable].clone())
+    }
+
+    /// What a box is worth, rounded down to a billionth.
+    pub(super) fn worth(&self, values: &[Rational]) -> Rational {
+        let mut sum = Rational::ZERO;
+        for term in &self.terms {
+            let Some(chance) = &term.chance else { continue };
+            let [mass, _] = chance.mass(&term.nominal, &Self::reach(term, values));
+            match enclosed::ln(&mass) {
+                Some([below, _]) => sum += below,
+                None => return Rational::from(NEVER),
+            }
+        }
+        enclosed::billionths_below(&sum).max(Rational::from(NEVER))
+    }
+
+    pub(super) fn solve(
+        &self,
+        master: &mut Master,
+        variables: &Variables,
+        case: InCase<'_>,
+        flow: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Outcome {
+        let mut is_over = false;
+        let mut goes_on = || {
+            let flow = flow();
+            is_over |= flow.is_break();
+            flow
+        };
+        let softs = self.terms.iter().filter_map(|term| {
+            let chance = term.chance.as_ref()?;
+            let cell = cell(term, case.spans);
+            Some(Soft::new(
+                chance,
+                (&term.nominal, &term.scale),
+                &cell,
+                term.ends,
+            ))
+        });
+        let function: Vec<Soft> = softs.collect();
+        let guess = guess(&function, master, variables, case, &mut goes_on);
+        if is_over {
+            return Outcome::Unknown;
+        }
+        let near = guess.clone().and_then(|guess| {
+            let (_, slopes) = self.tangents(case.spans, &guess);
+            let worths = self.worths(variables, &slopes);
+            let values = master.beside(case, (Side::Upper, &guess), &worths)?;
+            let tidy = tidied(values, master, variables, case, &|own| self.worth(own));
+            Some(
+                master
+                    .beside(case, (Side::Lower, &tidy), &worths)
+                    .unwrap_or(tidy),
+            )
+        });
+        let at = near.clone().unwrap_or_else(|| {
+            let known = case.known.iter().zip(case.spans);
+            known
+                .map(|(value, span)| value.clone().max(span.least.clone()).min(span.most.clone()))
+                .collect()
+        });
+        // Rounding makes boxes simpler, but slopes are best where nothing has been rounded.
+        let mut best: Option<Bounded> = None;
+        for at in guess.iter().chain([&at]) {
+            let (touches, slopes) = self.tangents(case.spans, at);
+            match master.solve(case.chosen, case.spans, &self.worths(variables, &slopes)) {
+                Solved::Impossible(proof) => return Outcome::Impossible(proof),
+                Solved::Best {
+                    values: corner,
+                    worth,
+                    proof,
+                } => {
+                    let heights = self.heights(case.spans, (&slopes, &touches));
+                    let bound = heights.into_iter().sum::<Rational>() + worth;
+                    let bound = enclosed::billionths_above(&bound);
+                    if best.as_ref().is_none_or(|known| bound < known.bound) {
+                        best = Some(Bounded {
+                            bound,
+                            corner,
+                            proof,
+                            slopes,
+                            touches,
+                        });
+                    }
+                }
+            }
+        }
+        let Some(best) = best else {
+            return Outcome::Unknown;
+        };
+        let values = near.unwrap_or(best.corner);
+        // What gains nothing moves out all the same, beyond this case if it can.
+        let free = InCase { spans: &[], ..case };
+        let filled = master.beside(free, (Side::Lower, &values), &self.even);
+        Outcome::Best {
+            values: filled.unwrap_or(values),
+            bound: best.bound,
+            proof: best.proof,
+            slopes: best.slopes,
+            touches: best.touches,
+        }
+    }
+
+    /// Where tangents touch, nearly at these values, and their slopes, two for each parameter.
+    fn tangents(&self, spans: &[Span], values: &[Rational]) -> (Vec<Touch>, Vec<Rational>) {
+        let mut touches = Vec::new();
+        let mut slopes = Vec::new();
+        for term in &self.terms {
+            let own = term.chance.as_ref().and_then(|chance| {
+                let cell = cell(term, spans);
+                let mut at = Self::reach(term, values);
+                match chance {
+                    Chance::Dense(dense) => {
+                        let seen = dense.seen(&term.nominal, &cell)?;
+                        let (_, rises) = dense.tangent(&term.nominal, &seen, &at)?;
+                        // Where nothing rises any more, it does not matter where a tangent touches.
+                        let nothing = Rational::new(1, 1_000_000_000_000_000);
+                        let far = [&cell.below[1], &cell.above[1]];
+                        for ((at, [_, high]), far) in at.iter_mut().zip(&rises).zip(far) {
+                            if *high < nothing {
+                                at.clone_from(far);
+                            }
+                        }
+                        let (_, rises) = dense.tangent(&term.nominal, &seen, &at)?;
+                        let half = Rational::new(1, 2);
+                        let mut slopes = rises.map(|[low, high]| (low + high) * &half);
+                        for (slope, seen) in slopes.iter_mut().zip(&seen) {
+                            if let Cut::Open { place, gain } = seen {
+                                *slope += gain.checked_div(place)?;
+                            }
+                        }
+                        Some((Touch::At(at), slopes.map(|slope| short(&slope))))
+                    }
+                    Chance::Values(_) => {
+                        let soft =
+                            Soft::new(chance, (&term.nominal, &term.scale), &cell, term.ends);
+                        let (mass, slopes) = soft.hull_at(&at)?;
+                        Some((Touch::Mass(mass), slopes.map(|slope| short(&slope))))
+                    }
+                }
+            });
+            let (touch, own) = own.unwrap_or((Touch::Nowhere, [Rational::ZERO, Rational::ZERO]));
+            touches.push(touch);
+            slopes.extend(own);
+        }
+        (touches, slopes)
+    }
+
+    /// What each variable counts in the tangents.
+    fn worths(&self, variables: &Variables, slopes: &[Rational]) -> Vec<Rational> {
+        let mut worths = vec![Rational::ZERO; variables.count()];
+        for (term, slopes) in self.terms.iter().zip(slopes.chunks(2)) {
+            for (variable, slope) in term.ends.into_iter().zip(slopes) {
+                worths[variable] += slope;
+            }
+        }
+        worths
+    }
+
+    /// How far the logarithm of the probability of each interval is at most above its slopes.
+    fn heights(&self, spans: &[Span], (slopes, touches): (&[Rational], &[Touch])) -> Vec<Rational> {
+        let terms = self.terms.iter().zip(slopes.chunks(2)).zip(touches);
+        terms
+            .map(|((term, slopes), touch)| {
+                let Some(chance) = &term.chance else {
+                    return Rational::ZERO;
+                };
+                let cell = cell(term, spans);
+                let slopes = [slopes[0].clone(), slopes[1].clone()];
+                let height = chance.height(&term.nominal, &cell, touch, &slopes);
+                height.unwrap_or_else(|| {
+                    let nowhere = chance.height(&term.nominal, &cell, &Touch::Nowhere, &slopes);
+                    nowhere.unwrap_or_default()
+                })
+            })
+            .collect()
+    }
+
+    /// Which variable to split a case at, and where: where a jump is counted in part that is worth most.
+    pub(super) fn divide(&self, spans: &[Span], touches: &[Touch]) -> Option<(usize, Rational)> {
+        let mut widest: Option<(f64, usize, Rational)> = None;
+        for (term, touch) in self.terms.iter().zip(touches) {
+            let Some(chance) = &term.chance else { continue };
+            let own = cell(term, spans);
+            let place = match chance {
+                Chance::Dense(dense) => open_cut(term, dense, &own, touch),
+                Chance::Values(values) => middle_jump(term, chance, values, &own),
+            };
+            if let Some((gap, side, place)) = place
+                && widest.as_ref().is_none_or(|(known, _, _)| gap > *known)
+            {
+                widest = Some((gap, term.ends[side], place));
+            }
+        }
+        widest.map(|(_, variable, place)| (variable, place))
+    }
+}
+
+/// The cut that a case counts in part and that adds most where its bound touches: how much, on which
+/// side, and at which distance.
+fn open_cut(
+    term: &Term,
+    dense: &Dense,
+    cell: &Cell,
+    touch: &Touch,
+) -> Option<(f64, usize, Rational)> {
+    /// Less does not keep a box from being proved the best.
+    const LITTLE: f64 = 1e-9;
+    let seen = dense.seen(&term.nominal, cell)?;
+    let cuts = seen.into_iter().enumerate().filter_map(|(side, seen)| {
+        let Cut::Open { place, gain } = seen else {
+            return None;
+        };
+        let share = match touch {
+            Touch::At(at) => at[side].to_f64() / place.to_f64(),
+            Touch::Mass(_) | Touch::Nowhere => 1.0,
+        };
+        let gap = gain.to_f64() * share;
+        let near = [&cell.below[0], &cell.above[0]][side];
+        (gap > LITTLE && place > *near).then_some((gap, side, place))
+    });
+    cuts.max_by(|one, other| one.0.total_cmp(&other.0))
+}
+
+/// Of the values that some intervals of a case have and others do not, the one in the middle of the
+/// longer side: how far the logarithms of what they have differ, which side, and its distance.
+fn middle_jump(
+    term: &Term,
+    chance: &Chance,
+    values: &[Rational],
+    cell: &Cell,
+) -> Option<(f64, usize, Rational)> {
+    let steps = Steps::new(values, &term.nominal, cell);
+    let [below, above] = &steps.sides;
+    let (side, longer) = if below.len() > above.len() {
+        (0, below)
+    } else {
+        (1, above)
+    };
+    let (place, _) = longer.get(longer.len() / 2)?;
+    let far = [cell.below[1].clone(), cell.above[1].clone()];
+    let [_, most] = chance.mass(&term.nominal, &far);
+    // All that is left if intervals may have nothing at all.
+    let least = steps.center.to_f64().max(1e-12);
+    Some(((most.to_f64() / least).ln(), side, place.clone()))
+}
+
+/// The cell of a parameter's intervals in a case.
+fn cell(term: &Term, spans: &[Span]) -> Cell {
+    let [below, above] = term.ends.map(|variable| &spans[variable]);
+    Cell {
+        below: [below.least.clone(), below.far.clone()],
+        above: [above.least.clone(), above.far.clone()],
+        is_open: [below.is_open, above.is_open],
+    }
+}
+
+/// A slope with some fourteen digits.
+fn short(slope: &Rational) -> Rational {
+    let grid = power_of_ten(&(slope * &Rational::new(1, 10_000_000_000_000)));
+    if slope.is_positive() {
+        (slope / &grid).ceil() * grid
+    } else {
+        Rational::ZERO
+    }
+}
