@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
-use crate::certificate::{Certificate, Guarantee, Reasons};
+use crate::certificate::{Certificate, Chance, Guarantee, Reasons};
 use crate::check::{Verified, verify};
 use crate::flaw::Flaw;
 use crate::number;
@@ -78,6 +78,8 @@ struct Best {
     bound: Number,
     proved: bool,
     certificate: Option<Certificate>,
+    #[serde(default)]
+    chances: Vec<Option<Chance>>,
 }
 
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
@@ -86,6 +88,7 @@ enum Objective {
     LeastSlack,
     Widths,
     Volume,
+    Probability,
 }
 
 #[derive(Deserialize)]
@@ -119,6 +122,7 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
         Reasons::LeastSlack(_) => Objective::LeastSlack,
         Reasons::Widths(_) => Objective::Widths,
         Reasons::Volume { .. } => Objective::Volume,
+        Reasons::Probability(_) => Objective::Probability,
     };
     same(best.objective == objective, "the objective")?;
     same(best.most.exact == certificate.counted, "how far ends count")?;
@@ -136,6 +140,12 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
     same(
         answer.parameters.len() == certificate.parameters.len(),
         "the number of parameters",
+    )?;
+    let chances = certificate.parameters.iter().map(|own| &own.chance);
+    let is_told = best.chances.iter().eq(chances.clone());
+    same(
+        is_told || (best.chances.is_empty() && chances.flatten().next().is_none()),
+        "the distributions",
     )?;
     for (index, (room, own)) in answer
         .parameters

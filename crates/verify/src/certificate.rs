@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::number;
 
+pub use crate::chance::{Chance, Shape, Touch};
+pub use crate::number::Exact;
+
 /// That no box inside an envelope is better than the one with these `slacks`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -34,11 +37,6 @@ pub struct Certificate {
     /// How it follows that no box is better.
     pub reasons: Reasons,
 }
-
-/// A number.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Exact(#[serde(with = "number")] pub Rational);
 
 /// What is guaranteed inside the envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,6 +71,9 @@ pub struct Parameter {
     /// How far above it its upper end counts at most, where the proof uses that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub most_above: Option<Exact>,
+    /// How it is distributed, for a probability; none if it always has its nominal value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chance: Option<Chance>,
 }
 
 /// `lower <= time of to - time of from <= upper`.
@@ -211,6 +212,9 @@ pub enum Reasons {
         /// The first is split into the others.
         cases: Vec<Case>,
     },
+    /// The logarithm of the probability that all parameters are inside is at most so much in each of
+    /// these cases.
+    Probability(Vec<Case>),
 }
 
 impl Reasons {
@@ -218,7 +222,7 @@ impl Reasons {
     pub fn cases(&self) -> &[Case] {
         match self {
             Self::LeastSlack(_) => &[],
-            Self::Widths(cases) | Self::Volume { cases, .. } => cases,
+            Self::Widths(cases) | Self::Volume { cases, .. } | Self::Probability(cases) => cases,
         }
     }
 }
@@ -249,6 +253,17 @@ pub enum Case {
         /// The cases, by position.
         cases: Vec<usize>,
     },
+    /// The variable is less than a number, or not: where what it moves jumps to a greater
+    /// probability.
+    Split {
+        /// The variable, by position.
+        variable: usize,
+        /// The number.
+        #[serde(with = "number")]
+        at: Rational,
+        /// The cases, by position.
+        cases: [usize; 2],
+    },
     /// These inequalities, each times its multiplier, add up to a bound on the objective.
     Sum(Total),
     /// These inequalities, each times its multiplier, add up to: 0 is at most a negative number.
@@ -265,9 +280,16 @@ pub struct Total {
     #[serde(with = "number")]
     pub bound: Rational,
     /// Where the objective is a product: what the width of each parameter counts in the sum, which
-    /// is the slope of a tangent of its logarithm.
+    /// is the slope of a tangent of its logarithm. Where it is a probability: the same for the lower
+    /// end and the upper end of each parameter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub slopes: Vec<Exact>,
+    /// Where the objective is a probability: of each parameter where the tangent touches.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub touches: Vec<Touch>,
+    /// Where the objective is a probability: what its logarithm is at most, rounded up to 10^-18.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most: Option<Exact>,
 }
 
 /// An inequality, and how often it is added.

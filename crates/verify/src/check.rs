@@ -1,12 +1,13 @@
 //! That a certificate proves what it claims: [`verify`].
 
-use elbowroom_num::Rational;
+mod cases;
+
+use elbowroom_num::{Rational, enclosed};
 
 use crate::bounds::Ends;
-use crate::certificate::{
-    Case, Certificate, Exact, Multiplier, Parameter, Proof, Reasons, Source, Stopped, Total,
-};
+use crate::certificate::{Case, Certificate, Exact, Parameter, Proof, Reasons, Source, Stopped};
 use crate::flaw::Flaw;
+use crate::probability::Chances;
 use crate::{claim, network, row, volume};
 
 /// What a certificate proves.
@@ -51,6 +52,7 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
         Reasons::LeastSlack(stopped) => checker.least_slack(stopped)?,
         Reasons::Widths(cases) => checker.widths(cases)?,
         Reasons::Volume { foot, cases } => checker.volume(foot, cases)?,
+        Reasons::Probability(cases) => checker.probability(cases)?,
     };
     let value = match &certificate.reasons {
         Reasons::LeastSlack(_) => bound.clone(),
@@ -59,10 +61,14 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
             let worth = volume::worth(foot, checker.widths_of_parameters());
             worth.ok_or(Flaw::Range("the volume of box", 0))?
         }
+        Reasons::Probability(_) => {
+            let worth = checker.chances.worth(&checker.slacks);
+            worth.ok_or(Flaw::Range("the probability of box", 0))?
+        }
     };
     let tolerance = match &certificate.reasons {
         Reasons::LeastSlack(_) | Reasons::Widths(_) => Rational::ZERO,
-        Reasons::Volume { .. } => Rational::new(1, 1_000_000),
+        Reasons::Volume { .. } | Reasons::Probability(_) => Rational::new(1, 1_000_000),
     };
     let is_assumed = |proof: &&Proof| matches!(proof, Proof::Assumed { .. });
     Ok(Verified {
@@ -77,13 +83,14 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
 }
 
 /// The certificate with what its inequalities add up to filled in ([`Stopped::over`],
-/// [`Total::bound`]), and with what it proves and assumes, whatever it says there.
+/// [`crate::certificate::Total::bound`]), and with what it proves and assumes, whatever it says there.
 ///
 /// # Errors
 /// When nothing can be added up. Whether the certificate proves anything is not asked.
 pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
     let checker = Checker::new(&certificate)?;
     let mut reasons = certificate.reasons.clone();
+    let is_likely = matches!(reasons, Reasons::Probability(_));
     match &mut reasons {
         Reasons::LeastSlack(stopped) => {
             for one in stopped {
@@ -93,16 +100,22 @@ pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
                 }
             }
         }
-        Reasons::Widths(cases) | Reasons::Volume { cases, .. } => {
+        Reasons::Widths(cases) | Reasons::Volume { cases, .. } | Reasons::Probability(cases) => {
+            let spans = checker.spans_of(cases)?;
             for (index, case) in cases.iter_mut().enumerate() {
-                if let Case::Sum(total) | Case::Impossible(total) = case {
+                if let (Case::Sum(total) | Case::Impossible(total), Some(spans)) =
+                    (case, &spans[index])
+                {
                     let rows = total.of.iter().filter_map(|own| match own.source {
                         Source::Row(proof, row) => Some((proof, row)),
                         Source::Most(_) | Source::Least(_) => None,
                     });
                     let rows: Vec<(usize, usize)> = rows.collect();
-                    let Total { of, bound, .. } = total;
-                    *bound = checker.sum(index, of, &rows)?.1;
+                    let (factors, sum) = checker.sum(index, &total.of, (&rows, spans))?;
+                    total.bound = sum;
+                    if is_likely && !total.touches.is_empty() {
+                        total.most = checker.chances.bound(total, &factors, spans).map(Exact);
+                    }
                 }
             }
         }
@@ -115,6 +128,8 @@ pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
 
 struct Checker<'a> {
     certificate: &'a Certificate,
+    /// How the parameters are distributed.
+    chances: Chances,
     /// Of each proof the inequalities of which one holds.
     rows: Vec<Vec<Inequality>>,
     /// Of each variable its slack, the size it is measured by, the most it can be, and its worth.
@@ -165,6 +180,7 @@ impl<'a> Checker<'a> {
         }
         let mut checker = Self {
             certificate,
+            chances: Chances::new(certificate)?,
             rows: Vec::new(),
             slacks,
             scales,
@@ -297,8 +313,10 @@ impl<'a> Checker<'a> {
 
     /// That in each case the weighted sum of widths is at most a bound: the greatest of these.
     fn widths(&self, cases: &[Case]) -> Result<Rational, Flaw> {
-        self.cases(cases, &|total, factors| {
-            let is_that = factors == self.worths && total.slopes.is_empty();
+        self.cases(cases, &|total, factors, _| {
+            let is_that =
+                factors == self.worths && total.slopes.is_empty() && total.touches.is_empty();
+            let is_that = is_that && total.most.is_none();
             is_that.then(|| total.bound.clone())
         })
     }
@@ -310,7 +328,7 @@ impl<'a> Checker<'a> {
             return Err(Flaw::Range("foot", 0));
         }
         let parameters = &self.certificate.parameters;
-        self.cases(cases, &|total, factors| {
+        self.cases(cases, &|total, factors, _| {
             let mut slopes = total.slopes.iter().flat_map(|Exact(slope)| {
                 if self.certificate.symmetric {
                     vec![slope + slope]
@@ -322,107 +340,16 @@ impl<'a> Checker<'a> {
                 .iter()
                 .all(|own| slopes.next().as_ref() == Some(own));
             let bound = volume::bound(foot, parameters, &total.slopes, &total.bound);
-            bound.filter(|_| is_that)
+            bound.filter(|_| is_that && total.touches.is_empty() && total.most.is_none())
         })
     }
 
-    /// That one of these cases holds, and the greatest of their bounds, each of which follows from
-    /// what its inequalities add up to.
-    fn cases(
-        &self,
-        cases: &[Case],
-        follows: &dyn Fn(&Total, &[Rational]) -> Option<Rational>,
-    ) -> Result<Rational, Flaw> {
-        let mut bound: Option<Rational> = None;
-        let mut is_seen = vec![false; cases.len()];
-        // Each case with the inequalities, by proof and position, that hold in it.
-        let mut open: Vec<(usize, Vec<(usize, usize)>)> = vec![(0, Vec::new())];
-        while let Some((index, chosen)) = open.pop() {
-            let case = cases.get(index).ok_or(Flaw::NoSuch("case", index))?;
-            if std::mem::replace(&mut is_seen[index], true) {
-                return Err(Flaw::Tree(index));
-            }
-            match case {
-                Case::Either { proof, cases } => {
-                    let rows = self.rows.get(*proof).ok_or(Flaw::NoSuch("proof", *proof))?;
-                    if rows.len() != cases.len() {
-                        return Err(Flaw::Count {
-                            what: "cases",
-                            found: cases.len(),
-                            wanted: rows.len(),
-                        });
-                    }
-                    for (row, case) in cases.iter().enumerate() {
-                        let mut chosen = chosen.clone();
-                        chosen.push((*proof, row));
-                        open.push((*case, chosen));
-                    }
-                }
-                Case::Sum(total) => {
-                    let (factors, sum) = self.sum(index, &total.of, &chosen)?;
-                    if sum != total.bound {
-                        return Err(Flaw::Sum(index));
-                    }
-                    let own = follows(total, &factors).ok_or(Flaw::Sum(index))?;
-                    bound = Some(bound.map_or(own.clone(), |bound| bound.max(own)));
-                }
-                Case::Impossible(total) => {
-                    let (factors, sum) = self.sum(index, &total.of, &chosen)?;
-                    let is_free = factors.iter().all(Rational::is_zero);
-                    if !is_free
-                        || !sum.is_negative()
-                        || sum != total.bound
-                        || !total.slopes.is_empty()
-                    {
-                        return Err(Flaw::Sum(index));
-                    }
-                }
-            }
-        }
-        if let Some(index) = is_seen.iter().position(|is_seen| !is_seen) {
-            return Err(Flaw::Tree(index));
-        }
-        // With nothing possible there would be no box, not even the nominal values.
-        bound.ok_or(Flaw::Sum(0))
-    }
-
-    /// The sum of inequalities, each times its multiplier.
-    fn sum(
-        &self,
-        case: usize,
-        multipliers: &[Multiplier],
-        chosen: &[(usize, usize)],
-    ) -> Result<(Vec<Rational>, Rational), Flaw> {
-        let mut factors = vec![Rational::ZERO; self.slacks.len()];
-        let mut bound = Rational::ZERO;
-        for Multiplier { source, factor } in multipliers {
-            if factor.is_negative() {
-                return Err(Flaw::Negative(case));
-            }
-            match *source {
-                Source::Row(proof, row) => {
-                    let rows = self.rows.get(proof).ok_or(Flaw::NoSuch("proof", proof))?;
-                    if rows.len() != 1 && !chosen.contains(&(proof, row)) {
-                        return Err(Flaw::NotThere(case));
-                    }
-                    let row = rows.get(row).ok_or(Flaw::NoSuch("inequality", row))?;
-                    for (sum, own) in factors.iter_mut().zip(&row.factors) {
-                        *sum += own * factor;
-                    }
-                    bound += &row.bound * factor;
-                }
-                Source::Most(variable) => {
-                    let most = self.most.get(variable).and_then(Option::as_ref);
-                    let most = most.ok_or(Flaw::NoSuch("variable", variable))?;
-                    factors[variable] += factor;
-                    bound += most * factor;
-                }
-                Source::Least(variable) => {
-                    let sum = factors.get_mut(variable);
-                    *sum.ok_or(Flaw::NoSuch("variable", variable))? -= factor;
-                }
-            }
-        }
-        Ok((factors, bound))
+    /// That in each case the logarithm of the probability is at most a bound: the greatest of these.
+    fn probability(&self, cases: &[Case]) -> Result<Rational, Flaw> {
+        self.cases(cases, &|total, factors, spans| {
+            let bound = self.chances.bound(total, factors, spans)?;
+            let is_told = total.most.as_ref().is_some_and(|most| most.0 == bound);
+            is_told.then(|| enclosed::billionths_above(&bound))
+        })
     }
 }

@@ -16,6 +16,10 @@ pub(crate) fn proves(certificate: &Certificate) -> &'static str {
             "in no box inside the envelope is the weighted sum of the logarithms of the widths, each \
              in relation to its `scale` and `foot` wider, greater than `bound`"
         }
+        Reasons::Probability(_) => {
+            "in no box inside the envelope is the sum of the logarithms of the probabilities of the \
+             intervals, each half a `resolution` longer at both ends, greater than `bound`"
+        }
     }
 }
 
@@ -26,6 +30,13 @@ pub(crate) fn assumes(certificate: &Certificate) -> Vec<String> {
             .to_owned(),
         "the time points and constraints are those of the plan".to_owned(),
     ];
+    if matches!(certificate.reasons, Reasons::Probability(_)) {
+        assumes.push(
+            "the parameters are independent of each other, each distributed as its `chance` says, and \
+             one without it always at its nominal value"
+                .to_owned(),
+        );
+    }
     for (index, proof) in certificate.proofs.iter().enumerate() {
         if let Proof::Assumed { why, .. } = proof {
             assumes.push(format!("the inequalities of proof {index}: {why}"));

@@ -67,6 +67,9 @@ pub enum Flaw {
     /// Cases are no tree.
     #[error("case {0} is reached never or twice")]
     Tree(usize),
+    /// A case is split where nothing jumps.
+    #[error("a case is split at a value of variable {0} at which no probability jumps")]
+    Jump(usize),
     /// A sum of inequalities is not what it should be.
     #[error("the inequalities of case {0} do not add up to its bound")]
     Sum(usize),

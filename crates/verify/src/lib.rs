@@ -39,19 +39,21 @@
 mod answer;
 mod bounds;
 mod certificate;
+mod chance;
 mod check;
 mod claim;
 mod flaw;
 mod network;
 mod number;
+mod probability;
 pub mod row;
 mod volume;
 
 pub use answer::{AnswerError, verify_answer};
 pub use bounds::Ends;
 pub use certificate::{
-    Case, Certificate, Constraint, End, Exact, Guarantee, Limit, Multiplier, Parameter, Part,
-    Proof, Reasons, Source, Stopped, Sum, Term, Total, Way,
+    Case, Certificate, Chance, Constraint, End, Exact, Guarantee, Limit, Multiplier, Parameter,
+    Part, Proof, Reasons, Shape, Source, Stopped, Sum, Term, Total, Touch, Way,
 };
 pub use check::{Verified, added_up, verify};
 pub use flaw::Flaw;

@@ -2,7 +2,12 @@
 
 use elbowroom_num::Rational;
 use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// A number.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Exact(#[serde(with = "crate::number")] pub Rational);
 
 /// Writes a number, for `#[serde(with = "…")]`.
 pub(crate) fn serialize<S: Serializer>(

@@ -64,6 +64,7 @@ mod tests {
             weight: Rational::from(weight),
             most_below: None,
             most_above: None,
+            chance: None,
         }
     }
 

@@ -1,0 +1,171 @@
+//! That in no box all parameters are more likely inside: sums of linear bounds on logarithms of
+//! probabilities.
+//!
+//! The bounds are those of [`elbowroom_num::chance`]: the probability of an interval is log-concave in
+//! its ends for a log-concave density (Prékopa 1973), and what jumps is counted in full where a case
+//! does not exclude it.
+
+use elbowroom_num::chance::{Cell, Chance, Reach, Touch as Touching};
+use elbowroom_num::{Rational, enclosed};
+
+use crate::certificate::{Certificate, Exact, Total, Touch};
+use crate::flaw::Flaw;
+
+/// Between which numbers a variable lies in a case.
+#[derive(Clone, Debug)]
+pub(crate) struct Span {
+    /// It is not less than this.
+    pub(crate) least: Rational,
+    /// It is not more than this, where that is known.
+    pub(crate) far: Option<Rational>,
+    /// Whether it is less than that.
+    pub(crate) is_open: bool,
+}
+
+/// The parameters with their distributions.
+pub(crate) struct Chances {
+    own: Vec<Option<(Rational, Chance)>>,
+    /// Of each parameter the variables that move its ends.
+    ends: Vec<[usize; 2]>,
+}
+
+impl Chances {
+    /// Those of a certificate.
+    ///
+    /// # Errors
+    /// When a distribution makes no sense, or none is there.
+    pub(crate) fn new(certificate: &Certificate) -> Result<Self, Flaw> {
+        let own = certificate
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(index, parameter)| {
+                let Some(chance) = &parameter.chance else {
+                    return Ok(None);
+                };
+                let reckoned = chance.reckoned();
+                let reckoned =
+                    reckoned.ok_or(Flaw::Range("the distribution of parameter", index))?;
+                Ok(Some((parameter.nominal.clone(), reckoned)))
+            });
+        let ends = (0..certificate.parameters.len()).map(|index| {
+            if certificate.symmetric {
+                [index; 2]
+            } else {
+                [2 * index, 2 * index + 1]
+            }
+        });
+        Ok(Self {
+            own: own.collect::<Result<_, _>>()?,
+            ends: ends.collect(),
+        })
+    }
+
+    /// Between which numbers variables lie where there is any probability, and where they gain any. A
+    /// box outside of them has no probability, or no more than one inside of it that is not.
+    pub(crate) fn narrow(&self, spans: &mut [Span]) {
+        let mut gains: Vec<Option<Option<Rational>>> = vec![None; spans.len()];
+        for (own, ends) in self.own.iter().zip(&self.ends) {
+            let limits = match own {
+                Some((nominal, chance)) => chance.limits(nominal),
+                None => [const { (Rational::ZERO, Some(Rational::ZERO)) }; 2],
+            };
+            for (&variable, (least, most)) in ends.iter().zip(limits) {
+                let span = &mut spans[variable];
+                span.least = span.least.clone().max(least);
+                gains[variable] = Some(match gains[variable].take() {
+                    None => most,
+                    // As long as one of the ends that it moves gains.
+                    Some(other) => other.zip(most).map(|(one, other)| one.max(other)),
+                });
+            }
+        }
+        for (span, gains) in spans.iter_mut().zip(gains) {
+            if let (Some(Some(gains)), Some(far)) = (gains, &mut span.far) {
+                *far = far.clone().min(gains);
+            }
+        }
+    }
+
+    /// Whether a probability jumps as this variable reaches a number.
+    pub(crate) fn jumps(&self, variable: usize, at: &Rational) -> bool {
+        let all = self.own.iter().zip(&self.ends);
+        let mut own = all.filter_map(|(own, ends)| Some((own.as_ref()?, ends)));
+        own.any(|((nominal, chance), ends)| {
+            let jumps = chance.jumps(nominal);
+            let mut sides = ends.iter().zip(&jumps);
+            sides.any(|(&moved, jumps)| moved == variable && jumps.contains(at))
+        })
+    }
+
+    /// The logarithm of the probability of a box, rounded down; `None` if there is none.
+    pub(crate) fn worth(&self, slacks: &[Rational]) -> Option<Rational> {
+        let mut sum = Rational::ZERO;
+        for (own, ends) in self.own.iter().zip(&self.ends) {
+            let Some((nominal, chance)) = own else {
+                continue;
+            };
+            let reach: Reach = ends.map(|variable| slacks[variable].clone());
+            let [mass, _] = chance.mass(nominal, &reach);
+            let [below, _] = enclosed::ln(&mass)?;
+            sum += below;
+        }
+        Some(enclosed::billionths_below(&sum))
+    }
+
+    /// What that is at most, rounded up to 10^-18, in a case in which the ends, each times its slope, add
+    /// up to no more than the total; `None` if nothing follows. `factors` are what the variables count in
+    /// it.
+    pub(crate) fn bound(
+        &self,
+        total: &Total,
+        factors: &[Rational],
+        spans: &[Span],
+    ) -> Option<Rational> {
+        let count = self.own.len();
+        if total.slopes.len() != 2 * count || total.touches.len() != count {
+            return None;
+        }
+        let mut wanted = vec![Rational::ZERO; factors.len()];
+        let mut bound = total.bound.clone();
+        for (index, (own, ends)) in self.own.iter().zip(&self.ends).enumerate() {
+            let slopes = [2 * index, 2 * index + 1].map(|place| total.slopes[place].0.clone());
+            for (variable, slope) in ends.iter().zip(&slopes) {
+                wanted[*variable] += slope;
+            }
+            let touch = &total.touches[index];
+            let Some((nominal, chance)) = own else {
+                let is_nothing = slopes.iter().all(Rational::is_zero) && *touch == Touch::Nowhere;
+                if !is_nothing {
+                    return None;
+                }
+                continue;
+            };
+            let [below, above] = ends.map(|variable| &spans[variable]);
+            let cell = Cell {
+                below: [below.least.clone(), below.far.clone()?],
+                above: [above.least.clone(), above.far.clone()?],
+                is_open: [below.is_open, above.is_open],
+            };
+            let touching = touching(touch, &cell)?;
+            bound += chance.height(nominal, &cell, &touching, &slopes)?;
+        }
+        let fine = Rational::from(1_000_000_000_000_000_000_i64);
+        (wanted == factors).then(|| (bound * &fine).ceil() / fine)
+    }
+}
+
+/// The touch with its numbers; `None` if it is not in the cell.
+fn touching(touch: &Touch, cell: &Cell) -> Option<Touching> {
+    Some(match touch {
+        Touch::At([Exact(below), Exact(above)]) => {
+            let is_in = |at: &Rational, [near, far]: &[Rational; 2]| near <= at && at <= far;
+            if !is_in(below, &cell.below) || !is_in(above, &cell.above) {
+                return None;
+            }
+            Touching::At([below.clone(), above.clone()])
+        }
+        Touch::Mass(Exact(mass)) => Touching::Mass(mass.clone()),
+        Touch::Nowhere => Touching::Nowhere,
+    })
+}
