@@ -115,6 +115,9 @@ fn search_for_plans(
             counts: progress.counts,
         };
     }
+    grounding
+        .actions
+        .retain(|action| !settings.without.contains(&action.name));
     let tuning = &settings.tuning;
     if tuning.uses(Technique::Relevance) {
         relevance::keep_relevant(grounded, &mut grounding, situation);
@@ -143,7 +146,8 @@ fn search_for_plans(
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }
-    let symmetry = if tuning.uses(Technique::Symmetry) {
+    // What one object may do and another may not is no symmetry of the problem itself.
+    let symmetry = if tuning.uses(Technique::Symmetry) && settings.without.is_empty() {
         Symmetry::of(grounded, &compiled)
     } else {
         Symmetry::default()

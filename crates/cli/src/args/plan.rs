@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
@@ -24,6 +24,14 @@ pub(crate) struct PlanArgs {
     /// Return the first plan, even with a time limit
     #[arg(long)]
     pub(crate) first: bool,
+    /// What the plan is to be the best by, instead of metric and makespan: `room`, the share by
+    /// which all its durations may deviate (docs/chosen-plans.md), or `probability`, how often it
+    /// works in samples of --world. Without a time limit, a fixed number of plans is compared
+    #[arg(long, value_enum, conflicts_with = "first")]
+    pub(crate) objective: Option<PlanObjectiveChoice>,
+    /// The world file (docs/formats/world.md) for --objective probability
+    #[arg(long, value_name = "WORLD.toml", requires = "objective")]
+    pub(crate) world: Option<PathBuf>,
     /// Memory limit in MB; by default 2048 for the embedded planner
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
     #[arg(allow_negative_numbers = true)]
@@ -38,6 +46,15 @@ pub(crate) struct PlanArgs {
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// What plans can be made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PlanObjectiveChoice {
+    /// The room that it leaves
+    Room,
+    /// How often it works in a world
+    Probability,
 }
 
 /// The planner that is always there.

@@ -3,15 +3,26 @@
 mod text;
 mod watch;
 
-use elbowroom::answers::RequestError;
-use elbowroom::answers::plan::{PlanFinding, PlanOutcome, PlanRequest, plan, plan_with};
-use elbowroom::external::Planner;
+use std::sync::Arc;
 
-use crate::args::{EMBEDDED, PlanArgs};
+use elbowroom::answers::RequestError;
+use elbowroom::answers::plan::{
+    BestPlanRequest, PlanAim, PlanFinding, PlanOutcome, PlanRequest, best_plan, plan, plan_with,
+};
+use elbowroom::execute::SpecError;
+use elbowroom::external::Planner;
+use elbowroom::model::Task;
+use elbowroom::sim::WorldModel;
+
+use super::run::spec::contradiction;
+use crate::args::{EMBEDDED, PlanArgs, PlanObjectiveChoice};
 use crate::exit::{Answer, Exit, Failure};
 use crate::output::Output;
 use crate::{input, output};
 use watch::Watch;
+
+/// For how many problems like the given one plans are compared without a time limit.
+const SEARCHES: usize = 40;
 
 /// Plans.
 pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
@@ -23,6 +34,15 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
     };
     let (task, domain, problem) =
         input::task_with_sources(&arguments.problem, &arguments.epsilon, output)?;
+    if let Some(objective) = arguments.objective {
+        return best(
+            arguments,
+            objective,
+            planner.as_ref(),
+            &Arc::new(task),
+            output,
+        );
+    }
     let mut watch = Watch::start(arguments, planner.is_some());
     let mut request = PlanRequest {
         task: &task,
@@ -38,6 +58,54 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
         }
     };
     // The line on the terminal goes before the answer comes.
+    drop(watch);
+    print(arguments, &outcome, output)
+}
+
+/// The plan that is best by an objective.
+fn best(
+    arguments: &PlanArgs,
+    objective: PlanObjectiveChoice,
+    planner: Option<&Planner>,
+    task: &Arc<Task>,
+    output: &mut Output,
+) -> Answer {
+    if planner.is_some() {
+        return Err(Failure::new(
+            "--objective compares plans of the embedded planner; another one gives only its own",
+            "leave out --planner, or --objective",
+        ));
+    }
+    let world;
+    let aim = match (objective, &arguments.world) {
+        (PlanObjectiveChoice::Room, None) => PlanAim::Room,
+        (PlanObjectiveChoice::Room, Some(_)) => {
+            return Err(Failure::new(
+                "--world says nothing to `--objective room`",
+                "leave it out, or ask for --objective probability",
+            ));
+        }
+        (PlanObjectiveChoice::Probability, None) => {
+            return Err(Failure::new(
+                "`--objective probability` has to know the world",
+                "give it a world file with --world (docs/formats/world.md)",
+            ));
+        }
+        (PlanObjectiveChoice::Probability, Some(path)) => {
+            let source = input::source(path, "world")?;
+            world = WorldModel::read(source, task.problem())
+                .map_err(|wrong| contradiction(SpecError::World(wrong)))?;
+            PlanAim::Probability(&world)
+        }
+    };
+    let mut watch = Watch::start(arguments, false);
+    let request = BestPlanRequest {
+        task,
+        aim,
+        most_searches: watch.limit().is_none().then_some(SEARCHES),
+        most_memory: arguments.memory.map(|megabytes| megabytes << 20),
+    };
+    let outcome = best_plan(&request, &mut watch).map_err(unsupported)?;
     drop(watch);
     print(arguments, &outcome, output)
 }

@@ -1,6 +1,7 @@
 //! Is there a plan?
 
 mod external;
+mod objective;
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -14,6 +15,9 @@ use serde::{Deserialize, Serialize};
 use super::{Event, Exact, Halt, PlanProgress, RequestError, Version, Watcher, exact};
 
 pub use external::{PlannerFailure, plan_with};
+pub use objective::{
+    BestPlanRequest, PlanAim, PlanChoice, PlanObjective, PlanWorth, UnknownPlanObjective, best_plan,
+};
 
 /// Asks for a plan.
 #[derive(Debug)]
@@ -52,6 +56,9 @@ pub struct PlanAnswer {
     /// The answer itself.
     #[serde(flatten)]
     pub finding: PlanFinding,
+    /// How the plan was chosen; left out where plans are compared by metric or makespan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub choice: Option<PlanChoice>,
     /// Why the search ended.
     pub stop: PlanStop,
     /// The number of plans found, each better than the one before as far as the planner knows.
@@ -139,7 +146,7 @@ pub enum PlanStop {
     /// It is proved that there is no plan (embedded planner).
     #[serde(rename = "proved")]
     Proved,
-    /// By itself (other planners).
+    /// By itself (other planners), or at the number of plans that is compared without a time limit.
     #[serde(rename = "ended")]
     Ended,
 }
@@ -238,21 +245,34 @@ pub fn plan(
         }
         Err(finding) => (None, finding),
     };
-    let problem = request.task.problem();
-    let answer = PlanAnswer {
-        format: PlanFormat::Plan,
-        version: Version,
-        domain: problem.domain.clone(),
-        problem: problem.name.clone(),
-        planner: EMBEDDED.to_owned(),
-        finding,
-        stop,
-        plans: course.plans,
-        seconds: course.elapsed().as_secs_f64(),
-        first_plan_seconds: course.first.map(|first| first.as_secs_f64()),
-        statistics: counts.into(),
-    };
+    let answer = course.answer(request.task, (finding, None), (stop, counts));
     Ok(PlanOutcome { answer, plan })
+}
+
+impl Course<'_> {
+    /// The answer, with how the plan was chosen if it was chosen among many.
+    fn answer(
+        &mut self,
+        task: &Task,
+        (finding, choice): (PlanFinding, Option<PlanChoice>),
+        (stop, counts): (PlanStop, Counts),
+    ) -> PlanAnswer {
+        let problem = task.problem();
+        PlanAnswer {
+            format: PlanFormat::Plan,
+            version: Version,
+            domain: problem.domain.clone(),
+            problem: problem.name.clone(),
+            planner: EMBEDDED.to_owned(),
+            finding,
+            choice,
+            stop,
+            plans: self.plans,
+            seconds: self.elapsed().as_secs_f64(),
+            first_plan_seconds: self.first.map(|first| first.as_secs_f64()),
+            statistics: counts.into(),
+        }
+    }
 }
 
 impl PlanFinding {
@@ -327,6 +347,7 @@ impl Course<'_> {
         self.tell(&PlanProgress {
             makespan: found.map(|found| &found.makespan),
             metric: found.and_then(|found| found.metric.as_ref()),
+            worth: None,
             plans: self.plans,
             states: Some(progress.counts.evaluated),
             memory: None,

@@ -1,5 +1,7 @@
 //! What is asked of the planner, and what it answers.
 
+use std::collections::BTreeSet;
+
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 
@@ -17,6 +19,9 @@ pub struct Settings {
     pub first_plan_only: bool,
     /// The order of preference among plans.
     pub objective: Objective,
+    /// The names of ground actions, `(drive rover depot shelf)`, that plans must do without. What is
+    /// proved then is proved of plans without them.
+    pub without: BTreeSet<String>,
     /// The constants of the search.
     pub tuning: Tuning,
 }
@@ -33,12 +38,13 @@ pub enum Objective {
 }
 
 impl Default for Settings {
-    /// Memory 2 GiB, any number of plans, the problem's own metric.
+    /// Memory 2 GiB, any number of plans with any action, the problem's own metric.
     fn default() -> Self {
         Self {
             max_memory: 2 << 30,
             first_plan_only: false,
             objective: Objective::Metric,
+            without: BTreeSet::new(),
             tuning: Tuning::default(),
         }
     }

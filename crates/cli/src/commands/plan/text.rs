@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use elbowroom::answers::plan::{PlanAnswer, PlanFinding, PlanStop, PlannerFailure};
+use elbowroom::answers::plan::{PlanChoice, PlanObjective, PlanWorth};
 use elbowroom::external::Outcome;
 
 use crate::args::EMBEDDED;
@@ -42,6 +43,10 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     if let Some(metric) = metric.as_ref().filter(|metric| *metric != makespan) {
         let _ = write!(text, ", metric {}", number::nearest(metric));
     }
+    if let Some(choice) = &answer.choice {
+        let _ = write!(text, "; {}", chosen(choice));
+        return Some(styled(FAINT, &text));
+    }
     let plans = counted(answer.plans, "plan");
     let better = match answer.stop {
         PlanStop::Exhausted => "the search found no better one",
@@ -52,6 +57,41 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     };
     let _ = write!(text, "; {plans} found, {better}");
     Some(styled(FAINT, &text))
+}
+
+/// What a plan is worth by its objective, beside the shortest one.
+fn chosen(choice: &PlanChoice) -> String {
+    let PlanChoice {
+        objective,
+        value,
+        shortest,
+        shortest_makespan,
+        made_for,
+        compared,
+    } = choice;
+    let name = match objective {
+        PlanObjective::Room => "room",
+        PlanObjective::Probability => "works in",
+    };
+    let plans = counted(*compared, "plan");
+    let mut text = format!("{name} {value}");
+    if let PlanWorth::Sampled { .. } = value {
+        text.push_str(" samples of the world");
+    }
+    if let PlanWorth::Unknown { why } = value {
+        let _ = write!(text, " ({why})");
+    }
+    if made_for.is_empty() {
+        let _ = write!(text, ", the shortest of {plans} compared");
+    } else {
+        let _ = write!(
+            text,
+            ", beside {shortest} of the shortest, which ends at {}; best of {plans} compared, made \
+             {made_for}",
+            number::nearest(&shortest_makespan.0)
+        );
+    }
+    text
 }
 
 /// The times are not the planner's own.

@@ -26,6 +26,8 @@ pub(super) struct Watch {
 struct Worth {
     makespan: Rational,
     metric: Option<Rational>,
+    /// In words, where plans are compared by something else.
+    objective: Option<String>,
 }
 
 impl Watch {
@@ -62,6 +64,9 @@ impl Watch {
             if let Some(best) = best {
                 let makespan = number::nearest(&best.makespan);
                 let _ = write!(line, ", the last ends at {makespan}");
+                if let Some(worth) = &best.objective {
+                    let _ = write!(line, ", worth {worth}");
+                }
                 if let Some(metric) = &best.metric {
                     let _ = write!(line, ", metric {}", number::nearest(metric));
                 }
@@ -99,6 +104,7 @@ impl Watcher for Watch {
                     .metric
                     .filter(|metric| *metric != makespan)
                     .cloned(),
+                objective: progress.worth.map(str::to_owned),
             });
         }
         self.show(progress);

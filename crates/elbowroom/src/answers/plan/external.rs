@@ -75,6 +75,7 @@ impl Course<'_> {
             Event::Running { memory, .. } => self.tell(&PlanProgress {
                 makespan: None,
                 metric: None,
+                worth: None,
                 plans: self.plans,
                 states: None,
                 memory: Some(*memory),
@@ -84,6 +85,7 @@ impl Course<'_> {
                 let flow = self.tell(&PlanProgress {
                     makespan: Some(&found.makespan),
                     metric: found.metric.as_ref(),
+                    worth: None,
                     plans: self.plans,
                     states: None,
                     memory: None,
@@ -139,6 +141,7 @@ fn conclude(
         problem: problem.name.clone(),
         planner: name.clone(),
         finding,
+        choice: None,
         stop: stop(&statistics, halt),
         plans: statistics.plans,
         seconds: statistics.elapsed.as_secs_f64(),

@@ -1,0 +1,298 @@
+//! Plans that are made better by the room that they leave, or by how likely they are to work.
+
+mod worth;
+
+use std::fmt;
+use std::ops::ControlFlow;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_planner::{Answer, Settings};
+use elbowroom_sim::WorldModel;
+use serde::{Deserialize, Serialize};
+
+use super::{Course, PlanFinding, PlanOutcome, PlanStop, none_found};
+use crate::answers::{Event, Exact, PlanProgress, RequestError, Watcher, exact};
+use crate::execute::{Candidates, Limits};
+use crate::flow;
+use crate::makespan::end;
+use worth::{Judge, Judged};
+
+/// What else than short a plan is to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PlanObjective {
+    /// Of much room: the least share of its nominal value by which any duration may deviate, all at
+    /// the same time, in the plan's best box ([`elbowroom_envelope::Objective::LeastSlack`]), as large as can be.
+    Room,
+    /// Likely to work in a world: executed by `live`, without any new plan.
+    Probability,
+}
+
+/// A name that is none of [`PlanObjective`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("plans are made for `room` or `probability`, not for `{0}`")]
+pub struct UnknownPlanObjective(String);
+
+impl fmt::Display for PlanObjective {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Room => "room",
+            Self::Probability => "probability",
+        })
+    }
+}
+
+impl FromStr for PlanObjective {
+    type Err = UnknownPlanObjective;
+
+    fn from_str(name: &str) -> Result<Self, UnknownPlanObjective> {
+        let all = [Self::Room, Self::Probability];
+        let known = all.into_iter().find(|known| known.to_string() == name);
+        known.ok_or_else(|| UnknownPlanObjective(name.to_owned()))
+    }
+}
+
+/// Asks for the plan that is best by an objective, of those that can be found.
+#[derive(Clone, Debug)]
+pub struct BestPlanRequest<'a> {
+    /// The problem.
+    pub task: &'a Arc<Task>,
+    /// By what plans are compared: for [`PlanObjective::Probability`], in this world.
+    pub aim: PlanAim<'a>,
+    /// How many problems like this one are planned for; without a limit, until the watcher wants no
+    /// more or there are no others.
+    pub most_searches: Option<usize>,
+    /// About how much memory a search may use, in bytes.
+    pub most_memory: Option<u64>,
+}
+
+/// An objective with what it takes.
+#[derive(Clone, Copy, Debug)]
+pub enum PlanAim<'a> {
+    /// See [`PlanObjective::Room`].
+    Room,
+    /// See [`PlanObjective::Probability`].
+    Probability(&'a WorldModel),
+}
+
+/// What a plan is worth by an objective.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum PlanWorth {
+    /// The share of its nominal value by which each duration may deviate.
+    Room {
+        /// The share.
+        #[serde(with = "exact")]
+        room: Rational,
+    },
+    /// How often it worked.
+    Sampled {
+        /// The number of samples of the world in which it worked.
+        successes: u64,
+        /// The number of samples.
+        samples: u64,
+        /// Wilson's 95 % interval of the probability.
+        interval: Option<(f64, f64)>,
+    },
+    /// Nothing is known of it: there is nothing in the plan that may deviate, or it is beyond exact
+    /// analysis.
+    Unknown {
+        /// Why not.
+        why: String,
+    },
+}
+
+/// How the plan was chosen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlanChoice {
+    /// By what.
+    pub objective: PlanObjective,
+    /// What the plan is worth.
+    pub value: PlanWorth,
+    /// What the shortest plan that the planner found is worth.
+    pub shortest: PlanWorth,
+    /// When that one ends.
+    pub shortest_makespan: Exact,
+    /// What the plan was made for, in words; empty if it is that one.
+    pub made_for: String,
+    /// How many plans were compared.
+    pub compared: usize,
+}
+
+impl fmt::Display for PlanWorth {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Room { room } => {
+                let percent = room * &Rational::from(100);
+                write!(f, "{} %", percent.to_decimal(1))
+            }
+            Self::Sampled {
+                successes, samples, ..
+            } => write!(f, "{successes} of {samples}"),
+            Self::Unknown { .. } => f.write_str("unknown"),
+        }
+    }
+}
+
+/// Looks for the best plan by an objective. Every plan is judged; the shortest one is the first,
+/// and no answer is worse than it.
+///
+/// # Errors
+/// When the problem needs what the embedded planner does not support.
+pub fn best_plan(
+    request: &BestPlanRequest<'_>,
+    watcher: &mut dyn Watcher,
+) -> Result<PlanOutcome, RequestError> {
+    let task = request.task.with_own_table();
+    let situation = Situation::initial(&task);
+    let mut settings = Settings::default();
+    if let Some(bytes) = request.most_memory {
+        settings.max_memory = usize::try_from(bytes).unwrap_or(usize::MAX);
+    }
+    let max_memory = settings.max_memory;
+    let limits = Limits {
+        most_states: u64::MAX,
+        improve_states: 20_000,
+        other_states: u64::MAX / 2,
+        searches: request.most_searches.unwrap_or(usize::MAX),
+    };
+    let world = match request.aim {
+        PlanAim::Room => None,
+        PlanAim::Probability(world) => Some(world),
+    };
+    let begun = watcher.elapsed();
+    let mut course = Course {
+        watcher,
+        begun,
+        plans: 0,
+        first: None,
+        halt: None,
+    };
+    let mut source = Candidates::new(&task, &situation, world, settings, limits);
+    let (best, shortest) = compared(request, &task, &mut source, &mut course);
+    let stop = match (course.halt, request.most_searches) {
+        (Some(halt), _) => halt.into(),
+        (None, Some(_)) => PlanStop::Ended,
+        (None, None) => PlanStop::Exhausted,
+    };
+    let counts = source.counts();
+    let (plan, finding, choice) = match best {
+        Some(best) => {
+            let value = best.value.worth();
+            let (worth, end) = shortest.unwrap_or((value.clone(), best.makespan.clone()));
+            let choice = PlanChoice {
+                objective: request.aim.objective(),
+                value,
+                shortest: worth,
+                shortest_makespan: Exact(end),
+                made_for: best.candidate.made_for,
+                compared: course.plans,
+            };
+            let plan = best.candidate.plan;
+            let metric = metric(&task, &plan);
+            let finding = PlanFinding::of(&task, &plan, best.makespan, metric, None);
+            (Some(plan), finding, Some(choice))
+        }
+        None => match source.answer() {
+            Some(Answer::Unsupported(unsupported)) => {
+                return Err(RequestError::Unsupported(unsupported.to_string()));
+            }
+            Some(Answer::Unsolvable { proof, .. }) => {
+                let reason = proof.to_string();
+                (None, PlanFinding::NoPlan { reason }, None)
+            }
+            _ => {
+                let reason = none_found(stop, counts, max_memory);
+                (None, PlanFinding::None { reason }, None)
+            }
+        },
+    };
+    let stop = match &finding {
+        PlanFinding::NoPlan { .. } => PlanStop::Proved,
+        _ => stop,
+    };
+    let answer = course.answer(request.task, (finding, choice), (stop, counts));
+    let plan = plan.and_then(|plan| crate::execute::renumbered(request.task, &plan));
+    Ok(PlanOutcome { answer, plan })
+}
+
+/// The best plan, and what the shortest is worth and when it ends.
+fn compared(
+    request: &BestPlanRequest<'_>,
+    task: &Task,
+    source: &mut Candidates<'_>,
+    course: &mut Course<'_>,
+) -> (Option<Judged>, Option<(PlanWorth, Rational)>) {
+    let mut best: Option<Judged> = None;
+    let mut shortest: Option<(PlanWorth, Rational)> = None;
+    let mut judge: Option<Judge<'_>> = None;
+    while let Some(candidate) = source.next(&mut |states| course.goes_on(states, None)) {
+        course.plans += 1;
+        let elapsed = course.elapsed();
+        course.first.get_or_insert(elapsed);
+        let known = best.as_ref().map(|best| &best.value);
+        // By now the facts that plans are about have their numbers.
+        let judge = judge.get_or_insert_with(|| Judge::of(request, task));
+        let value = judge.value(&candidate.plan, known, course);
+        let Some(value) = value else {
+            // Interrupted: of a first plan nothing may be known, of others nothing is claimed.
+            best.get_or_insert(Judged::unknown(candidate, "the search was ended before"));
+            break;
+        };
+        let judged = Judged {
+            makespan: end(&candidate.plan),
+            candidate,
+            value,
+        };
+        shortest.get_or_insert_with(|| (judged.value.worth(), judged.makespan.clone()));
+        if best.as_ref().is_none_or(|best| judged.is_better_than(best)) {
+            let worth = judged.value.worth().to_string();
+            course.goes_on(0, Some((&judged.makespan, &worth)));
+            best = Some(judged);
+        }
+    }
+    (best, shortest)
+}
+
+impl PlanAim<'_> {
+    fn objective(self) -> PlanObjective {
+        match self {
+            Self::Room => PlanObjective::Room,
+            Self::Probability(_) => PlanObjective::Probability,
+        }
+    }
+}
+
+/// The value of the problem's metric, if it has one.
+fn metric(task: &Task, plan: &TimeTriggeredPlan) -> Option<Rational> {
+    match flow::judge(task, plan) {
+        elbowroom_model::validate::Verdict::Valid(report) => report.metric(task),
+        _ => None,
+    }
+}
+
+impl Course<'_> {
+    /// Tells how far the search has come, with the end and the worth of a new best plan, and says
+    /// whether to go on.
+    fn goes_on(&mut self, states: u64, new: Option<(&Rational, &str)>) -> bool {
+        let progress = PlanProgress {
+            makespan: new.map(|(makespan, _)| makespan),
+            metric: None,
+            worth: new.map(|(_, worth)| worth),
+            plans: self.plans,
+            states: Some(states),
+            memory: None,
+        };
+        self.watcher.notice(&Event::Plan(progress));
+        match self.watcher.flow() {
+            ControlFlow::Continue(()) => true,
+            ControlFlow::Break(halt) => {
+                self.halt = Some(halt);
+                false
+            }
+        }
+    }
+}

@@ -1,0 +1,367 @@
+//! Plans that are chosen for their odds, or for their room, among many.
+#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
+
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use elbowroom::answers::odds::{OddsFinding, OddsRequest, OddsSettings, odds};
+use elbowroom::answers::plan::{
+    BestPlanRequest, PlanAim, PlanChoice, PlanFinding, PlanOutcome, PlanStop, PlanWorth, best_plan,
+};
+use elbowroom::answers::run::{RunRequest, simulate};
+use elbowroom::answers::{Halt, Unwatched, Watcher};
+use elbowroom::execute::{
+    Candidates, Choice, Chooser, Embedded, Execution, FirstPlan, Known, Limits, NamedText,
+    Replanning, Rollouts, RunSpec, Value,
+};
+use elbowroom::execution::run::{PlanningTime, RunSettings, Verdict};
+use elbowroom::execution::{Entry, Recorder};
+use elbowroom::flow;
+use elbowroom::model::validate::{Settings, validate};
+use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+use elbowroom::pddl::{self, Source};
+use elbowroom::probability::{Likelihoods, likelihoods};
+use elbowroom::sim::WorldModel;
+
+const WORLDS: [&str; 5] = ["counter", "weld", "detour", "rendezvous", "door"];
+
+fn text(path: &str) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::fs::read_to_string(root.join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+fn task(folder: &str) -> Arc<Task> {
+    let [domain, problem] = ["domain", "problem"]
+        .map(|name| Source::new(name, text(&format!("{folder}/{name}.pddl")).as_str()));
+    Arc::new(Task::new(pddl::read_problem(&domain, &problem).unwrap().0))
+}
+
+fn world(folder: &str, task: &Task) -> WorldModel {
+    let source = Source::new("world", text(&format!("{folder}/world.toml")).as_str());
+    WorldModel::read(source, task.problem()).unwrap()
+}
+
+fn settings() -> RunSettings {
+    RunSettings {
+        planning_time: PlanningTime::Seconds(Rational::ONE),
+        ..RunSettings::default()
+    }
+}
+
+/// The choice for an executor in a world of `experiments`.
+fn chosen(name: &str, executor: &str) -> (Arc<Task>, WorldModel, Choice) {
+    let folder = format!("experiments/{name}");
+    let task = task(&folder);
+    let world = world(&folder, &task);
+    let planner = Embedded::default();
+    let chooser = Chooser {
+        settings: planner.settings.clone(),
+        most_states: planner.most_states,
+        improve_states: planner.improve_states,
+        known: Known::World(Rollouts {
+            world: Arc::new(world.clone()),
+            executor: executor.parse().unwrap(),
+            settings: settings(),
+            flow: flow::Settings::default(),
+            likelihoods: Arc::new(Likelihoods::certain()),
+            replanning: Some(Replanning::within(&planner)),
+            is_ready: true,
+        }),
+        goes_on: &|| true,
+    };
+    let choice = chooser.choose(&task, &Situation::initial(&task)).unwrap();
+    (task, world, choice)
+}
+
+/// In how many of so many runs of its own the goal is reached, beginning with a plan.
+fn count(task: &Arc<Task>, world: &WorldModel, plan: &TimeTriggeredPlan, runs: u64) -> u64 {
+    let reaches = |seed: &u64| {
+        let task = Arc::new(task.with_own_table());
+        let run = Execution::of(&task)
+            .by("live".parse().unwrap())
+            .with_settings(settings())
+            .beginning_with(plan.clone());
+        run.run_in(&mut *world.world(&task, *seed)).verdict == Verdict::GoalReached
+    };
+    (1000..1000 + runs).filter(reaches).count() as u64
+}
+
+fn starts(plan: &TimeTriggeredPlan) -> Vec<String> {
+    let mut steps: Vec<_> = plan.steps.iter().collect();
+    steps.sort_by(|a, b| (&a.start, &a.action.name).cmp(&(&b.start, &b.action.name)));
+    steps.iter().map(|step| step.action.name.clone()).collect()
+}
+
+#[test]
+fn candidates_are_valid_differ_from_each_other_and_are_the_same_each_time() {
+    let folders = WORLDS.map(|name| (format!("experiments/{name}"), true));
+    let cases = ["crossing", "errand", "delivery"].map(|name| (format!("cases/{name}"), false));
+    for (folder, has_world) in folders.into_iter().chain(cases) {
+        let make = || {
+            let task = task(&folder);
+            let world = has_world.then(|| world(&folder, &task));
+            let situation = Situation::initial(&task);
+            let limits = Limits {
+                most_states: 20_000,
+                improve_states: 500,
+                other_states: 20_000,
+                searches: 12,
+            };
+            let planner = elbowroom::planner::Settings::default();
+            let mut source = Candidates::new(&task, &situation, world.as_ref(), planner, limits);
+            let plans: Vec<_> = std::iter::from_fn(|| source.next(&mut |_| true)).collect();
+            for candidate in &plans {
+                let verdict = validate(&task, &candidate.plan, &Settings::default());
+                assert!(verdict.is_valid(), "{folder}: {verdict:?}");
+                let without = candidate.made_for.split_once("without ");
+                for name in starts(&candidate.plan) {
+                    assert!(without.is_none_or(|(_, others)| !others.contains(&name)));
+                }
+            }
+            plans
+        };
+        let plans = make();
+        let orders: BTreeSet<_> = plans.iter().map(|it| starts(&it.plan)).collect();
+        assert_eq!(orders.len(), plans.len(), "{folder}");
+        assert!(plans.len() > 1, "{folder} has other plans");
+        assert!(plans[0].made_for.is_empty(), "{folder}");
+        let names = |plans: &[elbowroom::execute::Candidate]| {
+            let each = plans
+                .iter()
+                .map(|it| (starts(&it.plan), it.made_for.clone()));
+            each.collect::<Vec<_>>()
+        };
+        assert_eq!(names(&plans), names(&make()), "{folder}");
+    }
+}
+
+#[test]
+fn the_estimate_agrees_with_a_count_of_other_runs() {
+    for name in ["counter", "weld"] {
+        let (task, world, choice) = chosen(name, "live");
+        let Value::Sampled { successes, samples } = choice.value else {
+            panic!("it was tried out");
+        };
+        let runs = 400;
+        let counted = count(&task, &world, &choice.plan, runs);
+        #[expect(clippy::cast_precision_loss, reason = "some hundreds")]
+        let (of, all) = ((successes + counted) as f64, (samples + runs) as f64);
+        let share = of / all;
+        #[expect(clippy::cast_precision_loss, reason = "some hundreds")]
+        let (told, found) = (
+            successes as f64 / samples as f64,
+            counted as f64 / runs as f64,
+        );
+        #[expect(clippy::cast_precision_loss, reason = "some hundreds")]
+        let error = (share * (1.0 - share) * (1.0 / samples as f64 + 1.0 / runs as f64)).sqrt();
+        assert!(
+            (told - found).abs() <= 3.0 * error + 1e-9,
+            "{name}: {told} told, {found} counted"
+        );
+        assert!(choice.value.probability() > choice.shortest.probability() + 0.1);
+    }
+}
+
+/// The actions of a plan, and what is said of it.
+type Remarked = (Vec<String>, Option<String>);
+
+/// Keeps the first plan that a run is given by its planner.
+#[derive(Clone, Default)]
+struct First(Arc<Mutex<Option<Remarked>>>);
+
+impl Recorder for First {
+    fn record(&mut self, entry: &Entry<'_>) {
+        if let Entry::Planned { plan, remark, .. } = entry {
+            let mut first = self.0.lock().unwrap();
+            first.get_or_insert_with(|| {
+                let remark = remark.map(str::to_owned);
+                (plan.map(starts).unwrap_or_default(), remark)
+            });
+        }
+    }
+}
+
+fn first_plan_of_a_run(spec: &RunSpec) -> (Vec<String>, Option<String>) {
+    let (domain, problem) = (spec.domain.source(), spec.problem.source());
+    let task = Arc::new(Task::new(pddl::read_problem(&domain, &problem).unwrap().0));
+    let first = First::default();
+    let request = RunRequest::new(spec, &task).recorded_by(first.clone());
+    let outcome = simulate(request, &mut Unwatched).unwrap();
+    let first = first.0.lock().unwrap().take().unwrap();
+    assert_eq!(outcome.answer.first_plan, first.1);
+    first
+}
+
+fn spec(name: &str, seed: u64, first_plan: FirstPlan) -> RunSpec {
+    let file = |name: &str, path: String| NamedText {
+        name: name.to_owned(),
+        text: text(&path),
+    };
+    RunSpec {
+        world: Some(text(&format!("experiments/{name}/world.toml"))),
+        seed,
+        first_plan,
+        executor: "live".parse().unwrap(),
+        planning_time: PlanningTime::Seconds(Rational::ONE),
+        ..RunSpec::new(
+            file("domain", format!("experiments/{name}/domain.pddl")),
+            file("problem", format!("experiments/{name}/problem.pddl")),
+        )
+    }
+}
+
+#[test]
+fn a_run_begins_with_the_same_choice_whatever_its_dice_and_says_so() {
+    let (plan, remark) = first_plan_of_a_run(&spec("counter", 1, FirstPlan::Likeliest));
+    let (other, also) = first_plan_of_a_run(&spec("counter", 2, FirstPlan::Likeliest));
+    assert_eq!((&plan, &remark), (&other, &also));
+    let remark = remark.unwrap();
+    assert!(remark.starts_with("chosen among "), "{remark}");
+    assert!(plan.iter().any(|name| name.contains("hand-over-carefully")));
+    let (shortest, remark) = first_plan_of_a_run(&spec("counter", 1, FirstPlan::Shortest));
+    assert!(
+        shortest
+            .iter()
+            .any(|name| name.contains("hand-over-quickly"))
+    );
+    assert_eq!(remark, None);
+}
+
+#[test]
+fn without_a_clock_the_choice_is_by_the_exact_probability() {
+    let task = task("experiments/counter");
+    let likely = "format = \"elbowroom-likelihoods\"\nversion = 1\n[defaults]\n\
+         becomes_true = 0.0\nbecomes_false = 0.0\nstart = 1.0\neffect = 1.0\n\
+         [actions.grasp-quickly]\nstart = 0.4\n[actions.grasp-carefully]\nstart = 0.98\n";
+    let likelihoods = Arc::new(likelihoods::read(likely, &task).unwrap());
+    let planner = Embedded::default();
+    let chooser = Chooser {
+        settings: planner.settings.clone(),
+        most_states: planner.most_states,
+        improve_states: planner.improve_states,
+        known: Known::Likelihoods {
+            likelihoods: Arc::clone(&likelihoods),
+            reorders: true,
+        },
+        goes_on: &|| true,
+    };
+    let choice = chooser.choose(&task, &Situation::initial(&task)).unwrap();
+    // By hand: all else is certain, and one grasps once.
+    assert_eq!(choice.value, Value::Exact(0.98));
+    assert_eq!(choice.shortest, Value::Exact(0.4));
+    let request = OddsRequest {
+        task: &task,
+        plan: Some(choice.plan),
+        likelihoods: &likelihoods,
+        world: None,
+        settings: OddsSettings::default(),
+    };
+    let OddsFinding::Odds(odds) = odds(&request, &mut Unwatched).unwrap().finding else {
+        panic!("it has odds");
+    };
+    assert!((odds.order.probability - 0.98).abs() < 1e-12);
+}
+
+/// Ends a search after so many questions.
+struct Impatient(usize);
+
+impl Watcher for Impatient {
+    fn elapsed(&mut self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        self.0 = self.0.saturating_sub(1);
+        if self.0 == 0 {
+            ControlFlow::Break(Halt::Cancelled)
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
+
+fn best(task: &Arc<Task>, aim: PlanAim<'_>, watcher: &mut dyn Watcher) -> PlanOutcome {
+    let request = BestPlanRequest {
+        task,
+        aim,
+        most_searches: Some(12),
+        most_memory: None,
+    };
+    best_plan(&request, watcher).unwrap()
+}
+
+fn choice(outcome: &PlanOutcome) -> &PlanChoice {
+    outcome.answer.choice.as_ref().unwrap()
+}
+
+#[test]
+fn where_the_shortest_plan_has_no_room_a_longer_one_is_chosen() {
+    let task = task("cases/crossing");
+    let outcome = best(&task, PlanAim::Room, &mut Unwatched);
+    let choice = choice(&outcome);
+    // As worked by hand in the problem.
+    let room = |room: Rational| PlanWorth::Room { room };
+    assert_eq!(choice.value, room(Rational::new(2999, 7000)));
+    assert_eq!(choice.shortest, room(Rational::ZERO));
+    let plan = outcome.plan.as_ref().unwrap();
+    assert_eq!(starts(plan), ["(go-round)", "(hand-over)"]);
+    assert!(validate(&task, plan, &Settings::default()).is_valid());
+    let PlanFinding::Plan { makespan, .. } = &outcome.answer.finding else {
+        panic!("there is a plan");
+    };
+    assert_eq!(*makespan, Rational::new(14_001, 1000));
+    assert_eq!(choice.shortest_makespan.0, Rational::new(7001, 1000));
+}
+
+#[test]
+fn no_plan_is_worse_than_the_shortest_and_none_is_claimed_to_be_more_when_it_is_interrupted() {
+    for name in ["crossing", "delivery", "battery", "errand", "match", "tank"] {
+        let task = task(&format!("cases/{name}"));
+        for patience in [40, 400, usize::MAX] {
+            let outcome = best(&task, PlanAim::Room, &mut Impatient(patience));
+            let Some(plan) = &outcome.plan else {
+                assert_eq!(outcome.answer.stop, PlanStop::Cancelled, "{name}");
+                continue;
+            };
+            assert!(validate(&task, plan, &Settings::default()).is_valid());
+            let choice = choice(&outcome);
+            match (&choice.value, &choice.shortest) {
+                (PlanWorth::Room { room }, PlanWorth::Room { room: shortest }) => {
+                    assert!(room >= shortest, "{name}: {choice:?}");
+                }
+                (PlanWorth::Room { .. } | PlanWorth::Unknown { .. }, PlanWorth::Unknown { .. }) => {
+                }
+                _ => panic!("{name}: {choice:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn a_plan_made_for_its_probability_works_as_often_as_is_said() {
+    let task = task("experiments/counter");
+    let world = world("experiments/counter", &task);
+    let outcome = best(&task, PlanAim::Probability(&world), &mut Unwatched);
+    let choice = choice(&outcome);
+    let (
+        PlanWorth::Sampled { interval, .. },
+        PlanWorth::Sampled {
+            interval: of_shortest,
+            ..
+        },
+    ) = (&choice.value, &choice.shortest)
+    else {
+        panic!("it was tried out");
+    };
+    let (least, most) = interval.unwrap();
+    // Without new plans: both careful moves succeed, and the drives are not too long.
+    assert!(
+        least > 0.85 && most <= 0.98_f64.powi(2) + 0.02,
+        "{choice:?}"
+    );
+    assert!(of_shortest.unwrap().1 < 0.3, "{choice:?}");
+}
