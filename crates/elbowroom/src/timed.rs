@@ -5,14 +5,16 @@
 //! under way with the time since each began, what has happened by itself, and the clock. The agent
 //! sees the state, and may at any moment start an action whose condition holds, cancel one that is
 //! under way, or wait. What it does not see is the future: how long an action will take, whether it
-//! fails, when something happens by itself, are drawn from the world file's distributions, given
-//! what has been seen so far. It succeeds as soon as the goal holds. Any action of the problem is
+//! fails and what it then leaves behind, when something happens by itself, are drawn from the world
+//! file's distributions, given what has been seen so far. It succeeds as soon as the goal holds. Any action of the problem is
 //! available at any time, and deciding takes no time, so no executor, however it plans, does
 //! better.
 //!
 //! What the process leaves out: interfering happenings may be as close as one likes (ε is nothing),
-//! and happenings that coincide take place one after the other. A start that fails costs no time
-//! and can be tried again at once.
+//! and happenings that coincide take place one after the other. Whether an action has broken down and
+//! can no longer be cancelled is not seen either: the bound from below never cancels one of which that
+//! may be so, and the goal counts when it is over; the one from above always can. A start that fails
+//! costs no time and can be tried again at once.
 //!
 //! **Bounds.** The best value is bounded from both sides on a grid of time: cells of one length.
 //!
@@ -36,6 +38,7 @@ mod above;
 mod below;
 mod chances;
 mod compile;
+mod failures;
 mod graph;
 mod policy;
 mod world;
@@ -45,9 +48,9 @@ use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use chances::Chances;
+pub(crate) use chances::{Chances, Ends};
 pub use policy::Policy;
-pub(crate) use world::{Act, Facts, Needs, TimedWorld};
+pub(crate) use world::{Act, Event, Facts, Needs, TimedWorld};
 
 /// How far to go.
 #[derive(Clone, Debug, PartialEq)]

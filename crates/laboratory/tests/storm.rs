@@ -294,3 +294,40 @@ fn bounds_of_the_timed_optimum_are_those_of_storm() {
         assert_within(name, ours, (&said[0], &said[1]));
     }
 }
+
+#[test]
+fn a_world_with_rates_is_refused_as_a_process_by_name() {
+    let task = task(
+        "(define (domain d) (:requirements :durative-actions) (:predicates (open) (through))
+            (:durative-action go :parameters () :duration (= ?duration 2)
+              :condition (over all (open)) :effect (at end (through))))",
+        "(define (problem p) (:domain d) (:init (open)) (:goal (through)))",
+    );
+    let text = "format = \"elbowroom-world\"\nversion = 1
+        [[hazard]]\nfact = \"open\"\nbecomes_false_per_second = 0.1";
+    let world = WorldModel::read(text, task.problem()).expect("a world");
+    let written = timed(&task, &world, &Settings::default(), (4, Bound::Upper));
+    let error = written.expect_err("it is refused");
+    assert!(error.to_string().contains("[[hazard]]"), "{error}");
+}
+
+#[test]
+fn a_world_in_which_failures_differ_is_refused_as_a_process_by_name() {
+    let task = task(
+        "(define (domain d) (:requirements :durative-actions) (:predicates (late) (through))
+            (:durative-action go :parameters () :duration (= ?duration 2)
+              :condition () :effect (at end (through))))",
+        "(define (problem p) (:domain d) (:init (at 9 (late))) (:goal (through)))",
+    );
+    let text = "format = \"elbowroom-world\"\nversion = 1
+        [[failure]]\naction = \"go\"\nprobability = 0.5
+        [[failure.outcome]]\nprobability = 0.5\ndelay = 3";
+    let world = WorldModel::read(text, task.problem()).expect("a world");
+    let settings = Settings {
+        horizon: Some(9.into()),
+        ..Settings::default()
+    };
+    let written = timed(&task, &world, &settings, (4, Bound::Upper));
+    let error = written.expect_err("it is refused");
+    assert!(error.to_string().contains("[[failure.outcome]]"), "{error}");
+}

@@ -43,6 +43,26 @@ pub enum PrismError {
     /// The world is one for which there is no timed optimum.
     #[error(transparent)]
     NotTabulated(#[from] NotTabulated),
+    /// Facts change at a rate: again and again.
+    #[error(
+        "the world has facts that change by themselves at a rate ([[hazard]]), and only events that \
+         happen at most once are written as a process; `elbowroom compare` with `optimum = true` \
+         knows rates"
+    )]
+    Rates,
+    /// Failures have several outcomes, or take time.
+    #[error(
+        "the world has failures with several outcomes or with delays ([[failure.outcome]]), and only \
+         failures that all leave the same behind are written as a process; `elbowroom compare` with \
+         `optimum = true` knows outcomes"
+    )]
+    Outcomes,
+    /// Likelihoods are rates per second.
+    #[error(
+        "the likelihoods have rates per second, and the process without time has steps only: give \
+         `becomes_true` and `becomes_false` instead"
+    )]
+    Seconds,
     /// It has too many commands.
     #[error(
         "the process has {commands} commands, and {most} is the most that is written: say fewer \

@@ -11,8 +11,36 @@ pub(super) struct Above<'a> {
     chances: &'a Chances,
 }
 
-/// A state within a cell, with the events that are still to happen in it.
-type Moment = (State, u32);
+/// A state within a cell, with the events that are still to come in it.
+type Moment = (State, Coming);
+
+/// The events of a cell, as bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+struct Coming {
+    /// Those that still have to happen.
+    must: u32,
+    /// Those that may happen as often as one likes.
+    may: u32,
+}
+
+/// How often an event happens in a cell.
+#[derive(Clone, Copy, Debug)]
+enum Times {
+    Never,
+    Once,
+    /// More than once: as often as the agent likes, but once.
+    Often,
+}
+
+impl Coming {
+    /// What is left when that event has happened once.
+    fn without(self, event: usize) -> Self {
+        Self {
+            must: self.must & !(1 << event),
+            ..self
+        }
+    }
+}
 
 /// What is being put together of one cell.
 struct Cell<'c> {
@@ -33,37 +61,38 @@ impl<'a> Above<'a> {
 
     /// What the cell brings: which of the actions under way may end, and which events happen.
     fn revealed(&self, cell: usize, state: &State) -> Vec<(f64, Moment)> {
-        let mut moments = vec![(1.0, (state.clone(), 0_u32))];
+        let mut moments = vec![(1.0, (state.clone(), Coming::default()))];
         for (place, running) in state.running.iter().enumerate() {
             let age = cell - usize::from(running.since);
-            let (well, badly) = match running.phase {
-                Phase::Goes => self.chances.ends[usize::from(running.act)][age],
+            let ends = match running.phase {
+                Phase::Goes => &self.chances.ends[usize::from(running.act)][age],
                 Phase::Ready(_) | Phase::Due(_) => continue,
             };
-            moments = split(
-                moments,
-                &[
-                    (well, Some(true)),
-                    (badly, Some(false)),
-                    (1.0 - well - badly, None),
-                ],
-                |moment, is_well| {
-                    if let Some(is_well) = is_well {
-                        moment.0.running[place].phase = Phase::Ready(*is_well);
-                    }
-                },
-            );
+            let ways: Vec<_> = ends.ways().collect();
+            moments = split(moments, &ways, |moment, ending| {
+                if let Some(ending) = ending {
+                    moment.0.running[place].phase = Phase::Ready(*ending);
+                }
+            });
         }
         for (event, hazards) in self.chances.events.iter().enumerate() {
             if state.happened & (1 << event) == 0 {
                 let p = hazards[cell];
-                moments = split(
-                    moments,
-                    &[(p, true), (1.0 - p, false)],
-                    |moment, happens| {
-                        moment.1 |= u32::from(*happens) << event;
-                    },
-                );
+                let often = p * self.chances.again[event][cell];
+                let ways = [
+                    (p - often, Times::Once),
+                    (often, Times::Often),
+                    (1.0 - p, Times::Never),
+                ];
+                moments = split(moments, &ways, |moment, times| {
+                    let (must, may) = match times {
+                        Times::Never => (0, 0),
+                        Times::Once => (1, 0),
+                        Times::Often => (1, 1),
+                    };
+                    moment.1.must |= must << event;
+                    moment.1.may |= may << event;
+                });
             }
         }
         moments
@@ -154,42 +183,46 @@ impl Cell<'_> {
 
     fn choices(&mut self, moment: &Moment) -> Vec<Choice> {
         let world = self.bound.world;
-        let (state, pending) = moment;
+        let (state, coming) = moment;
         let startable = state.startable(world);
         if state.must_start(world, &startable) {
-            return vec![self.start(state, *pending, startable[0])];
+            return vec![self.start(state, *coming, startable[0])];
         }
         let mut choices: Vec<Choice> = Vec::new();
         for (place, running) in state.running.iter().enumerate() {
-            if let Phase::Ready(is_well) | Phase::Due(is_well) = running.phase {
-                let after = state.ended(world, place, is_well);
-                choices.push(vec![(1.0, vec![self.target((after, *pending))])]);
+            if let Phase::Ready(ending) | Phase::Due(ending) = running.phase {
+                let after = state.ended(world, place, ending);
+                choices.push(vec![(1.0, vec![self.target((after, *coming))])]);
             }
             if world.may_gain_by_cancelling(usize::from(running.act)) {
                 let mut after = state.clone();
                 after.running.remove(place);
-                choices.push(vec![(1.0, vec![self.target((after, *pending))])]);
+                choices.push(vec![(1.0, vec![self.target((after, *coming))])]);
             }
         }
-        let events = (0..world.events.len()).filter(|event| pending & (1 << event) != 0);
-        for event in events.clone() {
-            if !world.is_best_last(event) {
-                let after = state.changed(world, event);
-                choices.push(vec![(
-                    1.0,
-                    vec![self.target((after, pending & !(1 << event)))],
-                )]);
+        for event in 0..world.events.len() {
+            let (must, may) = (coming.must & (1 << event), coming.may & (1 << event));
+            if must | may == 0 || (must != 0 && world.is_best_last(event)) {
+                continue;
+            }
+            let after = state.changed(world, event);
+            if must != 0 || after != *state {
+                let left = coming.without(event);
+                choices.push(vec![(1.0, vec![self.target((after, left))])]);
             }
         }
         for act in startable {
-            choices.push(self.start(state, *pending, act));
+            choices.push(self.start(state, *coming, act));
         }
         // Harm for good is best done last.
-        let mut after = state.clone();
-        for event in events.filter(|event| world.is_best_last(*event)) {
-            after = after.changed(world, event);
+        let (mut after, mut left) = (state.clone(), *coming);
+        for event in 0..world.events.len() {
+            if coming.must & (1 << event) != 0 && world.is_best_last(event) {
+                after = after.changed(world, event);
+                left = left.without(event);
+            }
         }
-        let all_happened = after.happened & pending == *pending;
+        let all_happened = left.must == 0;
         let is_due = |phase: Phase| matches!(phase, Phase::Due(_));
         if all_happened && !after.running.iter().any(|running| is_due(running.phase)) {
             choices.push(vec![(1.0, vec![self.pass(after)])]);
@@ -198,21 +231,17 @@ impl Cell<'_> {
     }
 
     /// An action starts, which may end in the very cell.
-    fn start(&mut self, state: &State, pending: u32, act: usize) -> Choice {
+    fn start(&mut self, state: &State, coming: Coming, act: usize) -> Choice {
         let world = self.bound.world;
-        let (well, badly) = match world.acts[act].rest {
-            Some(_) => self.bound.chances.ends[act][0],
-            None => (0.0, 0.0),
+        let ways: Vec<_> = match world.acts[act].rest {
+            Some(_) => self.bound.chances.ends[act][0].ways().collect(),
+            None => vec![(1.0, None)],
         };
-        let ways = [
-            (well, Phase::Ready(true)),
-            (badly, Phase::Ready(false)),
-            (1.0 - well - badly, Phase::Goes),
-        ];
         let mut choice = Choice::new();
-        for (p, phase) in ways.into_iter().filter(|(p, _)| *p > 0.0) {
+        for (p, ending) in ways.into_iter().filter(|(p, _)| *p > 0.0) {
+            let phase = ending.map_or(Phase::Goes, Phase::Ready);
             let after = state.started(world, act, self.number, phase);
-            choice.push((p, vec![self.target((after, pending))]));
+            choice.push((p, vec![self.target((after, coming))]));
         }
         choice
     }
@@ -220,8 +249,8 @@ impl Cell<'_> {
     fn pass(&mut self, mut state: State) -> Target {
         let world = self.bound.world;
         for running in &mut state.running {
-            if let Phase::Ready(is_well) = running.phase {
-                running.phase = Phase::Due(is_well);
+            if let Phase::Ready(ending) = running.phase {
+                running.phase = Phase::Due(ending);
             }
         }
         if !state.is_hopeful(world, self.hopes) {
@@ -234,24 +263,24 @@ impl Cell<'_> {
 /// What is best done at once.
 fn forced(world: &TimedWorld, mut moment: Moment) -> Moment {
     loop {
-        let (state, pending) = &moment;
+        let (state, coming) = &moment;
         let event = (0..world.events.len())
-            .find(|event| pending & (1 << event) != 0 && world.is_best_at_once(*event));
+            .find(|event| coming.must & (1 << event) != 0 && world.is_best_at_once(*event));
         let end = || {
             let mut running = state.running.iter().enumerate();
             running.find_map(|(place, running)| {
-                let (Phase::Ready(is_well) | Phase::Due(is_well)) = running.phase else {
+                let (Phase::Ready(ending) | Phase::Due(ending)) = running.phase else {
                     return None;
                 };
                 let act = usize::from(running.act);
-                let is_best = world.ends_best_at_once(act, is_well, state.facts);
-                is_best.then_some((place, is_well))
+                let is_best = world.ends_best_at_once(act, ending, state.facts);
+                is_best.then_some((place, ending))
             })
         };
         moment = if let Some(event) = event {
-            (state.changed(world, event), pending & !(1 << event))
-        } else if let Some((place, is_well)) = end() {
-            (state.ended(world, place, is_well), *pending)
+            (state.changed(world, event), coming.without(event))
+        } else if let Some((place, ending)) = end() {
+            (state.ended(world, place, ending), *coming)
         } else {
             return moment;
         };

@@ -4,6 +4,7 @@
 use indexmap::IndexSet;
 
 use super::chances::Chances;
+use super::failures::Ending;
 use super::graph::{Choice, Expansion, Hopes, Nodes, Phase, State, Target};
 use super::world::TimedWorld;
 
@@ -19,9 +20,11 @@ pub(super) struct Below<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Happening {
     /// An action ends, well or badly.
-    End(u8, bool),
+    End(u8, Ending),
     /// An event.
     Event(usize),
+    /// An event that happens several times, with whatever in between.
+    Often,
 }
 
 /// Something that the agent can do at a boundary.
@@ -45,7 +48,8 @@ pub(super) fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
     let running = state.running.iter().enumerate();
     let cancelled = running.filter_map(|(place, running)| {
         let act = &world.acts[usize::from(running.act)];
-        act.may_be_cancelled.then_some(Move::Cancel(place))
+        // Whether one that may hold things up can still be let go, nobody knows.
+        (act.may_be_cancelled && !act.may_hold_up()).then_some(Move::Cancel(place))
     });
     let started = startable.into_iter().map(Move::Start);
     cancelled.chain(started).chain([Move::Wait]).collect()
@@ -83,17 +87,28 @@ impl<'a> Below<'a> {
         };
         for running in &state.running {
             let age = cell - usize::from(running.since);
-            let (well, badly) = self.chances.ends[usize::from(running.act)][age];
-            split(&[
-                (well, Some(Happening::End(running.act, true))),
-                (badly, Some(Happening::End(running.act, false))),
-                (1.0 - well - badly, None),
-            ]);
+            let ends = &self.chances.ends[usize::from(running.act)][age];
+            let ways = ends.ways().map(|(p, ending)| {
+                let end = ending.map(|ending| Happening::End(running.act, ending));
+                (p, end)
+            });
+            split(&ways.collect::<Vec<_>>());
         }
         for (event, hazards) in self.chances.events.iter().enumerate() {
             if state.happened & (1 << event) == 0 {
                 let p = hazards[cell];
-                split(&[(p, Some(Happening::Event(event))), (1.0 - p, None)]);
+                // Where more facts are never worse, harm that comes both before and after all else
+                // is the worst that any number of times can do, and of gifts one is the least.
+                let often = if self.world.is_monotone {
+                    0.0
+                } else {
+                    p * self.chances.again[event][cell]
+                };
+                split(&[
+                    (p - often, Some(Happening::Event(event))),
+                    (often, Some(Happening::Often)),
+                    (1.0 - p, None),
+                ]);
             }
         }
         all
@@ -102,6 +117,9 @@ impl<'a> Below<'a> {
     /// What a state may be after all of these, in whatever order; `None` if that is too much.
     fn outcomes(&self, state: &State, happenings: &[Happening]) -> Option<Vec<State>> {
         let world = self.world;
+        if happenings.contains(&Happening::Often) {
+            return None;
+        }
         if !world.is_monotone {
             return (happenings.len() <= MOST_ORDERED).then(|| {
                 let mut outcomes = IndexSet::new();
@@ -113,7 +131,7 @@ impl<'a> Below<'a> {
         // else.
         let is_harm = |happening: &Happening| match happening {
             Happening::Event(event) => world.events[*event].is_harmful(),
-            Happening::End(..) => false,
+            Happening::End(..) | Happening::Often => false,
         };
         let (harm, rest): (Vec<_>, Vec<_>) = happenings.iter().copied().partition(is_harm);
         if rest.len() > MOST_ORDERED {
@@ -150,9 +168,11 @@ impl<'a> Below<'a> {
     fn after(&self, state: &State, happening: Happening) -> State {
         match happening {
             Happening::Event(event) => state.changed(self.world, event),
-            Happening::End(act, is_well) => {
+            // Such a cell is given up, whatever comes of it.
+            Happening::Often => state.clone(),
+            Happening::End(act, ending) => {
                 match state.running.iter().position(|running| running.act == act) {
-                    Some(place) => state.ended(self.world, place, is_well),
+                    Some(place) => state.ended(self.world, place, ending),
                     None => state.clone(),
                 }
             }
@@ -166,24 +186,37 @@ impl Expansion for Below<'_> {
     }
 
     fn initial(&self) -> Vec<(f64, State)> {
-        let state = State::initial(self.world);
-        let mut states = vec![(1.0, state)];
+        let events = &self.world.events;
+        // With the events that have happened: nobody knows in which order.
+        let mut states = vec![(1.0, State::initial(self.world), Vec::<usize>::new())];
         for (event, p) in self.chances.before.iter().enumerate() {
-            if *p > 0.0 {
-                let happened = states
-                    .iter()
-                    .map(|(weight, state)| (weight * p, state.changed(self.world, event)));
-                let happened: Vec<_> = happened.collect();
-                let not = states
-                    .into_iter()
-                    .map(|(weight, state)| (weight * (1.0 - p), state));
-                states = not
-                    .chain(happened)
-                    .filter(|(weight, _)| *weight > 0.0)
-                    .collect();
+            if *p <= 0.0 {
+                continue;
             }
+            let clashes = |other: &usize| {
+                let (own, other) = (&events[event], &events[*other]);
+                let is_opposed = own.adds & other.deletes | own.deletes & other.adds != 0;
+                is_opposed && (own.is_recurrent() || other.is_recurrent())
+            };
+            // Where the order matters, it is given up.
+            let able = states
+                .iter()
+                .filter(|(_, _, with)| !with.iter().any(clashes));
+            let happened = able.map(|(weight, state, with)| {
+                let with = with.iter().copied().chain([event]).collect();
+                (weight * p, state.changed(self.world, event), with)
+            });
+            let happened: Vec<_> = happened.collect();
+            let not = states
+                .into_iter()
+                .map(|(weight, state, with)| (weight * (1.0 - p), state, with));
+            states = not
+                .chain(happened)
+                .filter(|(weight, _, _)| *weight > 0.0)
+                .collect();
         }
-        states
+        let states = states.into_iter();
+        states.map(|(weight, state, _)| (weight, state)).collect()
     }
 
     fn expand(
@@ -208,14 +241,14 @@ impl Expansion for Below<'_> {
     }
 
     fn last(&self, state: &State) -> f64 {
-        f64::from(u8::from(self.world.goal.hold(state.facts)))
+        f64::from(u8::from(state.is_won(self.world)))
     }
 }
 
 impl Cell<'_> {
     fn target(&mut self, state: State) -> Target {
         let world = self.bound.world;
-        if world.goal.hold(state.facts) {
+        if state.is_won(world) {
             return Target::Won;
         }
         if !state.is_hopeful(world, self.hopes) {
@@ -226,7 +259,7 @@ impl Cell<'_> {
 
     fn choices(&mut self, state: &State) -> Vec<Choice> {
         let world = self.bound.world;
-        if world.goal.hold(state.facts) {
+        if state.is_won(world) {
             return vec![vec![(1.0, vec![Target::Won])]];
         }
         if !state.is_hopeful(world, self.hopes) {
@@ -260,7 +293,7 @@ impl Cell<'_> {
         for (p, happenings) in self.bound.happenings(self.number, state) {
             let outcomes = self.bound.outcomes(state, &happenings).unwrap_or_default();
             let targets = outcomes.into_iter().map(|outcome| {
-                if world.goal.hold(outcome.facts) {
+                if outcome.is_won(world) {
                     Target::Won
                 } else if outcome.is_hopeful(world, self.hopes) {
                     Target::Next(self.next.insert_full(outcome).0)

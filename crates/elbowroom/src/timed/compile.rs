@@ -10,9 +10,9 @@ use elbowroom_model::problem::{self, Comparison, TimedChange, TimedInitial};
 use elbowroom_model::reachability::{self, Answer};
 use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
-use elbowroom_sim::{Distribution, ExogenousChange, Failure, WorldModel};
+use elbowroom_sim::{Becoming, Distribution, ExogenousChange, Failure, WorldModel};
 
-use super::world::{Act, Event, Facts, Needs, Snap};
+use super::world::{Act, Event, Facts, Needs, Occurs, Snap};
 use super::{NotTabulated, Settings};
 
 /// All actions that can start, whatever happens by itself, or those that are asked for. One that
@@ -39,6 +39,24 @@ pub(super) fn actions(
             });
         }
     }
+    for (name, hazard) in model.hazardous(task.problem()) {
+        let Some(fact) = task.fact_named(&name) else {
+            continue;
+        };
+        let (predicate, objects) = task.atom(fact);
+        let mut add = |change| {
+            problem.timed.push(TimedInitial {
+                time: Rational::ONE,
+                change,
+            });
+        };
+        if hazard.becomes_true > 0.0 {
+            add(TimedChange::Add(predicate, objects.clone()));
+        }
+        if hazard.becomes_false > 0.0 {
+            add(TimedChange::Delete(predicate, objects));
+        }
+    }
     for schema in &mut problem.schemas {
         if let problem::Body::Durative {
             over_all, at_end, ..
@@ -48,7 +66,41 @@ pub(super) fn actions(
             *at_end = problem::Condition::TRUE;
         }
     }
-    let wider = Task::new(problem);
+    // What failures leave behind may be what other actions need.
+    let mut left: BTreeSet<(FactId, bool)> = BTreeSet::new();
+    loop {
+        let actions = grounded(task, &problem, settings)?;
+        let mut is_news = false;
+        for action in &actions {
+            for (fact, truth) in left_by_failures(task, model, &action.name) {
+                if left.insert((fact, truth)) {
+                    is_news = true;
+                    let (predicate, objects) = task.atom(fact);
+                    let change = if truth {
+                        TimedChange::Add
+                    } else {
+                        TimedChange::Delete
+                    };
+                    problem.timed.push(TimedInitial {
+                        time: Rational::ONE,
+                        change: change(predicate, objects),
+                    });
+                }
+            }
+        }
+        if !is_news {
+            return Ok(actions);
+        }
+    }
+}
+
+/// The actions of a task that can start if the problem is this one.
+fn grounded(
+    task: &Task,
+    problem: &problem::Problem,
+    settings: &Settings,
+) -> Result<Vec<Action>, NotTabulated> {
+    let wider = Task::new(problem.clone());
     let Answer::Complete(grounding) =
         reachability::ground(&wider, &reachability::Settings::default())
     else {
@@ -73,22 +125,47 @@ pub(super) fn actions(
     Ok(actions)
 }
 
-/// The facts on which the goal depends, through whatever actions.
-pub(super) fn relevant(actions: &[Action], goal: &Condition) -> Vec<FactId> {
+/// The facts that failures of an action may change, and what they become.
+fn left_by_failures(task: &Task, model: &WorldModel, action: &str) -> Vec<(FactId, bool)> {
+    let outcomes = model.failing(action).into_iter();
+    let changes = outcomes
+        .flat_map(|failing| &failing.outcomes)
+        .flat_map(|outcome| &outcome.changes);
+    let facts = changes.filter_map(|change| match change.becomes {
+        Becoming::Truth(truth) => Some((task.fact_named(&change.what.of(action))?, truth)),
+        Becoming::Value(_) | Becoming::Grown(_) => None,
+    });
+    facts.collect()
+}
+
+/// The facts on which the goal depends, through whatever actions and their failures.
+pub(super) fn relevant(
+    task: &Task,
+    model: &WorldModel,
+    actions: &[Action],
+    goal: &Condition,
+) -> Vec<FactId> {
+    let left: Vec<Vec<FactId>> = actions
+        .iter()
+        .map(|action| {
+            let left = left_by_failures(task, model, &action.name);
+            left.into_iter().map(|(fact, _)| fact).collect()
+        })
+        .collect();
     let mut facts = BTreeSet::new();
     goal.visit_facts(&mut |fact| {
         facts.insert(fact);
     });
     loop {
         let before = facts.len();
-        for action in actions {
+        for (action, left) in actions.iter().zip(&left) {
             let snaps = snaps(action);
             let mut effects = snaps.iter().flat_map(|snap| &snap.effects);
             let matters = effects.any(|effect| match &effect.change {
                 Change::Add(fact) | Change::Delete(fact) => facts.contains(fact),
                 Change::Update { .. } => false,
             });
-            if matters {
+            if matters || left.iter().any(|fact| facts.contains(fact)) {
                 let mut insert = |fact| {
                     facts.insert(fact);
                 };
@@ -205,16 +282,15 @@ impl Compiler<'_> {
                 (self.snap(&body.start, name)?, Some(rest), planned)
             }
         };
-        if model.failing(name).is_some_and(|it| it.is_undone) && start.adds != 0 {
-            return refuse("a start that makes something true and is undone by a failure");
-        }
+        let failures = self.failures(name, model, &start, rest.is_some())?;
         let end = rest.as_ref().map_or(0, |(_, end)| end.adds | end.deletes);
-        if start.adds | start.deletes | end == 0 {
+        let failed = failures.iter();
+        let failed = failed.fold(0, |all, failed| all | failed.adds | failed.deletes);
+        if start.adds | start.deletes | end | failed == 0 {
             return Ok(None);
         }
-        let (mut midway, mut at_end, mut is_undone) = (0.0, 0.0, false);
+        let (mut midway, mut at_end) = (0.0, 0.0);
         if let Some(failing) = model.failing(name) {
-            is_undone = failing.is_undone;
             let is_at_start = failing.when == Failure::AtStart || rest.is_none();
             match failing.when {
                 _ if is_at_start && failing.probability >= 1.0 => return Ok(None),
@@ -232,7 +308,7 @@ impl Compiler<'_> {
             planned,
             midway,
             at_end,
-            is_undone,
+            failures,
             may_be_cancelled: true,
             is_eager: false,
         }))
@@ -261,8 +337,10 @@ impl Compiler<'_> {
             events.push(Event {
                 adds: if *truth { bit } else { 0 },
                 deletes: if *truth { 0 } else { bit },
-                probability: exogenous.probability,
-                time: exogenous.time.clone(),
+                occurs: Occurs::Once {
+                    probability: exogenous.probability,
+                    time: exogenous.time.clone(),
+                },
             });
         }
         let goal = Footprint::of_condition(self.task, self.task.goal());
@@ -288,11 +366,33 @@ impl Compiler<'_> {
             events.push(Event {
                 adds,
                 deletes: deletes & !adds,
-                probability: 1.0,
-                time: Distribution::Constant(timed.time.to_f64()).into(),
+                occurs: Occurs::Once {
+                    probability: 1.0,
+                    time: Distribution::Constant(timed.time.to_f64()).into(),
+                },
             });
         }
-        events.retain(|event| event.adds | event.deletes != 0 && event.probability > 0.0);
+        for fact in &self.facts {
+            let Some(hazard) = model.hazard(&self.task.fact_name(*fact)) else {
+                continue;
+            };
+            let bit = self.bit(*fact);
+            events.push(Event {
+                adds: bit,
+                deletes: 0,
+                occurs: Occurs::Rate(hazard.becomes_true),
+            });
+            events.push(Event {
+                adds: 0,
+                deletes: bit,
+                occurs: Occurs::Rate(hazard.becomes_false),
+            });
+        }
+        let ever = |event: &Event| match event.occurs {
+            Occurs::Once { probability, .. } => probability > 0.0,
+            Occurs::Rate(rate) => rate > 0.0,
+        };
+        events.retain(|event| event.adds | event.deletes != 0 && ever(event));
         Ok(events)
     }
 }

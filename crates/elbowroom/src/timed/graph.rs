@@ -3,13 +3,14 @@
 use indexmap::{IndexMap, IndexSet};
 
 use super::Stop;
+use super::failures::Ending;
 use super::world::{Facts, TimedWorld};
 
 /// A state at the beginning of a cell.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct State {
     pub(super) facts: Facts,
-    /// Which events have happened, as bits.
+    /// Which events have happened, as bits; not those that happen again and again.
     pub(super) happened: u32,
     /// Sorted by action.
     pub(super) running: Vec<Running>,
@@ -29,10 +30,10 @@ pub(super) struct Running {
 pub(super) enum Phase {
     /// Nothing yet.
     Goes,
-    /// It may end in this cell, or in the next one: well, or badly.
-    Ready(bool),
-    /// It ends in this cell: well, or badly.
-    Due(bool),
+    /// It may end in this cell, or in the next one.
+    Ready(Ending),
+    /// It ends in this cell.
+    Due(Ending),
 }
 
 /// Where something leads.
@@ -135,21 +136,26 @@ impl State {
         after
     }
 
+    /// Whether the goal is reached for good: it holds, and nothing is under way that nobody might be
+    /// able to let go, and that could spoil it.
+    pub(super) fn is_won(&self, world: &TimedWorld) -> bool {
+        let holds_up = |running: &Running| world.acts[usize::from(running.act)].may_hold_up();
+        world.goal.hold(self.facts) && !self.running.iter().any(holds_up)
+    }
+
     /// The action at that place in the list ends, well or badly. It fails, too, if what its end
-    /// needs does not hold; then nobody undoes what its start did, nor does anybody where it breaks
-    /// off.
-    pub(super) fn ended(&self, world: &TimedWorld, place: usize, well: bool) -> Self {
+    /// needs does not hold; then nothing is left behind or undone, nor is it where it breaks off.
+    pub(super) fn ended(&self, world: &TimedWorld, place: usize, ending: Ending) -> Self {
         let mut after = self.clone();
         let running = after.running.remove(place);
         let act = &world.acts[usize::from(running.act)];
-        if let Some((_, end)) = &act.rest
-            && well
+        if let Some(failed) = act.failed(ending) {
+            after.facts = failed.apply(after.facts);
+            after.settle(world);
+        } else if let Some((_, end)) = &act.rest
             && end.needs.hold(after.facts)
         {
             after.facts = end.apply(after.facts);
-            after.settle(world);
-        } else if !well && act.is_undone {
-            after.facts = act.start.undo(after.facts);
             after.settle(world);
         }
         after
@@ -158,7 +164,9 @@ impl State {
     /// An event happens.
     pub(super) fn changed(&self, world: &TimedWorld, event: usize) -> Self {
         let mut after = self.clone();
-        after.happened |= 1 << event;
+        if !world.events[event].is_recurrent() {
+            after.happened |= 1 << event;
+        }
         after.facts = world.events[event].apply(after.facts);
         after.settle(world);
         after

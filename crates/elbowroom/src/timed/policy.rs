@@ -115,7 +115,7 @@ impl Policy {
     fn values(&self, cell: usize, state: &State) -> Vec<(Move, f64)> {
         let world = &self.world;
         let mut hopes = Hopes::new();
-        if world.goal.hold(state.facts) || !state.is_hopeful(world, &mut hopes) {
+        if state.is_won(world) || !state.is_hopeful(world, &mut hopes) {
             return Vec::new();
         }
         let bound = Below::new(world, &self.chances);
@@ -161,8 +161,8 @@ impl Policy {
             (&self.step * &Rational::from(i64::try_from(standing.period).unwrap_or(0))).to_f64();
         let resolution = self.world.model.resolution.to_f64();
         let share = |event: &super::world::Event| {
-            let share = event.time.share(now, Part::UpTo, 0.0, resolution);
-            share.unwrap_or(0.0) * event.probability
+            let share = event.is_over_by(now, Part::UpTo, resolution);
+            share.unwrap_or(0.0)
         };
         let mut happened = 0_u32;
         for (index, event) in self.world.events.iter().enumerate() {
@@ -178,7 +178,7 @@ impl Policy {
             let events = self.world.events.iter().enumerate();
             let mut fitting = events.filter(|(index, event)| {
                 let changed = if *truth { event.adds } else { event.deletes };
-                happened & (1 << index) == 0 && changed & bit != 0
+                happened & (1 << index) == 0 && changed & bit != 0 && !event.is_recurrent()
             });
             if let Some((index, _)) = fitting.next() {
                 happened |= 1 << index;
@@ -195,12 +195,8 @@ impl Policy {
             let ends = &self.chances.ends[usize::from(running.act)];
             let is_alive = |since: u16| {
                 let age = cell.saturating_sub(usize::from(since));
-                ends.get(age)
-                    .is_some_and(|(well, badly)| well + badly > 0.0)
-                    || ends
-                        .iter()
-                        .skip(age)
-                        .any(|(well, badly)| well + badly > 0.0)
+                let mut later = ends.iter().skip(age);
+                later.any(|ends| ends.in_all() > 0.0)
             };
             let here = u16::try_from(cell).unwrap_or(u16::MAX);
             running.since = running.since.min(here);
@@ -238,13 +234,14 @@ impl Outlook for Policy {
         // Something may have happened that has changed nothing, and so was not seen.
         let events = self.world.events.iter().enumerate();
         let silent = events.fold(0_u32, |all, (index, event)| {
-            let is_so = event.adds & !facts == 0 && event.deletes & facts == 0;
+            let changes_nothing = event.adds & !facts == 0 && event.deletes & facts == 0;
+            let is_so = changes_nothing && !event.is_recurrent();
             all | (u32::from(is_so) << index)
         });
         let mut overdue = None;
         for happened in [happened, happened | silent] {
             let mut state = self.state(standing, facts, happened);
-            if self.world.goal.hold(state.facts) {
+            if state.is_won(&self.world) {
                 return Some(Weighed {
                     moves: vec![(Choice::Wait, 1.0)],
                     is_overdue: false,

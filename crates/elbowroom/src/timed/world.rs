@@ -8,6 +8,7 @@ use elbowroom_num::Rational;
 use elbowroom_sim::{Distribution, Rule, Side, WorldModel};
 
 use super::compile::{Compiler, actions, relevant};
+use super::failures::{Ending, Failed};
 use super::{NotTabulated, Settings};
 
 /// Which facts are true.
@@ -43,21 +44,29 @@ pub(crate) struct Act {
     pub(crate) midway: f64,
     /// P(it fails at its end), given that it starts.
     pub(crate) at_end: f64,
-    /// Whether what its start did is undone when it fails.
-    pub(crate) is_undone: bool,
+    /// How things may stand when it has failed; the shares add up to 1.
+    pub(crate) failures: Vec<Failed>,
     /// Whether it may do any good to cancel it.
     pub(crate) may_be_cancelled: bool,
     /// Whether nothing is ever better than to start it as soon as one can.
     pub(crate) is_eager: bool,
 }
 
-/// Something that happens by itself, at most once.
+/// Something that happens by itself.
 #[derive(Clone, Debug)]
 pub(crate) struct Event {
     pub(crate) adds: Facts,
     pub(crate) deletes: Facts,
-    pub(crate) probability: f64,
-    pub(crate) time: Rule,
+    pub(crate) occurs: Occurs,
+}
+
+/// How often something happens by itself.
+#[derive(Clone, Debug)]
+pub(crate) enum Occurs {
+    /// At most once: how likely, and when.
+    Once { probability: f64, time: Rule },
+    /// Again and again, so many times per second, whatever has been before.
+    Rate(f64),
 }
 
 /// See [`timed`](super).
@@ -98,11 +107,16 @@ impl TimedWorld {
                 "the world has events that it does not report",
             ));
         }
+        if model.hazards.iter().any(|hazard| !hazard.is_reported) {
+            return Err(NotTabulated::new(
+                "the world has facts that change at a rate and does not report it",
+            ));
+        }
         let actions = actions(task, model, settings)?;
         let goal = task.goal().clone();
         let compiler = Compiler {
             task,
-            facts: relevant(&actions, &goal),
+            facts: relevant(task, model, &actions, &goal),
         };
         if compiler.facts.len() > 128 {
             return Err(NotTabulated::new(format!(
@@ -132,7 +146,7 @@ impl TimedWorld {
         let initial = initial.fold(0, |facts, fact| facts | compiler.bit(*fact));
         let mut world = Self {
             facts: compiler.facts,
-            horizon: horizon(&events, model, settings)?,
+            horizon: latest(&events, model)?,
             is_monotone: !goal.has_negation() && !acts.iter().any(Act::has_negation),
             deletable: acts.iter().fold(0, |all, act| all | act.deletes())
                 | events.iter().fold(0, |all, event| all | event.deletes),
@@ -144,13 +158,16 @@ impl TimedWorld {
             initial,
             goal,
         };
+        world.horizon = world.end_of_runs(settings)?;
         if world.is_monotone {
             for act in &mut world.acts {
                 act.may_be_cancelled = act.may_gain_by_cancelling(model);
                 // It takes nothing away, and what it gives stays. Whoever starts it later could as
                 // well have it over earlier.
-                act.is_eager =
-                    act.ends_safely() && act.deletes() == 0 && act.adds() & world.deletable == 0;
+                act.is_eager = act.ends_safely()
+                    && !act.may_hold_up()
+                    && act.deletes() == 0
+                    && act.adds() & world.deletable == 0;
             }
         }
         Ok(world)
@@ -166,8 +183,8 @@ impl TimedWorld {
             }
         }
         for (index, act) in self.acts.iter().enumerate() {
-            if under_way & (1 << index) != 0 && act.is_undone {
-                facts |= act.start.deletes;
+            if under_way & (1 << index) != 0 {
+                facts |= act.adds_by_failing();
             }
         }
         loop {
@@ -178,7 +195,7 @@ impl TimedWorld {
             for (index, act) in self.acts.iter().enumerate() {
                 let can_start = act.start.needs.is_possible(facts);
                 if can_start {
-                    facts |= act.start.adds;
+                    facts |= act.start.adds | act.adds_by_failing();
                 }
                 if let Some((over_all, end)) = &act.rest
                     && (can_start || under_way & (1 << index) != 0)
@@ -218,17 +235,15 @@ impl TimedWorld {
     }
 
     /// Whether an action that is about to end, well or badly, had best do so at once.
-    pub(super) fn ends_best_at_once(&self, act: usize, is_well: bool, facts: Facts) -> bool {
+    pub(super) fn ends_best_at_once(&self, act: usize, ending: Ending, facts: Facts) -> bool {
         let act = &self.acts[act];
         let Some((_, end)) = &act.rest else {
             return false;
         };
-        let gives = match (is_well, act.is_undone) {
-            (true, _) => end.adds,
-            (false, true) => act.start.deletes,
-            (false, false) => 0,
+        let (gives, does_no_harm) = match act.failed(ending) {
+            None => (end.adds, act.ends_kindly() && end.needs.hold(facts)),
+            Some(failed) => (failed.adds, failed.deletes == 0),
         };
-        let does_no_harm = !is_well || (act.ends_kindly() && end.needs.hold(facts));
         self.is_monotone && does_no_harm && gives & self.deletable == 0
     }
 
@@ -298,16 +313,28 @@ impl Snap {
     }
 }
 
-impl Snap {
-    /// What it made false becomes true again; starts that make something true are not undone here.
-    pub(super) fn undo(&self, facts: Facts) -> Facts {
-        facts | self.deletes
-    }
-}
-
 impl Event {
     pub(super) fn apply(&self, facts: Facts) -> Facts {
         (facts & !self.deletes) | self.adds
+    }
+
+    /// Whether it happens again and again, so that nobody has to remember that it has.
+    pub(crate) fn is_recurrent(&self) -> bool {
+        matches!(self.occurs, Occurs::Rate(_))
+    }
+
+    /// How likely it is over at that time, in seconds; never for certain if it happens again.
+    pub(super) fn is_over_by(&self, time: f64, side: Side, resolution: f64) -> Option<f64> {
+        match &self.occurs {
+            Occurs::Once {
+                probability,
+                time: rule,
+            } => {
+                let share = rule.share(time, side, 0.0, resolution)?;
+                Some(share * probability)
+            }
+            Occurs::Rate(_) => Some(0.0),
+        }
     }
 
     /// Whether it only makes facts false.
@@ -326,17 +353,14 @@ impl Act {
 
     /// All that it may make true.
     fn adds(&self) -> Facts {
-        let undone = if self.is_undone {
-            self.start.deletes
-        } else {
-            0
-        };
-        self.start.adds | undone | self.rest.as_ref().map_or(0, |(_, end)| end.adds)
+        let end = self.rest.as_ref().map_or(0, |(_, end)| end.adds);
+        self.start.adds | self.adds_by_failing() | end
     }
 
     /// All that it may make false.
     fn deletes(&self) -> Facts {
-        self.start.deletes | self.rest.as_ref().map_or(0, |(_, end)| end.deletes)
+        let end = self.rest.as_ref().map_or(0, |(_, end)| end.deletes);
+        self.start.deletes | self.deletes_by_failing() | end
     }
 
     /// Whether its end deletes nothing that matters.
@@ -358,10 +382,12 @@ impl Act {
     }
 
     /// Whether there can be something in cancelling it where more facts are never worse: its end
-    /// may do harm, or who begins anew may be done earlier than who goes on.
+    /// may do harm, well or badly, or who begins anew may be done earlier than who goes on.
     fn may_gain_by_cancelling(&self, model: &WorldModel) -> bool {
         !self.ends_kindly()
             || !self.ends_safely()
+            || self.deletes_by_failing() != 0
+            || self.may_hold_up()
             || model
                 .duration_rule(&self.name)
                 .is_some_and(|rule| !is_fixed(rule))
@@ -372,17 +398,15 @@ fn is_fixed(rule: &Rule) -> bool {
     matches!(rule.distribution, Distribution::Constant(_))
 }
 
-/// When nothing more happens by itself.
-fn horizon(events: &[Event], model: &WorldModel, settings: &Settings) -> Result<f64, NotTabulated> {
-    if let Some(horizon) = &settings.horizon {
-        return Ok(horizon.to_f64());
-    }
+/// When all that happens at most once has happened, if it ever does.
+fn latest(events: &[Event], model: &WorldModel) -> Result<f64, NotTabulated> {
     let mut latest: f64 = 0.0;
     for event in events {
+        let Occurs::Once { time: rule, .. } = &event.occurs else {
+            continue;
+        };
         let beyond = |time: f64| {
-            let share = event
-                .time
-                .share(time, Side::UpTo, 0.0, model.resolution.to_f64());
+            let share = rule.share(time, Side::UpTo, 0.0, model.resolution.to_f64());
             share.map(|share| 1.0 - share)
         };
         let mut time: f64 = 1.0;
@@ -407,12 +431,52 @@ fn horizon(events: &[Event], model: &WorldModel, settings: &Settings) -> Result<
         let resolution = model.resolution.to_f64();
         latest = latest.max((late / resolution - 1e-6).ceil() * resolution);
     }
-    if latest <= 0.0 {
-        return Err(NotTabulated::new(
-            "nothing happens by itself, so there is nothing to be late for",
-        ));
-    }
     Ok(latest)
+}
+
+impl TimedWorld {
+    /// When a run ends at the latest: when it is asked to, or when nothing more happens by itself.
+    ///
+    /// Where facts change at a rate that is never, unless all hope is gone with the last of what
+    /// happens once. So there it is a time after which little is left to happen. Both bounds hold
+    /// whatever it is: who has not reached the goal by then counts as lost from below, and as
+    /// somebody who may yet reach it from above.
+    fn end_of_runs(&self, settings: &Settings) -> Result<f64, NotTabulated> {
+        if let Some(horizon) = &settings.horizon {
+            return Ok(horizon.to_f64());
+        }
+        let rates = self.events.iter().filter_map(|event| match event.occurs {
+            Occurs::Rate(rate) => Some(rate),
+            Occurs::Once { .. } => None,
+        });
+        let slowest = rates.fold(f64::INFINITY, f64::min);
+        if slowest.is_finite() && self.may_go_on() {
+            let planned = self.acts.iter().map(|act| act.planned.to_f64());
+            let all = planned.sum::<f64>().max(1.0);
+            return Ok((self.horizon + 2.0 * all + (7.0 / slowest).min(100.0 * all)).ceil());
+        }
+        if self.horizon <= 0.0 {
+            return Err(NotTabulated::new(
+                "nothing happens by itself, so there is nothing to be late for",
+            ));
+        }
+        Ok(self.horizon)
+    }
+
+    /// Whether there may be hope when all that happens at most once has happened.
+    fn may_go_on(&self) -> bool {
+        let mut gone = 0;
+        for event in &self.events {
+            if let Occurs::Once { probability, .. } = event.occurs
+                && probability >= 1.0
+            {
+                gone |= event.deletes & !self.addable;
+            }
+        }
+        let under_way = self.acts.iter().enumerate();
+        let under_way = under_way.fold(0, |all, (index, _)| all | 1 << index);
+        self.is_hopeful(!gone, under_way, u32::MAX)
+    }
 }
 
 pub(super) fn unknown_shape() -> NotTabulated {

@@ -19,15 +19,16 @@ const FACTS: usize = 4;
 /// A fact, and whether it must be true.
 type Literal = (usize, bool);
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct SmallWorld {
     actions: Vec<SmallAction>,
     events: Vec<SmallEvent>,
+    changes: Vec<SmallChange>,
     initial: u32,
     goal: Vec<usize>,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct SmallAction {
     start: Option<Literal>,
     over_all: Option<Literal>,
@@ -36,16 +37,110 @@ struct SmallAction {
     at_end: Literal,
     durations: Vec<u32>,
     fails: f64,
+    /// Whether a failure undoes what the start did.
+    is_undone: bool,
+    outcomes: Vec<SmallOutcome>,
 }
 
-#[derive(Debug)]
+/// What a failure leaves behind.
+#[derive(Clone, Debug)]
+struct SmallOutcome {
+    /// Of the failures.
+    share: f64,
+    changes: Vec<Literal>,
+    /// How much later it fails; nobody can let it go until then.
+    delay: u32,
+}
+
+/// One way in which an action may go: how likely that is, how long it takes until nothing but a
+/// failure can come of it or it ends, how long it is under way, and as what it ends.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    weight: f64,
+    lasts: u32,
+    over: u32,
+    ending: Ending,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Ending {
+    Well,
+    /// With that outcome, if any.
+    Badly(Option<usize>),
+}
+
+#[derive(Clone, Debug)]
 struct SmallEvent {
     change: Literal,
     times: Vec<u32>,
     probability: f64,
 }
 
+/// A fact that becomes so again and again, so many times a second. The world counts whole seconds.
+#[derive(Clone, Debug)]
+struct SmallChange {
+    change: Literal,
+    rate: f64,
+}
+
 impl SmallWorld {
+    /// The same kind of world, with facts that change at a rate; fewer actions and events, as there
+    /// are many orders.
+    pub(crate) fn with_rates(rng: &mut ChaCha8Rng, asks_for_less: bool) -> Self {
+        let mut world = Self::random(rng, asks_for_less);
+        world.actions.truncate(2);
+        world.events.truncate(1);
+        let count = rng.random_range(1..=2);
+        let changes = (0..count).map(|_| SmallChange {
+            change: (rng.random_range(0..FACTS), rng.random_bool(0.5)),
+            rate: if rng.random_bool(0.5) { 0.02 } else { 0.05 },
+        });
+        world.changes = changes.collect();
+        // One direction of a fact has one rate.
+        world.changes.sort_by_key(|change| change.change);
+        world.changes.dedup_by_key(|change| change.change);
+        world
+    }
+
+    /// The same kind of world, with failures that leave something behind and take time.
+    pub(crate) fn with_outcomes(rng: &mut ChaCha8Rng, asks_for_less: bool) -> Self {
+        let mut world = Self::random(rng, asks_for_less);
+        world.events.truncate(1);
+        for action in &mut world.actions {
+            action.fails = if rng.random_bool(0.7) { 0.5 } else { 0.0 };
+            action.is_undone = rng.random_bool(0.3);
+            let count = rng.random_range(0..=2);
+            let outcomes = (0..count).map(|_| {
+                let fact = rng.random_range(0..FACTS);
+                let mut changes = vec![(fact, rng.random_bool(0.5))];
+                if rng.random_bool(0.3) {
+                    changes.push(((fact + 1) % FACTS, rng.random_bool(0.5)));
+                }
+                SmallOutcome {
+                    share: if rng.random_bool(0.5) { 0.5 } else { 0.25 },
+                    changes,
+                    delay: if rng.random_bool(0.4) { 2 } else { 0 },
+                }
+            });
+            action.outcomes = outcomes.collect();
+        }
+        world
+    }
+
+    /// The same world, but that failures leave nothing behind.
+    #[allow(
+        dead_code,
+        reason = "one of the tests that share this compares with it"
+    )]
+    pub(crate) fn without_outcomes(&self) -> Self {
+        let mut plain = self.clone();
+        for action in &mut plain.actions {
+            action.is_undone = false;
+            action.outcomes.clear();
+        }
+        plain
+    }
+
     /// `asks_for_less`: conditions may ask for facts to be false, and ends may delete.
     pub(crate) fn random(rng: &mut ChaCha8Rng, asks_for_less: bool) -> Self {
         let literal = |rng: &mut ChaCha8Rng| {
@@ -72,6 +167,8 @@ impl SmallWorld {
             ),
             durations: even(rng),
             fails: if rng.random_bool(0.5) { 0.25 } else { 0.0 },
+            is_undone: false,
+            outcomes: Vec::new(),
         });
         let actions = actions.collect();
         let events = (0..2).map(|_| SmallEvent {
@@ -84,6 +181,7 @@ impl SmallWorld {
         Self {
             actions,
             events,
+            changes: Vec::new(),
             initial,
             goal: vec![rng.random_range(0..FACTS), rng.random_range(0..FACTS)],
         }
@@ -140,6 +238,21 @@ impl SmallWorld {
                 "[[failure]]\naction = \"a{index}\"\nprobability = {}",
                 action.fails
             );
+            if action.is_undone {
+                text += "undone = true\n";
+            }
+            for outcome in &action.outcomes {
+                let _ = writeln!(
+                    text,
+                    "[[failure.outcome]]\nprobability = {}\ndelay = {}",
+                    outcome.share, outcome.delay
+                );
+                for (word, truth) in [("true", true), ("false", false)] {
+                    let facts = outcome.changes.iter().filter(|change| change.1 == truth);
+                    let facts: Vec<String> = facts.map(|(fact, _)| format!("(f{fact})")).collect();
+                    let _ = writeln!(text, "becomes_{word} = {facts:?}");
+                }
+            }
         }
         for event in &self.events {
             let (fact, truth) = event.change;
@@ -148,6 +261,21 @@ impl SmallWorld {
                 "[[event]]\nfact = \"(f{fact})\"\nbecomes = {truth}\nvalues = {:?}\nprobability = {}",
                 event.times, event.probability
             );
+        }
+        if !self.changes.is_empty() {
+            text = text.replace("version = 1\n", "version = 1\nresolution = 1\n");
+        }
+        for fact in 0..FACTS {
+            let mut rates = String::new();
+            for (word, truth) in [("true", true), ("false", false)] {
+                let of = |change: &&SmallChange| change.change == (fact, truth);
+                if let Some(change) = self.changes.iter().find(of) {
+                    let _ = writeln!(rates, "becomes_{word}_per_second = {}", change.rate);
+                }
+            }
+            if !rates.is_empty() {
+                let _ = writeln!(text, "[[hazard]]\nfact = \"(f{fact})\"\n{rates}");
+            }
         }
         text
     }
@@ -162,12 +290,100 @@ impl SmallWorld {
             happened: 0,
             begun: 0,
         };
-        let value = |choice| self.value(&start, choice, &mut BTreeMap::new());
+        // What comes within half a second comes at once.
+        let value = |choice: Choice| {
+            let mut known = BTreeMap::new();
+            let begun = self.often(0.5).into_iter().map(|(p, changes)| {
+                let due: Vec<_> = changes
+                    .iter()
+                    .map(|it| (Happening::Change(*it), 1.0))
+                    .collect();
+                let values = orders(&due).into_iter().map(|order| {
+                    let mut all = vec![(1.0, start.clone())];
+                    for due in order {
+                        all = self.happen(all, due);
+                    }
+                    let values = all
+                        .iter()
+                        .map(|(p, after)| p * self.value(after, choice, &mut known));
+                    values.sum::<f64>()
+                });
+                p * values
+                    .reduce(choice)
+                    .expect("there is an order, if of nothing")
+            });
+            begun.sum()
+        };
         (value(f64::min), value(f64::max))
     }
 
+    /// Which changes come in so many seconds, as often as they do, with how likely that is; more
+    /// than twice is left out.
+    fn often(&self, seconds: f64) -> Vec<(f64, Vec<usize>)> {
+        let mut all = vec![(1.0, Vec::new())];
+        for (index, change) in self.changes.iter().enumerate() {
+            let mean = change.rate * seconds;
+            let counts = [1.0, mean, mean * mean / 2.0].map(|share| share * (-mean).exp());
+            let longer = all.iter().flat_map(|(weight, list)| {
+                counts.iter().enumerate().map(move |(times, p)| {
+                    let mut list: Vec<usize> = list.clone();
+                    list.extend(std::iter::repeat_n(index, times));
+                    (weight * p, list)
+                })
+            });
+            all = longer.collect();
+        }
+        all
+    }
+
+    /// The run is over when the goal holds and everything that is under way has been let go.
     fn is_won(&self, now: &Now) -> bool {
+        let holds_up = |action: &SmallAction| action.outcomes.iter().any(|it| it.delay > 0);
+        let mut running = now.running.iter();
         self.goal.iter().all(|fact| now.facts & (1 << fact) != 0)
+            && !running.any(|running| holds_up(&self.actions[running.action]))
+    }
+
+    /// All courses that an action may still take which has been under way for so long; as shares
+    /// they add up to 1.
+    fn courses(&self, running: Running, age: u32) -> Vec<Course> {
+        let action = &self.actions[running.action];
+        let mut all = Vec::new();
+        for &lasts in &action.durations {
+            let mut add = |weight: f64, delay: u32, ending| {
+                all.push(Course {
+                    weight,
+                    lasts,
+                    over: lasts + delay,
+                    ending,
+                });
+            };
+            add(1.0 - action.fails, 0, Ending::Well);
+            let mut plain = 1.0;
+            for (index, outcome) in action.outcomes.iter().enumerate() {
+                plain -= outcome.share;
+                let ending = Ending::Badly(Some(index));
+                add(action.fails * outcome.share, outcome.delay, ending);
+            }
+            add(action.fails * plain, 0, Ending::Badly(None));
+        }
+        all.retain(|course| course.weight > 0.0 && course.over >= age);
+        if let Some(found) = running.found_broken {
+            all.retain(|course| course.lasts <= found && course.over > found);
+        }
+        let sum: f64 = all.iter().map(|course| course.weight).sum();
+        for course in &mut all {
+            course.weight /= sum;
+        }
+        all
+    }
+
+    /// How likely nobody can let an action go.
+    fn is_broken(&self, running: Running, time: u32) -> f64 {
+        let age = time - running.since;
+        let courses = self.courses(running, age + 1).into_iter();
+        let broken = courses.filter(|course| course.lasts <= age);
+        broken.map(|course| course.weight).sum()
     }
 
     fn value(&self, now: &Now, choice: Choice, known: &mut BTreeMap<Now, f64>) -> f64 {
@@ -185,13 +401,36 @@ impl SmallWorld {
         for index in 0..self.actions.len() {
             let action = &self.actions[index];
             let mut after = now.clone();
-            if let Some(place) = now.running.iter().position(|(own, _)| *own == index) {
+            let mut running = now.running.iter();
+            if let Some(place) = running.position(|own| own.action == index) {
+                let own = now.running[place];
+                if own.found_broken.is_some() {
+                    continue;
+                }
+                let broken = self.is_broken(own, now.time);
+                after.running[place].found_broken = Some(now.time - own.since);
+                let kept = if broken > 0.0 {
+                    broken * self.value(&after, choice, known)
+                } else {
+                    0.0
+                };
                 after.running.remove(place);
+                let gone = if broken < 1.0 {
+                    (1.0 - broken) * self.value(&after, choice, known)
+                } else {
+                    0.0
+                };
+                best = best.max(kept + gone);
+                continue;
             } else if now.begun & (1 << index) == 0
                 && action.start.is_none_or(|it| holds(it, now.facts))
             {
                 after.begun |= 1 << index;
-                after.running.push((index, now.time));
+                after.running.push(Running {
+                    action: index,
+                    since: now.time,
+                    found_broken: None,
+                });
                 after.running.sort_unstable();
                 after.facts = action.at_start.map_or(now.facts, |it| set(it, now.facts));
                 self.break_off(&mut after);
@@ -207,12 +446,11 @@ impl SmallWorld {
     /// A second passes, and then happens what happens, in the order of that choice.
     fn wait(&self, now: &Now, choice: Choice, known: &mut BTreeMap<Now, f64>) -> f64 {
         let time = now.time + 1;
-        let ends = now.running.iter().map(|&(index, since)| {
-            let durations = &self.actions[index].durations;
-            let count = |of: &dyn Fn(u32) -> bool| durations.iter().filter(|it| of(**it)).count();
-            let age = time - since;
-            let due = share(count(&|it| it == age), count(&|it| it >= age));
-            (Happening::End(index), due)
+        let ends = now.running.iter().map(|&running| {
+            let courses = self.courses(running, time - running.since).into_iter();
+            let due = courses.filter(|course| course.over == time - running.since);
+            let due = due.map(|course| course.weight).sum();
+            (Happening::End(running), due)
         });
         let events = self.events.iter().enumerate();
         let events = events.filter(|(index, _)| now.happened & (1 << index) == 0);
@@ -230,39 +468,63 @@ impl SmallWorld {
             begun: 0,
             ..now.clone()
         };
-        let values = orders(&due).into_iter().map(|order| {
-            let all = order.iter().fold(vec![(1.0, after.clone())], |all, due| {
-                self.happen(all, *due)
+        let often = self.often(1.0).into_iter().map(|(p, changes)| {
+            let changes = changes.iter().map(|it| (Happening::Change(*it), 1.0));
+            let due: Vec<_> = due.iter().copied().chain(changes).collect();
+            let values = orders(&due).into_iter().map(|order| {
+                let all = order.iter().fold(vec![(1.0, after.clone())], |all, due| {
+                    self.happen(all, *due)
+                });
+                let values = all
+                    .iter()
+                    .map(|(p, after)| p * self.value(after, choice, known));
+                values.sum()
             });
-            let values = all
-                .iter()
-                .map(|(p, after)| p * self.value(after, choice, known));
-            values.sum()
+            p * values
+                .reduce(choice)
+                .expect("there is an order, if of nothing")
         });
-        values
-            .reduce(choice)
-            .expect("there is an order, if of nothing")
+        often.sum()
     }
 
     fn happen(&self, all: Vec<(f64, Now)>, (what, due): (Happening, f64)) -> Vec<(f64, Now)> {
         let is_won = |now: &Now| self.is_won(now);
         match what {
-            Happening::End(index) => {
-                let action = &self.actions[index];
-                let ways = [
-                    (due * (1.0 - action.fails), Some(true)),
-                    (due * action.fails, Some(false)),
-                    (1.0 - due, None),
-                ];
+            Happening::End(running) => {
+                let action = &self.actions[running.action];
+                let age = all.first().map_or(0, |(_, now)| now.time - running.since);
+                let courses = self.courses(running, age).into_iter();
+                let over = courses.filter(|course| course.over == age);
+                let mut ways: Vec<_> = over
+                    .map(|course| (course.weight, Some(course.ending)))
+                    .collect();
+                ways.push((1.0 - due, None));
                 let end = |after: &mut Now, way| {
-                    let (Some(is_well), Some(place)) =
-                        (way, after.running.iter().position(|it| it.0 == index))
+                    let is_it = |it: &Running| it.action == running.action;
+                    let (Some(ending), Some(place)) = (way, after.running.iter().position(is_it))
                     else {
                         return;
                     };
                     after.running.remove(place);
-                    if is_well && action.end.is_none_or(|it| holds(it, after.facts)) {
-                        after.facts = set(action.at_end, after.facts);
+                    let changes: Vec<Literal> = match ending {
+                        Ending::Well if action.end.is_none_or(|it| holds(it, after.facts)) => {
+                            vec![action.at_end]
+                        }
+                        Ending::Well => Vec::new(),
+                        Ending::Badly(outcome) => {
+                            let undone = action.at_start.filter(|_| action.is_undone);
+                            let undone = undone.map(|(fact, truth)| (fact, !truth));
+                            let left = outcome.map(|it| action.outcomes[it].changes.clone());
+                            undone
+                                .into_iter()
+                                .chain(left.into_iter().flatten())
+                                .collect()
+                        }
+                    };
+                    if !changes.is_empty() {
+                        for change in changes {
+                            after.facts = set(change, after.facts);
+                        }
                         self.break_off(after);
                     }
                 };
@@ -278,13 +540,20 @@ impl SmallWorld {
                 };
                 branch(all, &[(due, true), (1.0 - due, false)], change, is_won)
             }
+            Happening::Change(index) => {
+                let change = |after: &mut Now, ()| {
+                    after.facts = set(self.changes[index].change, after.facts);
+                    self.break_off(after);
+                };
+                branch(all, &[(1.0, ())], change, is_won)
+            }
         }
     }
 
     fn break_off(&self, now: &mut Now) {
         let facts = now.facts;
-        now.running.retain(|(index, _)| {
-            self.actions[*index]
+        now.running.retain(|running| {
+            self.actions[running.action]
                 .over_all
                 .is_none_or(|it| holds(it, facts))
         });
@@ -296,8 +565,17 @@ type Choice = fn(f64, f64) -> f64;
 
 #[derive(Clone, Copy, Debug)]
 enum Happening {
-    End(usize),
+    End(Running),
     Event(usize),
+    Change(usize),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Running {
+    action: usize,
+    since: u32,
+    /// How long it had been under way when somebody wanted to let it go and could not.
+    found_broken: Option<u32>,
 }
 
 /// All orders of those.
@@ -320,7 +598,7 @@ fn orders<T: Copy>(of: &[T]) -> Vec<Vec<T>> {
 struct Now {
     time: u32,
     facts: u32,
-    running: Vec<(usize, u32)>,
+    running: Vec<Running>,
     happened: u32,
     /// What began at this very time, as bits: nothing begins twice.
     begun: u32,

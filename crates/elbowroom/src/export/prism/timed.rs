@@ -9,7 +9,7 @@ use elbowroom_sim::WorldModel;
 use super::formula::{Formula, choice, exact};
 use super::{PrismError, bare, checked};
 use crate::export::names::distinct;
-use crate::timed::{Act, Chances, Facts, Needs, Settings, Side, TimedWorld, chances};
+use crate::timed::{Act, Chances, Ends, Event, Facts, Needs, Settings, Side, TimedWorld, chances};
 
 /// From where the best value is bounded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +43,14 @@ pub fn timed(
         return Err(PrismError::Cells { cells });
     }
     let world = TimedWorld::new(task, model, settings)?;
+    if world.events.iter().any(Event::is_recurrent) {
+        return Err(PrismError::Rates);
+    }
+    let has_outcomes =
+        |act: &Act| act.failures.len() > 1 || act.failures.iter().any(|way| way.delay > 0.0);
+    if world.acts.iter().any(has_outcomes) {
+        return Err(PrismError::Outcomes);
+    }
     let side = match bound {
         Bound::Lower => Side::Below,
         Bound::Upper => Side::Above,
@@ -71,6 +79,12 @@ struct Process<'p> {
     bound: Bound,
     facts: Vec<String>,
     acts: Vec<String>,
+}
+
+/// What its failure makes true and false, if it can fail in one way only.
+fn fails(act: &Act) -> (Facts, Facts) {
+    let way = act.failures.first();
+    way.map_or((0, 0), |way| (way.adds, way.deletes))
 }
 
 /// Something that takes place at one moment.
@@ -200,8 +214,7 @@ impl Process<'_> {
                 all.push(ended("miss", lacks, (0, 0), Some(true), agents));
             }
             if act.midway > 0.0 || act.at_end > 0.0 {
-                let undone = if act.is_undone { act.start.deletes } else { 0 };
-                let effects = (undone, 0);
+                let effects = fails(act);
                 all.push(ended("fail", Formula::TRUE, effects, Some(false), agents));
             }
             all.push(ended("cancel", Formula::TRUE, (0, 0), None, true));
@@ -314,9 +327,8 @@ impl Process<'_> {
             hope(can_start.clone(), act.start.adds);
             if let Some((over_all, end)) = &act.rest {
                 let goes = Formula::atom(format!("a_{name}>0"));
-                if act.is_undone {
-                    hope(goes.clone(), act.start.deletes);
-                }
+                let either = [can_start.clone(), goes.clone()];
+                hope(Formula::any(either), fails(act).0);
                 let begun = Formula::any([can_start, goes]);
                 let needs = [self.may_hold(over_all), self.may_hold(&end.needs)];
                 hope(Formula::all([begun].into_iter().chain(needs)), end.adds);
@@ -378,7 +390,7 @@ impl Process<'_> {
         let ends = format!("o_{}", self.acts[act]);
         let hazards: Vec<String> = self.chances.ends[act]
             .iter()
-            .map(|hazard| choice(&ends_of(&ends, *hazard, "true")))
+            .map(|hazard| choice(&ends_of(&ends, hazard, "true")))
             .collect();
         for (from, to) in runs(&hazards) {
             let _ = writeln!(
@@ -422,7 +434,7 @@ impl Process<'_> {
                     Bound::Lower => begins,
                     // It may end in the very cell.
                     Bound::Upper => {
-                        let ways = ends_of(&ends, self.chances.ends[act][0], "");
+                        let ways = ends_of(&ends, &self.chances.ends[act][0], "");
                         let ways = ways.map(|(p, end)| match end.as_str() {
                             "" => (p, begins.clone()),
                             // Unless it breaks off at once.
@@ -590,8 +602,8 @@ impl Process<'_> {
 }
 
 /// The ways in which an action under way may end, with `otherwise` for that it does not.
-fn ends_of(name: &str, (well, badly): (f64, f64), otherwise: &str) -> [(Rational, String); 3] {
-    let (well, badly) = (exact(well), exact(badly));
+fn ends_of(name: &str, hazard: &Ends, otherwise: &str) -> [(Rational, String); 3] {
+    let (well, badly) = (exact(hazard.well), exact(hazard.badly()));
     let rest = &(&Rational::ONE - &well) - &badly;
     // What rounding has left over goes to the likelier one.
     let is_over = rest.to_f64() < 1e-12;

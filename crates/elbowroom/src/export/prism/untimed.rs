@@ -84,6 +84,9 @@ impl<'p> Process<'p> {
         likelihoods: &'p Likelihoods,
         settings: &'p Settings,
     ) -> Result<Self, PrismError> {
+        if model.has_rates() {
+            return Err(PrismError::Seconds);
+        }
         let model = Arc::new(model);
         let instances = model.plan().instances();
         let actions: Vec<(InstanceId, Action)> = instances

@@ -1,0 +1,90 @@
+//! What choosing the first plan by its probability is worth, in the worlds of `experiments`.
+//!
+//! `ELBOWROOM_TRIALS=2000` makes that many trials of each world, and the table is printed
+//! (`--nocapture`); `ELBOWROOM_WORLDS="clumsy vase"` names other ones.
+
+#![allow(clippy::print_stdout, reason = "the table is worth seeing")]
+
+use elbowroom::execute::FirstPlan;
+use elbowroom_laboratory::compare::{Experiment, Part, Results, run};
+use elbowroom_pddl::Source;
+
+fn experiment(name: &str, first_plan: FirstPlan) -> Experiment {
+    let folder = format!("{}/../../experiments", env!("CARGO_MANIFEST_DIR"));
+    let file = |path: &str| {
+        std::fs::read_to_string(format!("{folder}/{path}")).map_err(|error| error.to_string())
+    };
+    let text = file(&format!("{name}.toml")).expect("it is there");
+    let read = Experiment::read(Source::new(name, text.as_str()), &file);
+    Experiment {
+        first_plan,
+        optimum: false,
+        clairvoyant: false,
+        ..read.expect("it is an experiment")
+    }
+}
+
+fn results(experiment: &Experiment, jobs: usize, trials: u64) -> Results {
+    let part = Part {
+        trials,
+        shard: 0,
+        shards: 1,
+        jobs,
+    };
+    run(experiment, part, &|_| true).expect("it runs")
+}
+
+fn only(experiment: Experiment, executors: &[&str]) -> Experiment {
+    let executors = executors.iter().map(|name| name.parse().expect("a name"));
+    Experiment {
+        executors: executors.collect(),
+        ..experiment
+    }
+}
+
+#[test]
+fn likelier_first_plans_lose_nothing_to_the_shortest_and_gain_much_where_these_fail() {
+    let told = std::env::var("ELBOWROOM_TRIALS").ok();
+    let trials: u64 = told.map_or(200, |told| told.parse().expect("a number of trials"));
+    let worlds = std::env::var("ELBOWROOM_WORLDS").ok();
+    let worlds = worlds.unwrap_or_else(|| "counter weld detour rendezvous door".to_owned());
+    for name in worlds.split_whitespace() {
+        let all = |first_plan| {
+            let read = experiment(name, first_plan);
+            let executors: Vec<String> = read.executors.iter().map(ToString::to_string).collect();
+            // The policy's table takes long, and no plan decides what it does.
+            let named: Vec<&str> = executors.iter().map(String::as_str).collect();
+            let named: Vec<&str> = named.into_iter().filter(|it| *it != "policy").collect();
+            only(read, &named)
+        };
+        let (shortest, likeliest) = (all(FirstPlan::Shortest), all(FirstPlan::Likeliest));
+        let before = results(&shortest, 2, trials);
+        let after = results(&likeliest, 2, trials);
+        for (row, executor) in shortest.executors.iter().enumerate() {
+            for (column, place) in shortest.columns.iter().enumerate() {
+                let [before, after] =
+                    [&before, &after].map(|results| results.cells[row][column].successes);
+                println!(
+                    "{name} {}: {executor} {before} {after} of {trials}",
+                    place.name
+                );
+                #[allow(clippy::cast_precision_loss, reason = "there are few trials")]
+                let (lost, all) = (before as f64 - after as f64, trials as f64);
+                // The samples of the choice are not those of the trials: three points, and three
+                // standard errors of a difference.
+                let doubt = 0.03 * all + 3.0 * (all * 0.25).sqrt();
+                assert!(lost <= doubt, "{name}: {executor} {before} to {after}");
+                if ["counter", "weld"].contains(&name) && executor.to_string() == "live" {
+                    assert!(-lost > 0.2 * all, "{name}: {executor} {before} to {after}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn choices_do_not_depend_on_the_number_of_threads() {
+    let read = only(experiment("weld", FirstPlan::Likeliest), &["live", "stn"]);
+    let (one, many) = (results(&read, 1, 12), results(&read, 5, 12));
+    assert_eq!(one.cells, many.cells);
+}
