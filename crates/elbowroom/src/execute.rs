@@ -5,25 +5,36 @@
 //! whoever decides, plans, prepares and records.
 
 mod analyst;
+mod candidates;
 mod execution;
 mod external;
 mod facts_only;
+mod first_plan;
 mod likeliest;
 mod memory;
 mod planners;
+mod race;
 pub mod rewrite;
+mod rollouts;
 mod spec;
 mod spoiling;
 mod vary;
 
 pub use analyst::{Analyst, WholeRegion};
+pub use candidates::{Candidate, Candidates, Limits, Pace};
 pub use execution::{Execution, Listener, execute, read_goal};
 pub use external::External;
 pub(crate) use facts_only::as_timed;
+pub(crate) use first_plan::renumbered;
+pub use first_plan::{Choice, Chooser, Choosing, FirstPlan, Known, UnknownFirstPlan, Value};
 pub use likeliest::{Likeliest, SharedLikeliest};
 pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use planners::{Clockless, Embedded};
+pub(crate) use race::is_behind;
+pub use rollouts::{Replanning, Rollouts, Tryout};
 pub(crate) use spec::listed;
-pub use spec::{EMBEDDED, NOBODY, NamedText, RunSpec, SpecError, Spoiler, SpoilerError};
+pub use spec::{
+    EMBEDDED, FirstPlanError, NOBODY, NamedText, RunSpec, SpecError, Spoiler, SpoilerError,
+};
 pub use spoiling::Spoiling;
 pub use vary::check_vary;

@@ -139,6 +139,11 @@ impl ExecutorSpec {
         self.asks_outlook() || (self.registered.is_optional && self.argument.is_some())
     }
 
+    /// Whether the executor chooses the likeliest order of a plan's actions.
+    pub fn reorders(&self) -> bool {
+        [adaptable::REGISTERED.name, lookahead::REGISTERED.name].contains(&self.registered.name)
+    }
+
     /// Whether the executor weighs each move, if somebody can tell it what it is worth.
     pub fn asks_outlook(&self) -> bool {
         self.registered.name == policy::REGISTERED.name

@@ -42,6 +42,19 @@ pub struct Planned {
     pub answer: PlanAnswer,
     /// The planning time in seconds, if it was measured.
     pub seconds: Option<Rational>,
+    /// What there is to say about the plan, for people: why it and not another one.
+    pub remark: Option<String>,
+}
+
+impl From<PlanAnswer> for Planned {
+    /// Without a clock, and nothing to say about it.
+    fn from(answer: PlanAnswer) -> Self {
+        Self {
+            answer,
+            seconds: None,
+            remark: None,
+        }
+    }
 }
 
 /// A planner's answer.
@@ -64,11 +77,8 @@ pub struct NoPlanner;
 
 impl Planner for NoPlanner {
     fn plan(&mut self, _task: &Task, _situation: &Situation) -> Planned {
-        Planned {
-            answer: PlanAnswer::NotFound {
-                why: "there is no planner in this run".to_owned(),
-            },
-            seconds: None,
-        }
+        Planned::from(PlanAnswer::NotFound {
+            why: "there is no planner in this run".to_owned(),
+        })
     }
 }

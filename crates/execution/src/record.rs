@@ -98,6 +98,8 @@ pub enum Entry<'a> {
         why_not: Option<&'a str>,
         /// Whether it is certain that there is none.
         is_unsolvable: bool,
+        /// What the planner has to say about it.
+        remark: Option<&'a str>,
     },
     /// An action has used most of the time that the plan can bear.
     Warning {

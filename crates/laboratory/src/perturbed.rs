@@ -186,6 +186,12 @@ impl<'e> Setting<'e> {
             &task,
         )
         .map_err(PerturbedError::Text)?;
+        if likelihoods.has_rates() {
+            return Err(wrong(
+                &"the likelihoods have rates per second, and a perturbed world has steps and no \
+                  seconds: give `becomes_true` and `becomes_false` instead",
+            ));
+        }
         let chances = Chances::new(&task, &actions, &likelihoods).map_err(|error| wrong(&error))?;
         let perturbed = match &experiment.perturbation {
             Some(names) => Some(names.find(&task)?.facts(&task, &chances)),

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_envelope::obligations::Refusal;
-use elbowroom_envelope::{BestSettings, Guarantee, Oracle, best, irr};
+use elbowroom_envelope::{BestSettings, Guarantee, Objective, Oracle, best, irr};
 use elbowroom_execution::{Forms, Need, PrepareError, Prepared, Preparer, Region};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_plan::deorder;
@@ -15,6 +15,7 @@ use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
 
 use super::facts_only::{as_timed, facts_only};
 use super::vary::is_about_an_absent_action;
+use crate::chances::{ChanceError, chances};
 use crate::flow::{self, FlowError};
 
 impl From<FlowError> for PrepareError {
@@ -132,8 +133,14 @@ impl Analyst {
         let Some(objective) = self.settings.objective else {
             return Ok(envelope);
         };
+        let chances = match (objective, &self.settings.world) {
+            (Objective::Probability, Some(world)) => chances(plan, world),
+            (Objective::Probability, None) => Err(ChanceError::NoWorld),
+            _ => Ok(Vec::new()),
+        };
         let wanted = BestSettings {
             objective,
+            chances: chances.map_err(|error| PrepareError::Beyond(error.to_string()))?,
             ..BestSettings::default()
         };
         let run = best(&mut oracle, &wanted, Some(&envelope), &mut |_| self.flow());

@@ -66,6 +66,7 @@ impl Planner for External<'_> {
         PlannerAnswer {
             answer,
             seconds: Some(seconds(report.statistics.elapsed)),
+            remark: None,
         }
     }
 }

@@ -62,7 +62,10 @@ impl Planner for Likeliest<'_> {
             .planner
             .clock
             .map(|clock| clock() - begun.unwrap_or_default());
-        PlannerAnswer { answer, seconds }
+        PlannerAnswer {
+            seconds,
+            ..PlannerAnswer::from(answer)
+        }
     }
 }
 

@@ -12,10 +12,7 @@ pub struct Clockless<F>(pub F);
 
 impl<F: FnMut(&Task, &Situation) -> PlanAnswer + Send> Planner for Clockless<F> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        PlannerAnswer {
-            answer: (self.0)(task, situation),
-            seconds: None,
-        }
+        PlannerAnswer::from((self.0)(task, situation))
     }
 }
 
@@ -37,9 +34,12 @@ pub struct Embedded<'a> {
 impl Planner for Embedded<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let begun = self.clock.map(|clock| clock());
-        let answer = self.answer(task, situation);
+        let (answer, _) = self.counted(task, situation);
         let seconds = self.clock.map(|clock| clock() - begun.unwrap_or_default());
-        PlannerAnswer { answer, seconds }
+        PlannerAnswer {
+            seconds,
+            ..PlannerAnswer::from(answer)
+        }
     }
 }
 
@@ -57,12 +57,20 @@ impl Default for Embedded<'_> {
 }
 
 impl Embedded<'_> {
-    fn answer(&self, task: &Task, situation: &Situation) -> PlanAnswer {
+    /// The answer, and the number of states looked at for it.
+    pub(crate) fn counted(&self, task: &Task, situation: &Situation) -> (PlanAnswer, u64) {
+        let mut states = 0;
+        let answer = self.answer(task, situation, &mut states);
+        (answer, states)
+    }
+
+    fn answer(&self, task: &Task, situation: &Situation, states: &mut u64) -> PlanAnswer {
         let answer = embedded::plan(task, situation, &self.settings, &mut |progress| {
             let limit = match progress.best {
                 Some(_) => self.improve_states.min(self.most_states),
                 None => self.most_states,
             };
+            *states = progress.counts.evaluated;
             let is_wanted = self.goes_on.is_none_or(|goes_on| goes_on());
             if progress.counts.evaluated >= limit || !is_wanted {
                 ControlFlow::Break(())

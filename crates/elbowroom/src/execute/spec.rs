@@ -16,12 +16,12 @@ use elbowroom_sim::WorldModel;
 use elbowroom_text::{Diagnostics, Source};
 use serde::{Deserialize, Serialize};
 
-use super::Embedded;
+use super::{Embedded, FirstPlan};
 use crate::flow;
 pub(crate) use text_form::listed;
 use text_form::{as_text, positive, required};
 
-pub use wiring::{SpecError, SpoilerError};
+pub use wiring::{FirstPlanError, SpecError, SpoilerError};
 
 /// The name of the planner that plans nothing.
 pub const NOBODY: &str = "none";
@@ -85,6 +85,9 @@ pub struct RunSpec {
     pub executor: ExecutorSpec,
     /// Which of the possible trajectories of the world to take.
     pub seed: u64,
+    /// By what the first plan is chosen, where none is given; left out where that is `shortest`.
+    #[serde(default, skip_serializing_if = "FirstPlan::is_shortest")]
+    pub first_plan: FirstPlan,
     /// How many states the embedded planner may look at for one plan.
     pub planner_states: u64,
     /// How many of them for a better plan than the first.
@@ -177,6 +180,7 @@ impl RunSpec {
             is_attended: false,
             executor: ExecutorSpec::default(),
             seed: 0,
+            first_plan: FirstPlan::default(),
             planner_states: planner.most_states,
             improve_states: planner.improve_states,
             vary: flow.vary,

@@ -157,6 +157,7 @@ impl Run<'_> {
             plan,
             why_not,
             is_unsolvable: planned.answer == PlanAnswer::Unsolvable,
+            remark: planned.remark.as_deref(),
         });
         self.heed()?;
         Ok(Attempt {

@@ -3,6 +3,7 @@
 mod file;
 
 use elbowroom::envelope::Objective;
+use elbowroom::execute::FirstPlan;
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{Patience, RunSettings};
 use elbowroom_num::Rational;
@@ -46,6 +47,8 @@ pub struct Experiment {
     pub precision: Rational,
     /// What envelopes are to be the best of; without one, they are IRR's.
     pub objective: Option<Objective>,
+    /// By what the first plan is chosen, where the planner is the embedded one.
+    pub first_plan: FirstPlan,
     /// The planner.
     pub planner: Planning,
     /// How many states the planner looks at for one plan.
@@ -146,6 +149,7 @@ impl Experiment {
             settings,
             precision,
             objective,
+            first_plan,
             planner,
             planner_states,
             improve_states,
@@ -200,6 +204,11 @@ impl Experiment {
         let identity = match objective {
             Some(objective) => json!([identity, "objective", objective.name()]),
             None => identity,
+        };
+        let identity = if first_plan.is_shortest() {
+            identity
+        } else {
+            json!([identity, "first plan", first_plan.name()])
         };
         if *optimum {
             json!([identity, "optimum"])
@@ -275,12 +284,10 @@ impl Experiment {
                     .collect(),
             });
         }
-        let settings = read
-            .settings()
-            .map_err(|(at, message)| wrong(at, message))?;
-        let planner = read
-            .planning()
-            .map_err(|(at, message)| wrong(at, message))?;
+        let wrong_at = |(at, message)| wrong(at, message);
+        let settings = read.settings().map_err(wrong_at)?;
+        let planner = read.planning().map_err(wrong_at)?;
+        let first_plan = read.first_plan().map_err(wrong_at)?;
         let precision = match &read.precision {
             None => Rational::ONE,
             Some(given) => exact(*given.get_ref())
@@ -306,6 +313,7 @@ impl Experiment {
             settings,
             precision,
             objective: read.objective,
+            first_plan,
             planner,
             planner_states: read.planner_states.unwrap_or(20_000),
             improve_states: read.improve_states.unwrap_or(20_000),

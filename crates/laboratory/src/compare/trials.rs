@@ -17,8 +17,8 @@ use elbowroom_sim::WorldModel;
 
 use super::{Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, clairvoyant};
 use elbowroom::execute::{
-    Analyst, Embedded, Execution, Likeliest, NamedText, RememberingPlanner, RememberingPreparer,
-    RunSpec, SharedLikeliest,
+    Analyst, Chooser, Embedded, Execution, Known, Likeliest, NamedText, RememberingPlanner,
+    RememberingPreparer, Replanning, Rollouts, RunSpec, SharedLikeliest,
 };
 use elbowroom::flow;
 use elbowroom::timed::{Policy, Settings};
@@ -44,7 +44,6 @@ pub(super) struct Setting<'a> {
 /// The data shared by all trials of a problem.
 struct Common<'a> {
     task: Arc<Task>,
-    first: TimeTriggeredPlan,
     planner: RememberingPlanner<Box<dyn Planner + 'a>>,
     columns: Vec<Place>,
 }
@@ -60,8 +59,8 @@ struct Place {
     likeliest: RememberingPlanner<SharedLikeliest>,
     /// For executors that weigh each move.
     outlook: Option<Arc<dyn Outlook>>,
-    /// The plan that they begin with: the likeliest.
-    likely: TimeTriggeredPlan,
+    /// The plan that each executor begins with.
+    firsts: Vec<TimeTriggeredPlan>,
 }
 
 impl Setting<'_> {
@@ -114,7 +113,6 @@ impl Setting<'_> {
             columns: columns.collect::<Result<_, _>>()?,
             planner: RememberingPlanner::new(planner, PLANS),
             task,
-            first,
         })
     }
 
@@ -126,15 +124,16 @@ impl Setting<'_> {
         goes_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Place, ExperimentError> {
         let world = world(column, task)?;
-        let likelihoods = match &column.likelihoods {
+        let likelihoods = Arc::new(match &column.likelihoods {
             None => Likelihoods::certain(),
             Some(text) => {
                 let name = format!("likelihoods of {}", column.name);
                 likelihoods::read(Source::new(name, text.as_str()), task)
                     .map_err(ExperimentError::Text)?
             }
-        };
-        let mut preparer = RememberingPreparer::new(Analyst::new(self.flow(column)), PREPARED);
+        });
+        let flow = self.flow(column, &world);
+        let mut preparer = RememberingPreparer::new(Analyst::new(flow), PREPARED);
         for spec in &self.experiment.executors {
             preparer
                 .prepare(task, first, spec.registered.need)
@@ -156,21 +155,62 @@ impl Setting<'_> {
         let odds = Likeliest::new(world.clone(), self.embedded(), planning_time);
         let odds = SharedLikeliest::new(odds);
         let mut likeliest = RememberingPlanner::new(odds.clone(), PLANS);
-        let likely =
-            match asks_outlook.then(|| likeliest.plan(task, &Situation::initial(task)).answer) {
-                Some(PlanAnswer::Plan(plan)) => plan,
-                _ => first.clone(),
-            };
+        let mut firsts = Vec::with_capacity(self.experiment.executors.len());
+        for spec in &self.experiment.executors {
+            let chosen = self.chosen(spec, column, (task, &world, &likelihoods), goes_on);
+            let likely = (chosen.is_none() && spec.asks_outlook()).then(|| {
+                let answer = likeliest.plan(task, &Situation::initial(task)).answer;
+                match answer {
+                    PlanAnswer::Plan(plan) => Some(plan),
+                    _ => None,
+                }
+            });
+            let plan = chosen.or(likely.flatten());
+            firsts.push(plan.unwrap_or_else(|| first.clone()));
+        }
         Ok(Place {
             outlook: outlook.flatten(),
-            likely,
+            firsts,
             world,
-            likelihoods: Arc::new(likelihoods),
+            likelihoods,
             foresight: Foresight::default(),
             preparer,
             likeliest,
             odds,
         })
+    }
+
+    /// The first plan that an executor begins with, if it is not the planner's; nor is it where
+    /// choosing was interrupted.
+    fn chosen(
+        &self,
+        spec: &ExecutorSpec,
+        column: &Column,
+        (task, world, likelihoods): (&Task, &WorldModel, &Arc<Likelihoods>),
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Option<TimeTriggeredPlan> {
+        let experiment = self.experiment;
+        if experiment.first_plan.is_shortest() || experiment.planner != Planning::Embedded {
+            return None;
+        }
+        let embedded = self.embedded();
+        let chooser = Chooser {
+            most_states: embedded.most_states,
+            improve_states: embedded.improve_states,
+            known: Known::World(Rollouts {
+                world: Arc::new(world.clone()),
+                executor: spec.clone(),
+                settings: experiment.settings.clone(),
+                flow: self.flow(column, world),
+                likelihoods: Arc::clone(likelihoods),
+                replanning: Some(Replanning::within(&embedded)),
+                is_ready: true,
+            }),
+            settings: embedded.settings,
+            goes_on,
+        };
+        let choice = chooser.choose(task, &Situation::initial(task)).ok()?;
+        Some(choice.plan)
     }
 
     /// Every executor in the same world.
@@ -185,7 +225,7 @@ impl Setting<'_> {
         let executors = &self.experiment.executors;
         let mut reached = Vec::with_capacity(executors.len() + 1);
         for (row, spec) in executors.iter().enumerate() {
-            let report = self.execute(seed, spec, column, common, None);
+            let report = self.execute(seed, (row, spec), column, common, None);
             reached.push(report.verdict == Verdict::GoalReached);
             let id = TrialId {
                 problem: self.problem,
@@ -234,7 +274,7 @@ impl Setting<'_> {
         let mut writer = TraceWriter::new(Arc::clone(&common.task), &mut sink);
         let written = writer.header(&self.spec(column, executor, seed)?);
         written.map_err(|error| self.wrong(&error.to_string()))?;
-        self.execute(seed, executor, column, &mut common, Some(writer));
+        self.execute(seed, (row, executor), column, &mut common, Some(writer));
         Ok(lines)
     }
 
@@ -315,7 +355,7 @@ impl Setting<'_> {
     fn execute(
         &self,
         seed: u64,
-        spec: &ExecutorSpec,
+        (row, spec): (usize, &ExecutorSpec),
         column: usize,
         common: &mut Common<'_>,
         writer: Option<TraceWriter<'_>>,
@@ -331,7 +371,7 @@ impl Setting<'_> {
             odds,
             likeliest,
             outlook,
-            likely,
+            firsts,
         } = &mut common.columns[column];
         let asks_odds = spec.asks_odds();
         let odds = asks_odds.then(|| Box::new(odds.clone()) as _);
@@ -341,11 +381,7 @@ impl Setting<'_> {
             &mut common.planner
         };
         let execution = Execution::of(&task)
-            .beginning_with(if spec.asks_outlook() {
-                likely.clone()
-            } else {
-                common.first.clone()
-            })
+            .beginning_with(firsts[row].clone())
             .by(spec.clone())
             .with_settings(settings.clone())
             .with_likelihoods(Arc::clone(likelihoods))
@@ -386,10 +422,11 @@ impl Setting<'_> {
         }
     }
 
-    fn flow(&self, column: &Column) -> flow::Settings {
+    fn flow(&self, column: &Column, world: &WorldModel) -> flow::Settings {
         let mut flow = flow::Settings {
             vary: column.vary.clone(),
             objective: self.experiment.objective,
+            world: Some(Arc::new(world.clone())),
             ..flow::Settings::default()
         };
         flow.search.precision = self.experiment.precision.clone();

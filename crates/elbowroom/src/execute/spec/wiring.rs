@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use elbowroom_envelope::Objective;
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::PlanningTime;
 use elbowroom_execution::{Need, NoPlanner, Odds, Outlook, Planner, PrepareError, Preparer, World};
@@ -13,9 +14,12 @@ use elbowroom_sim::{Paced, SimWorld, WorldModel};
 use elbowroom_text::Diagnostics;
 
 use super::{EMBEDDED, NOBODY, RunSpec};
-use crate::execute::{Analyst, Embedded, Execution, External, Likeliest, Spoiling};
+use crate::execute::{
+    Analyst, Chooser, Choosing, Embedded, Execution, External, Known, Likeliest, Replanning,
+    Rollouts, Spoiling,
+};
 use crate::timed::{Policy, Settings};
-use crate::{BoxTextError, parse_box};
+use crate::{BoxTextError, ChanceError, parse_box};
 
 /// The time limit of another planner for its first plan.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -39,15 +43,39 @@ pub enum SpecError {
     /// The executor compares plans of the embedded planner, and there is another.
     #[error("`{0}` chooses among plans of the embedded planner")]
     NeedsEmbedded(ExecutorSpec),
+    /// The likeliest first plan was asked for, and there is nothing to choose among, or by.
+    #[error("the likeliest first plan cannot be chosen: {0}")]
+    FirstPlan(FirstPlanError),
     /// A time limit was set for a planner that has none.
     #[error("`{0}` has no time limit for better plans; the embedded planner is limited by states")]
     NoTimeLimit(String),
+    /// The most likely box was asked for, and nothing is known of the world.
+    #[error(transparent)]
+    Chance(#[from] ChanceError),
     /// A simulation was asked for.
     #[error("the world is a process; it cannot be simulated")]
     Process,
     /// A requirement of a world that spoils plans is missing.
     #[error(transparent)]
     Spoiler(#[from] SpoilerError),
+}
+
+/// Why the first plan cannot be chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FirstPlanError {
+    /// A plan was given.
+    #[error("a plan is given")]
+    Given,
+    /// Another planner was named, which gives its own plan only.
+    #[error("it is one of the embedded planner's")]
+    AnotherPlanner,
+    /// There is no world file, and there are no likelihoods.
+    #[error("nothing is known of the world")]
+    NothingKnown,
+    /// Goals are given later.
+    #[error("the goals are still to come")]
+    Lasting,
 }
 
 /// There is no world that spoils the plan.
@@ -87,7 +115,9 @@ impl RunSpec {
             return Ok(model.world(task, self.seed));
         };
         let plan = plan.ok_or(SpoilerError::NoPlan)?;
-        let mut analyst = Analyst::new(self.envelopes());
+        let mut settings = self.envelopes();
+        settings.world = Some(Arc::new(model.clone()));
+        let mut analyst = Analyst::new(settings);
         let prepared = analyst.prepare(task, plan, Need::OpenNetwork)?;
         let envelope = match (&spoiler.inside, prepared.envelope) {
             (Some(text), _) => parse_box(text, &prepared.plan)?,
@@ -103,12 +133,15 @@ impl RunSpec {
 
     /// Whom [`Self::planner`] names, with the limits of the run; to be asked with `clock` and
     /// `goes_on`, as in [`Embedded`]. For executors that look for likelier plans, it is the one
-    /// that makes the likeliest in the world of `model`.
+    /// that makes the likeliest in the world of `model`. Its first plan is chosen as
+    /// [`Self::first_plan`] says; other planners have one plan only.
     ///
     /// # Errors
-    /// When the planner is not known, or has been set a limit that it does not have.
+    /// When the planner is not known, or has been set a limit that it does not have, or the
+    /// likelihood file cannot be read.
     pub fn planner_for<'a>(
         &self,
+        task: &Task,
         model: Option<&WorldModel>,
         clock: &'a (dyn Fn() -> Rational + Sync),
         goes_on: &'a (dyn Fn() -> bool + Sync),
@@ -118,8 +151,8 @@ impl RunSpec {
             goes_on: Some(goes_on),
             ..self.embedded()
         };
-        Ok(match self.whom()? {
-            Whom::Nobody => Box::new(NoPlanner),
+        let planner: Box<dyn Planner + 'a> = match self.whom()? {
+            Whom::Nobody => return Ok(Box::new(NoPlanner)),
             Whom::Embedded => match model.filter(|_| self.executor.asks_odds()) {
                 None => Box::new(embedded),
                 Some(model) => {
@@ -130,7 +163,7 @@ impl RunSpec {
             Whom::Another(planner) => {
                 let given = self.planner_time.as_ref();
                 let limit = given.map(|time| Duration::from_secs_f64(time.to_f64().min(1e9)));
-                Box::new(External {
+                return Ok(Box::new(External {
                     planner: *planner,
                     domain: self.domain.source(),
                     problem: self.problem.source(),
@@ -140,9 +173,56 @@ impl RunSpec {
                     },
                     takes_first: limit.is_none(),
                     goes_on,
-                })
+                }));
             }
-        })
+        };
+        let Some(known) = self.known_before(task, model)? else {
+            return Ok(planner);
+        };
+        let chooser = Chooser {
+            settings: self.embedded().settings,
+            most_states: self.planner_states,
+            improve_states: self.improve_states,
+            known,
+            goes_on,
+        };
+        Ok(Box::new(Choosing {
+            inner: planner,
+            chooser: Some(chooser),
+            latest: self.expected_planning_time(),
+            clock,
+        }))
+    }
+
+    /// What the first plan is chosen by; `None` if it is the planner's own: if that was asked for,
+    /// nothing is known, or the goals are still to come.
+    fn known_before(
+        &self,
+        task: &Task,
+        model: Option<&WorldModel>,
+    ) -> Result<Option<Known>, SpecError> {
+        if self.first_plan.is_shortest() || self.has_plan || self.is_lasting {
+            return Ok(None);
+        }
+        let likelihoods = self.likelihoods(task)?;
+        if let Some(world) = model.filter(|_| self.world.is_some()) {
+            let world = Arc::new(world.clone());
+            let mut flow = self.envelopes();
+            flow.world = Some(Arc::clone(&world));
+            return Ok(Some(Known::World(Rollouts {
+                world,
+                executor: self.executor.clone(),
+                settings: self.settings(),
+                flow,
+                likelihoods,
+                replanning: Some(Replanning::within(&self.embedded())),
+                is_ready: false,
+            })));
+        }
+        Ok(self.likelihoods.is_some().then(|| Known::Likelihoods {
+            reorders: self.executor.reorders(),
+            likelihoods,
+        }))
     }
 
     /// Whom [`Self::planner`] names.
@@ -174,6 +254,22 @@ impl RunSpec {
     /// When they do not.
     pub fn check(&self) -> Result<(), SpecError> {
         let whom = self.whom()?;
+        if !self.first_plan.is_shortest() {
+            let is_known = self.world.is_some() || self.likelihoods.is_some();
+            let wrong = match whom {
+                _ if self.has_plan => Some(FirstPlanError::Given),
+                _ if self.is_lasting => Some(FirstPlanError::Lasting),
+                Whom::Embedded if is_known => None,
+                Whom::Embedded => Some(FirstPlanError::NothingKnown),
+                Whom::Nobody | Whom::Another(_) => Some(FirstPlanError::AnotherPlanner),
+            };
+            if let Some(wrong) = wrong {
+                return Err(SpecError::FirstPlan(wrong));
+            }
+        }
+        if self.objective == Some(Objective::Probability) && self.world.is_none() {
+            return Err(SpecError::Chance(ChanceError::NoWorld));
+        }
         // Who weighs moves goes by the plan where that cannot be done.
         if !self.executor.asks_odds() || self.executor.asks_outlook() {
             return Ok(());
@@ -214,6 +310,10 @@ impl RunSpec {
     pub fn execution(&self, task: &Arc<Task>) -> Result<Execution<'static>, SpecError> {
         self.check()?;
         let model = self.model(task.problem()).map_err(SpecError::World)?;
+        let mut envelopes = self.envelopes();
+        if self.world.is_some() {
+            envelopes.world = model.clone().map(Arc::new);
+        }
         let model = model.filter(|_| self.executor.asks_odds());
         let outlook = model.as_ref().filter(|_| self.executor.asks_outlook());
         let outlook = outlook.and_then(|model| {
@@ -231,7 +331,7 @@ impl RunSpec {
             .with_settings(self.settings())
             .lasting(self.is_lasting)
             .attended(self.is_attended)
-            .with_envelopes(self.envelopes())
+            .with_envelopes(envelopes)
             .with_likelihoods(self.likelihoods(task)?)
             .with_odds(odds)
             .with_outlook(outlook))

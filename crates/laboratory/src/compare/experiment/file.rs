@@ -1,7 +1,7 @@
 //! Experiment files as they stand.
 
 use elbowroom::envelope::Objective;
-use elbowroom::execute::EMBEDDED;
+use elbowroom::execute::{EMBEDDED, FirstPlan};
 use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
 use elbowroom_num::Rational;
 use elbowroom_text::Span;
@@ -32,6 +32,7 @@ pub(super) struct File {
     pub(super) max_replans: Option<usize>,
     pub(super) precision: Option<Spanned<f64>>,
     pub(super) objective: Option<Objective>,
+    pub(super) first_plan: Option<Spanned<FirstPlan>>,
     pub(super) planner: Option<Spanned<String>>,
     pub(super) planner_time: Option<Spanned<f64>>,
     pub(super) planner_states: Option<u64>,
@@ -84,6 +85,23 @@ impl File {
             return wrong(empty.span(), "give the blanks at least one row");
         }
         Ok(())
+    }
+
+    /// By what first plans are chosen; another planner gives only its own plan.
+    pub(super) fn first_plan(&self) -> Result<FirstPlan, (Span, String)> {
+        let Some(given) = &self.first_plan else {
+            return Ok(FirstPlan::default());
+        };
+        let is_embedded = self
+            .planner
+            .as_ref()
+            .is_none_or(|name| name.get_ref() == EMBEDDED);
+        if is_embedded || given.get_ref().is_shortest() {
+            return Ok(*given.get_ref());
+        }
+        let message =
+            "another planner gives only its own plan: leave out `planner`, or `first_plan`";
+        Err((given.span(), message.to_owned()))
     }
 
     /// That published figures belong to rows and columns of the table.

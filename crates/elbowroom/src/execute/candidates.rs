@@ -1,0 +1,335 @@
+//! Plans of one problem that differ from each other: a source.
+//!
+//! A planner goes for one thing, such as a short plan. Which of many plans is best by something
+//! that no planner goes for, a probability or a box, is found out by making many and comparing
+//! them. This makes them, one after the other, each time for a [`Variant`] of the problem:
+//!
+//! 1. as it is, each plan on the way to the shortest one included;
+//! 2. with actions that take long, and events that come early: as long, and as early, as in so many
+//!    of 100 cases where a world is known, by so much where none is; never shorter than planned;
+//! 3. for the plan whose actions fail least often, where a world is known;
+//! 4. without an action of a plan that was found, and so on from there.
+//!
+//! Plans are of the problem as it is, whatever variant they were made for: the judge has found each
+//! of them valid, and no two have the same actions in the same order. No clock and no dice are
+//! looked at: the same problem, world and limits give the same plans.
+
+mod variant;
+
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, VecDeque};
+use std::ops::ControlFlow;
+
+use elbowroom_model::validate::{self, validate_from};
+use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
+use elbowroom_plan::deorder::deorder;
+use elbowroom_planner::{Counts, embedded};
+use elbowroom_sim::WorldModel;
+use elbowroom_stn::{ConsistentNetwork, NodeId};
+
+pub use variant::Pace;
+use variant::{Variant, duration_fixed_by_domain, written};
+
+/// How many states more than the first plan took a plan of a variant may take.
+const PATIENCE: u64 = 8;
+
+/// How many states a search for a plan of a variant has in any case.
+const LEAST_STATES: u64 = 1_000;
+
+/// How far candidates are looked for.
+#[derive(Clone, Debug)]
+pub struct Limits {
+    /// The states that may be looked at for the plan of the problem as it is.
+    pub most_states: u64,
+    /// Of these, the states for a better plan than the first.
+    pub improve_states: u64,
+    /// The states that may be looked at for all other plans together.
+    pub other_states: u64,
+    /// The number of variants that may be asked for.
+    pub searches: usize,
+}
+
+/// A plan, and what it was made for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// The plan, on the task's clock. The judge has found it valid.
+    pub plan: TimeTriggeredPlan,
+    /// What it was made for, in words; empty for the best plan of the problem as it is.
+    pub made_for: String,
+}
+
+/// A source of plans that differ.
+pub struct Candidates<'a> {
+    task: &'a Task,
+    situation: &'a Situation,
+    world: Option<&'a WorldModel>,
+    settings: embedded::Settings,
+    limits: Limits,
+    queue: VecDeque<Variant>,
+    asked: BTreeSet<Variant>,
+    /// Found, and not yet given out.
+    ready: VecDeque<Candidate>,
+    known: BTreeSet<Vec<String>>,
+    states: u64,
+    first_states: Option<u64>,
+    answer: Option<embedded::Answer>,
+}
+
+impl<'a> Candidates<'a> {
+    /// The plans of a task from a situation in which nothing is under way.
+    pub fn new(
+        task: &'a Task,
+        situation: &'a Situation,
+        world: Option<&'a WorldModel>,
+        settings: embedded::Settings,
+        limits: Limits,
+    ) -> Self {
+        let paces: &[Pace] = match world {
+            Some(_) => &[
+                Pace::Quantile(80),
+                Pace::Quantile(50),
+                Pace::Quantile(95),
+                Pace::Quantile(99),
+            ],
+            None => &[
+                Pace::Slower(125),
+                Pace::Slower(110),
+                Pace::Slower(150),
+                Pace::Slower(200),
+                Pace::Slower(300),
+                Pace::Slower(105),
+            ],
+        };
+        let fails = world.is_some_and(|world| !world.failures.is_empty());
+        let mut queue = VecDeque::from([Variant::default()]);
+        for pace in paces {
+            queue.push_back(Variant::at(*pace));
+        }
+        if fails {
+            let kinds = [Pace::Planned, Pace::Quantile(80)];
+            for (place, pace) in kinds.into_iter().enumerate() {
+                queue.insert(2 + place, Variant::at(pace).reliable());
+            }
+        }
+        Self {
+            task,
+            situation,
+            world,
+            settings,
+            limits,
+            asked: queue.iter().cloned().collect(),
+            queue,
+            ready: VecDeque::new(),
+            known: BTreeSet::new(),
+            states: 0,
+            first_states: None,
+            answer: None,
+        }
+    }
+
+    /// What the planner answered to the problem as it is, once that was asked for.
+    pub fn answer(&self) -> Option<&embedded::Answer> {
+        self.answer.as_ref()
+    }
+
+    /// Statistics of all searches so far: the states looked at, and of the first search the rest.
+    pub fn counts(&self) -> Counts {
+        let counts = match &self.answer {
+            Some(
+                embedded::Answer::Plan { counts, .. }
+                | embedded::Answer::Unsolvable { counts, .. }
+                | embedded::Answer::NoneFound { counts, .. },
+            ) => *counts,
+            _ => Counts::default(),
+        };
+        Counts {
+            evaluated: self.states,
+            ..counts
+        }
+    }
+
+    /// The next plan; `None` when there are no more within the limits. `goes_on` is asked often, and
+    /// told the number of states looked at so far; when it says no, there are no more plans.
+    pub fn next(&mut self, goes_on: &mut dyn FnMut(u64) -> bool) -> Option<Candidate> {
+        loop {
+            if let Some(candidate) = self.ready.pop_front() {
+                return Some(candidate);
+            }
+            if self.asked.len() - self.queue.len() >= self.limits.searches.max(1) {
+                return None;
+            }
+            if !goes_on(self.states) {
+                return None;
+            }
+            let variant = self.queue.pop_front()?;
+            self.search(&variant, goes_on);
+            if self.answer.as_ref().is_none_or(|a| a.found().is_none()) {
+                // Where there is no plan, there is none without this or that either.
+                return None;
+            }
+        }
+    }
+
+    /// Plans for a variant.
+    fn search(&mut self, variant: &Variant, goes_on: &mut dyn FnMut(u64) -> bool) {
+        let own = variant.is_problem();
+        let (most, improve) = if own {
+            (self.limits.most_states, self.limits.improve_states)
+        } else {
+            let first = self.first_states.unwrap_or_default();
+            let left = (self.limits.other_states + first).saturating_sub(self.states);
+            let most = LEAST_STATES.max(PATIENCE.saturating_mul(first)).min(left);
+            (most, most.min(self.limits.improve_states))
+        };
+        if most == 0 {
+            return;
+        }
+        let settings = embedded::Settings {
+            without: variant.without.clone(),
+            first_plan_only: false,
+            objective: if variant.is_reliable {
+                embedded::Objective::Metric
+            } else {
+                self.settings.objective
+            },
+            ..self.settings.clone()
+        };
+        let other;
+        let rewritten;
+        let (task, there) = if variant.is_as_written() {
+            (self.task, self.situation)
+        } else {
+            let Some(problem) = variant.problem(self.task, self.situation, self.world) else {
+                return;
+            };
+            rewritten = Task::new(problem).with_epsilon(self.task.epsilon().clone());
+            other = Situation {
+                time: self.situation.time.clone(),
+                state: rewritten.initial().clone(),
+                running: Vec::new(),
+            };
+            (&rewritten, &other)
+        };
+        let mut plans: Vec<TimeTriggeredPlan> = Vec::new();
+        let (before, mut states) = (self.states, 0);
+        let answer = embedded::plan(task, there, &settings, &mut |progress| {
+            if let Some(found) = &progress.plan {
+                plans.push(found.plan.clone());
+            }
+            states = progress.counts.evaluated;
+            let limit = if progress.best.is_some() {
+                improve.min(most)
+            } else {
+                most
+            };
+            if states >= limit || !goes_on(before + states) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        self.states += states;
+        if let Some(found) = answer.found()
+            && plans.last() != Some(&found.plan)
+        {
+            plans.push(found.plan.clone());
+        }
+        if own {
+            self.first_states = Some(states);
+            self.answer = Some(answer);
+        }
+        // The best first: it is what the planner would have been asked for.
+        plans.reverse();
+        for (place, plan) in plans.into_iter().enumerate() {
+            let Some(plan) = self.of_task(variant, &plan) else {
+                continue;
+            };
+            if place == 0 {
+                self.go_without(variant, &plan);
+            }
+            if self.known.insert(order(&plan)) {
+                let made_for = match (own, place) {
+                    (true, 0) => String::new(),
+                    (true, _) => "on the way to the shortest".to_owned(),
+                    (false, _) => variant.words(),
+                };
+                self.ready.push_back(Candidate { plan, made_for });
+            }
+        }
+    }
+
+    /// A plan of a variant as a plan of the task: with the domain's durations, and no later than it
+    /// has to be; `None` if the judge finds none.
+    fn of_task(&self, variant: &Variant, plan: &TimeTriggeredPlan) -> Option<TimeTriggeredPlan> {
+        if variant.is_as_written() {
+            return Some(plan.clone());
+        }
+        let mut steps = Vec::with_capacity(plan.steps.len());
+        for step in &plan.steps {
+            let arguments = &step.action.arguments;
+            let action = self.task.instantiate(step.action.schema, arguments).ok()?;
+            let planned = duration_fixed_by_domain(&action).or_else(|| step.duration.clone());
+            steps.push(Step {
+                start: step.start.clone(),
+                duration: step.duration.as_ref().and(planned),
+                action,
+            });
+        }
+        let plan = TimeTriggeredPlan { steps };
+        let is_valid = |plan: &TimeTriggeredPlan| {
+            let settings = validate::Settings::default();
+            validate_from(self.task, self.situation, plan, &settings).is_valid()
+        };
+        let early = tightened(self.task, self.situation, &plan).filter(&is_valid);
+        early.or_else(|| is_valid(&plan).then_some(plan))
+    }
+
+    /// Asks for plans that do without one more action, those first that fail most often.
+    fn go_without(&mut self, variant: &Variant, plan: &TimeTriggeredPlan) {
+        let mut names: Vec<&str> = Vec::with_capacity(plan.steps.len());
+        for step in &plan.steps {
+            if !names.contains(&step.action.name.as_str()) {
+                names.push(&step.action.name);
+            }
+        }
+        let odds = |name: &&str| {
+            let failing = self.world.and_then(|world| world.failing(name));
+            Reverse(failing.map_or(0, |failing| written(failing.probability)))
+        };
+        names.sort_by_key(odds);
+        for name in names {
+            let next = variant.without(name);
+            if self.asked.insert(next.clone()) {
+                self.queue.push_back(next);
+            }
+        }
+    }
+}
+
+/// What tells plans apart: their actions, in the order in which they start.
+fn order(plan: &TimeTriggeredPlan) -> Vec<String> {
+    let mut steps: Vec<_> = plan.steps.iter().collect();
+    steps.sort_by(|a, b| (&a.start, &a.action.name).cmp(&(&b.start, &b.action.name)));
+    steps
+        .into_iter()
+        .map(|step| step.action.name.clone())
+        .collect()
+}
+
+/// The plan's order with everything as early as it can be; `None` where the plan has no order.
+pub(crate) fn tightened(
+    task: &Task,
+    situation: &Situation,
+    plan: &TimeTriggeredPlan,
+) -> Option<TimeTriggeredPlan> {
+    let rest = situation.rest_of_task(task);
+    let freed = deorder(&rest, &situation.rest_of_plan(plan)).ok()?;
+    let network = freed.plan.network(&elbowroom_plan::Valuation::default());
+    let network = ConsistentNetwork::try_from(network).ok()?;
+    let schedule = network.earliest_schedule(NodeId(0));
+    let mut early = freed.plan.scheduled(&schedule.into());
+    for step in &mut early.steps {
+        step.start = &step.start + &situation.time;
+    }
+    Some(early)
+}

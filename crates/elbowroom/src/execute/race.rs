@@ -1,0 +1,124 @@
+//! Which of several plans succeeds most often, found out with few trials.
+
+/// How many samples there are at the end of each round.
+const ROUNDS: [u64; 4] = [50, 100, 200, 400];
+
+/// How many standard deviations of the difference a plan may be behind.
+const BEHIND: u64 = 2;
+
+/// How often a plan succeeded, in the samples from 0 on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Tally {
+    results: Vec<bool>,
+}
+
+impl Tally {
+    pub(super) fn samples(&self) -> u64 {
+        self.results.len() as u64
+    }
+
+    pub(super) fn successes(&self) -> u64 {
+        self.results.iter().filter(|success| **success).count() as u64
+    }
+
+    fn is_behind(&self, other: &Self) -> bool {
+        is_behind(&self.results, &other.results)
+    }
+}
+
+/// Whether results are behind others by more than chance, in the samples that both have: of those
+/// in which only one of the two succeeded, too few are one's own (McNemar's test).
+pub(crate) fn is_behind(results: &[bool], others: &[bool]) -> bool {
+    let pairs = || results.iter().zip(others);
+    let own = pairs().filter(|(own, other)| **own && !**other).count() as u64;
+    let theirs = pairs().filter(|(own, other)| !**own && **other).count() as u64;
+    theirs > own && (theirs - own).pow(2) > BEHIND.pow(2) * (theirs + own)
+}
+
+/// The tallies of as many plans as there are, and the place of the one that succeeded most often;
+/// of several, the first of them.
+///
+/// `try_out` says whether a plan succeeds in a sample; all plans are tried in the same ones (common
+/// random numbers), so that they differ by what they are, and not by the dice. Who is behind by more
+/// than chance is tried no further (racing; Maron & Moore, NIPS 1993). `None` of `try_out` ends it.
+pub(super) fn race(
+    count: usize,
+    try_out: &mut dyn FnMut(usize, u64) -> Option<bool>,
+) -> (Vec<Tally>, usize) {
+    let mut tallies = vec![Tally::default(); count];
+    let mut racing: Vec<usize> = (0..count).collect();
+    let mut leader = 0;
+    for most in ROUNDS {
+        for &place in &racing {
+            for sample in tallies[place].samples()..most {
+                let Some(success) = try_out(place, sample) else {
+                    return (tallies, leader);
+                };
+                tallies[place].results.push(success);
+            }
+        }
+        leader = first_of_most(&tallies, &racing);
+        let best = tallies[leader].clone();
+        racing.retain(|place| !tallies[*place].is_behind(&best));
+        // Nobody can be ahead of one that always succeeds.
+        if racing.len() < 2 || best.successes() == best.samples() {
+            break;
+        }
+    }
+    (tallies, leader)
+}
+
+fn first_of_most(tallies: &[Tally], racing: &[usize]) -> usize {
+    let mut best = racing.first().copied().unwrap_or(0);
+    for &place in racing {
+        if tallies[place].successes() > tallies[best].successes() {
+            best = place;
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Plans that succeed in this share of samples, each by a number that the sample shares.
+    fn trials(shares: &[u64]) -> impl FnMut(usize, u64) -> Option<bool> + '_ {
+        |place, sample| {
+            Some(sample.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32 < (shares[place] << 32) / 100)
+        }
+    }
+
+    #[test]
+    fn the_likeliest_wins_and_who_is_far_behind_is_tried_in_one_round_only() {
+        let (tallies, leader) = race(3, &mut trials(&[60, 90, 20]));
+        assert_eq!(leader, 1);
+        assert_eq!(tallies[2].samples(), ROUNDS[0]);
+        assert!(tallies[1].successes() * 100 >= 85 * tallies[1].samples());
+    }
+
+    #[test]
+    fn of_plans_alike_the_first_is_taken_after_all_rounds() {
+        let (tallies, leader) = race(3, &mut trials(&[70, 70, 70]));
+        assert_eq!(leader, 0);
+        assert_eq!(tallies[0], tallies[2]);
+        assert_eq!(tallies[0].samples(), ROUNDS[3]);
+    }
+
+    #[test]
+    fn one_that_always_succeeds_ends_the_race() {
+        let (tallies, leader) = race(2, &mut trials(&[90, 100]));
+        assert_eq!(leader, 1);
+        assert!(tallies[1].samples() < ROUNDS[3]);
+    }
+
+    #[test]
+    fn an_interrupted_race_has_the_leader_of_its_last_round() {
+        let mut left = 60;
+        let (_, leader) = race(2, &mut |place, _| {
+            left -= 1;
+            (left > 0).then_some(place == 1)
+        });
+        assert_eq!(leader, 0, "no round was over");
+    }
+}
