@@ -26,8 +26,8 @@ pub(crate) use learn::LearnArgs;
 pub(crate) use network::{DurationsChoice, NetworkArgs};
 use number::{positive, positive_or_zero};
 pub(crate) use odds::OddsArgs;
-pub(crate) use plan::{EMBEDDED, PlanArgs};
-pub(crate) use run::{RunArgs, RunningChoice};
+pub(crate) use plan::{EMBEDDED, PlanArgs, PlanObjectiveChoice};
+pub(crate) use run::{FirstPlanChoice, RunArgs, RunningChoice};
 pub(crate) use serve::{CtlArgs, CtlCommand, ServeArgs};
 pub(crate) use world_check::WorldCheckArgs;
 

@@ -33,6 +33,10 @@ pub(crate) struct EnvelopeArgs {
     /// What the largest box is the greatest of; by default the least slack
     #[arg(long, value_enum)]
     objective: Option<Objective>,
+    /// With --objective probability: the world file that says how long actions take
+    /// (docs/formats/world.md)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) world: Option<PathBuf>,
     /// The largest box whose intervals have both bounds equally far from the nominal value
     #[arg(long)]
     symmetric: bool,
@@ -120,6 +124,7 @@ impl EnvelopeArgs {
         let others = [
             ("--method", self.method.is_some()),
             ("--objective", self.objective.is_some()),
+            ("--world", self.world.is_some()),
             ("--symmetric", self.symmetric),
             ("--cap", self.cap.is_some()),
             ("--precision", self.precision.is_some()),
@@ -183,6 +188,7 @@ impl EnvelopeArgs {
         }
         let only_boxes = [
             ("--objective", self.objective.is_some()),
+            ("--world", self.world.is_some()),
             ("--symmetric", self.symmetric),
             ("--cap", self.cap.is_some() && !self.volume),
             ("--precision", self.precision.is_some()),
@@ -246,7 +252,23 @@ impl EnvelopeArgs {
             objective: self.objective.map_or(default.objective, Into::into),
             symmetric: self.symmetric,
             most: self.most(),
+            ..default
         };
+        match (best.objective, &self.world) {
+            (library::Objective::Probability, None) => {
+                return Err(Failure::new(
+                    "--objective probability needs to know how long actions take",
+                    "add --world with a world file (docs/formats/world.md)",
+                ));
+            }
+            (library::Objective::Probability, Some(_)) | (_, None) => {}
+            (_, Some(_)) => {
+                return Err(Failure::new(
+                    "--world is for --objective probability",
+                    "add that, or leave out --world",
+                ));
+            }
+        }
         Ok((method, best))
     }
 }
@@ -291,6 +313,9 @@ pub(crate) enum Objective {
     Widths,
     /// The product of the widths of all intervals, with the weights of --vary as exponents
     Volume,
+    /// The probability that independent durations, distributed as in the world file of --world, all
+    /// stay inside
+    Probability,
 }
 
 impl From<Objective> for library::Objective {
@@ -299,6 +324,7 @@ impl From<Objective> for library::Objective {
             Objective::LeastSlack => Self::LeastSlack,
             Objective::Widths => Self::Widths,
             Objective::Volume => Self::Volume,
+            Objective::Probability => Self::Probability,
         }
     }
 }

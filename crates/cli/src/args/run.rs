@@ -35,6 +35,11 @@ pub(crate) struct RunArgs {
     /// plan is taken, within a minute
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) planner_time: Option<Rational>,
+    /// By what the plan to begin with is chosen, where the embedded planner makes it: the shortest,
+    /// or, of several, the one with which the executor succeeds most often in samples of --world;
+    /// without a world file, the one whose actions are likeliest to succeed by --likelihoods
+    #[arg(long = "first-plan", value_enum, default_value_t = FirstPlanChoice::Shortest)]
+    pub(crate) first_plan_by: FirstPlanChoice,
     /// Number of states that the embedded planner may evaluate for a plan
     #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = whole)]
     #[arg(allow_negative_numbers = true)]
@@ -185,6 +190,15 @@ impl RunArgs {
     }
 }
 
+/// By what the first plan is chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FirstPlanChoice {
+    /// Its length, or the problem's metric
+    Shortest,
+    /// Its probability
+    Likeliest,
+}
+
 /// Options that a stored trace fixes, so that the command line cannot change them.
 const IN_THE_TRACE: &[&str] = &[
     "domain",
@@ -193,6 +207,7 @@ const IN_THE_TRACE: &[&str] = &[
     "plan",
     "planner",
     "planner_time",
+    "first_plan_by",
     "planner_states",
     "improve_states",
     "world",

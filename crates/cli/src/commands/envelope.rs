@@ -11,6 +11,7 @@ use elbowroom::answers::RequestError;
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Search};
 use elbowroom::envelope as library;
 use elbowroom::plan::parametrize::VarySpec;
+use elbowroom::sim::WorldModel;
 
 use crate::args::{self, EnvelopeArgs};
 use crate::exit::{Answer, Exit, Failure};
@@ -35,6 +36,16 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         &arguments.controllable,
     ))?);
     let plan = input::any_plan(&task, &arguments.plan, output)?;
+    let world = match &arguments.world {
+        Some(path) => {
+            let text = input::source(path, "world")?;
+            let world = WorldModel::read(&text, task.problem()).map_err(|wrong| {
+                Failure::from(wrong).advised("docs/formats/world.md describes world files")
+            })?;
+            Some(Arc::new(world))
+        }
+        None => None,
+    };
     let search = Search::default();
     let request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
@@ -59,6 +70,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
             most_checks: search.most_checks,
             best,
         },
+        world,
         ..EnvelopeRequest::new(&Arc::new(task), plan)
     };
     let request = Arc::new(request);

@@ -118,7 +118,7 @@ fn show(arguments: &RunArgs, outcome: &RunOutcome, output: &mut Output) -> Resul
     if arguments.json {
         output.document(&outcome.answer)
     } else {
-        output::print(&text::human(&outcome.report))
+        output::print(&text::human(&outcome.answer, &outcome.report))
     }
 }
 
@@ -216,7 +216,9 @@ impl Job<'_> {
         let goes_on = || !self.interrupt.is_requested();
         let model = self.spec.model(self.task.problem());
         let model = model.map_err(SpecError::World)?;
-        let planner = self.spec.planner_for(model.as_ref(), &clock, &goes_on)?;
+        let planner = self
+            .spec
+            .planner_for(self.task, model.as_ref(), &clock, &goes_on)?;
         let request = RunRequest::new(self.spec, self.task)
             .beginning_with(self.first)
             .planned_by(Ahead::new(planner, self.spec, self.interrupt))
@@ -272,7 +274,7 @@ impl Job<'_> {
             let begun = Clock::start();
             let clock = || begun.seconds();
             let goes_on = || !interrupt.is_requested();
-            let planner = self.spec.planner_for(None, &clock, &goes_on);
+            let planner = self.spec.planner_for(self.task, None, &clock, &goes_on);
             let planner = planner.map_err(contradiction)?;
             let request = RunRequest::new(self.spec, self.task)
                 .beginning_with(self.first)
@@ -304,7 +306,7 @@ impl Job<'_> {
         let begun = Clock::start();
         let clock = || begun.seconds();
         let goes_on = || !self.interrupt.is_requested();
-        let planner = spec.planner_for(Some(&model), &clock, &goes_on)?;
+        let planner = spec.planner_for(task, Some(&model), &clock, &goes_on)?;
         let planner: Box<dyn Planner> = Box::new(Ahead::new(planner, spec, self.interrupt));
         let world = Realtime {
             inner: world.as_mut(),

@@ -1,15 +1,15 @@
 //! The answer as people read it.
 
+mod best;
 mod example;
 
 use std::fmt::Write as _;
 
 use elbowroom::answers::envelope::{
     Balance, Best, Chosen, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome,
-    EnvelopeRequest, Failing, Foresight, Makespans, QuantityKind, Range, Relax, Room, Stop, Worth,
+    EnvelopeRequest, Failing, Foresight, Makespans, QuantityKind, Range, Room, Stop,
 };
 
-use elbowroom::envelope::Objective;
 use elbowroom::num::Rational;
 
 use crate::args::Order;
@@ -18,6 +18,7 @@ use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
 use crate::number::{self, Rounding};
 use crate::table::{self, Row};
 use crate::words::counted;
+use best::{gained, goodness};
 use example::{example, what};
 
 /// The answer, whatever it is.
@@ -384,97 +385,6 @@ fn ended(
         }
         Stop::Cancelled => {
             "Interrupted before the search was done; the intervals could be wider".to_owned()
-        }
-    }
-}
-
-/// Which bounds it would be worth most to relax.
-fn gained(best: &Best) -> Option<String> {
-    /// Of a long list only the first are named.
-    const MOST_NAMED: usize = 3;
-    let gain = |worth: &Worth| match best.objective {
-        Objective::LeastSlack => {
-            let percent = &worth.gain * &Rational::from(100);
-            format!(
-                "{} % of least deviation",
-                number::rounded(&percent, 2, Rounding::Down)
-            )
-        }
-        Objective::Volume => {
-            let percent = &worth.gain * &Rational::from(100);
-            format!("{} % of volume", number::nearest(&percent))
-        }
-        _ => format!("{} in the sum of the widths", number::nearest(&worth.gain)),
-    };
-    let named = best.worth.iter().take(MOST_NAMED).map(|worth| {
-        let relax = match worth.relax {
-            Relax::More => "more",
-            Relax::Less => "less",
-        };
-        format!("1 {relax} of {} gains {}", worth.bound, gain(worth))
-    });
-    let named: Vec<String> = named.collect();
-    (!named.is_empty()).then(|| format!("Bounds that are worth most: {}.", named.join("; ")))
-}
-
-/// How large the product of the widths is.
-fn spacious(best: &Best, parameters: &[Room]) -> String {
-    let weights: Rational = parameters
-        .iter()
-        .map(|own| own.range.quantity.weight.clone())
-        .sum();
-    // The geometric mean says more to people than a product of many numbers.
-    let mean = |logarithm: &Rational| {
-        let mean = (logarithm.to_f64() / weights.to_f64().max(f64::MIN_POSITIVE)).exp();
-        let percent = Rational::from_f64_exactly(mean * 100.0).unwrap_or_default();
-        format!("{} %", number::rounded(&percent, 1, Rounding::Down))
-    };
-    let value = mean(&best.value);
-    let counted = number::nearest(&best.most);
-    let also = if best.is_proved {
-        "It is proved that no box has a volume that is more than a millionth greater".to_owned()
-    } else {
-        format!("No box has more than {}", mean(&best.bound))
-    };
-    format!(
-        "The geometric mean of the widths is {value} of the nominal values, counted up to {counted} \
-         times these. {also}"
-    )
-}
-
-/// How good the box is.
-fn goodness(best: &Best, parameters: &[Room]) -> String {
-    if best.objective == Objective::Volume {
-        return spacious(best, parameters);
-    }
-    let number = |value: &Rational| match best.objective {
-        Objective::LeastSlack => {
-            let percent = value * &Rational::from(100);
-            format!("{} %", number::rounded(&percent, 1, Rounding::Down))
-        }
-        _ => number::nearest(value),
-    };
-    let value = number(&best.value);
-    let what = match best.objective {
-        Objective::LeastSlack => "least deviation that any end has room for",
-        _ => "sum of the widths",
-    };
-    let counted = format!(
-        "counted up to {} times the nominal values",
-        number::nearest(&best.most)
-    );
-    match (best.is_proved, best.objective) {
-        (true, Objective::LeastSlack) => format!(
-            "The {what} is {value}, {counted}. It is proved that none can have more unless one that \
-             has no more gets less"
-        ),
-        (true, _) => format!("The {what} is {value}, {counted}. It is proved that no box has more"),
-        (false, _) if best.value < best.bound => format!(
-            "The {what} is {value}, {counted}. No box has more than {}",
-            number(&best.bound)
-        ),
-        (false, _) => {
-            format!("The {what} is {value}, {counted}. No box has more, but other ends could have")
         }
     }
 }

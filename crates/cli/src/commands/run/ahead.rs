@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 
-use elbowroom::execute::RunSpec;
+use elbowroom::execute::{FirstPlan, RunSpec};
 use elbowroom::execution::{PlanAnswer, Planner, PlannerAnswer};
 use elbowroom::model::problem::Condition;
 use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan};
@@ -33,9 +33,14 @@ struct Work {
 
 impl<'a> Ahead<'a> {
     pub(super) fn new(inner: Box<dyn Planner + 'a>, spec: &RunSpec, interrupt: &Interrupt) -> Self {
+        // What is made ahead is no first plan.
+        let spec = RunSpec {
+            first_plan: FirstPlan::Shortest,
+            ..spec.clone()
+        };
         Self {
             inner,
-            spec: Arc::new(spec.clone()),
+            spec: Arc::new(spec),
             interrupt: interrupt.clone(),
             job: None,
         }
@@ -67,8 +72,10 @@ impl Planner for Ahead<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let clock = Clock::start();
         if let Some(answer) = self.made(task, situation) {
-            let seconds = Some(clock.seconds());
-            return PlannerAnswer { answer, seconds };
+            return PlannerAnswer {
+                seconds: Some(clock.seconds()),
+                ..PlannerAnswer::from(answer)
+            };
         }
         self.inner.plan(task, situation)
     }
@@ -92,7 +99,7 @@ impl Planner for Ahead<'_> {
             let begun = Clock::start();
             let clock = || begun.seconds();
             let goes_on = || !stop.load(Ordering::SeqCst) && !interrupt.is_requested();
-            let mut planner = spec.planner_for(None, &clock, &goes_on).ok()?;
+            let mut planner = spec.planner_for(&own, None, &clock, &goes_on).ok()?;
             let answer = planner.plan(&own, &from).answer;
             goes_on().then_some(answer)
         });

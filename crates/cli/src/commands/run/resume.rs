@@ -188,7 +188,7 @@ pub(in crate::commands) fn run(
         let clock = || begun.seconds();
         let goes_on = || !interrupt.is_requested();
         let planner = spec
-            .planner_for(None, &clock, &goes_on)
+            .planner_for(&task, None, &clock, &goes_on)
             .map_err(contradiction)?;
         let request = RunRequest::new(&spec, &task)
             .beginning_with(first)

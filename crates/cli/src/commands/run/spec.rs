@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
-use elbowroom::execute::{NamedText, RunSpec, SpecError, Spoiler, SpoilerError};
+use elbowroom::execute::{
+    FirstPlan, FirstPlanError, NamedText, RunSpec, SpecError, Spoiler, SpoilerError,
+};
 use elbowroom::execution::run::{PlanningTime, RunningRule};
 use elbowroom::num::Rational;
 use elbowroom::plan::parametrize::ParametrizeError;
 use elbowroom::text::Source;
 
-use crate::args::{RunArgs, RunningChoice};
+use crate::args::{FirstPlanChoice, RunArgs, RunningChoice};
 use crate::exit::Failure;
 use crate::input;
 
@@ -29,6 +31,10 @@ pub(in crate::commands) fn of(
         world_process: arguments.world_process.clone(),
         has_plan: arguments.plan().is_some(),
         seed: arguments.seed,
+        first_plan: match arguments.first_plan_by {
+            FirstPlanChoice::Shortest => FirstPlan::Shortest,
+            FirstPlanChoice::Likeliest => FirstPlan::Likeliest,
+        },
         planner_states: arguments.planner_states,
         improve_states: arguments.improve_states,
         guarantee: arguments.guarantee.into(),
@@ -109,6 +115,11 @@ pub(in crate::commands) fn contradiction(error: SpecError) -> Failure {
         }
         SpecError::NeedsWorld(_) => "give it a world file with --world, or leave out the number",
         SpecError::NeedsEmbedded(_) => "leave out --planner, or the number",
+        SpecError::FirstPlan(why) => match why {
+            FirstPlanError::Given => "leave out the plan, or --first-plan",
+            FirstPlanError::AnotherPlanner => "leave out --planner, or --first-plan",
+            _ => "give it a world file with --world, or --likelihoods, or leave out --first-plan",
+        },
         SpecError::NoTimeLimit(name) => {
             return Failure::new(
                 format!("--planner-time says nothing to `--planner {name}`"),

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use elbowroom::answers::run::RunAnswer;
 use elbowroom::execution::Ending;
 use elbowroom::execution::run::{Report, Verdict};
 
@@ -10,7 +11,7 @@ use crate::number::nearest;
 use crate::words::{counted, tame};
 use crate::wrap::wrapped;
 
-pub(super) fn human(report: &Report) -> String {
+pub(super) fn human(answer: &RunAnswer, report: &Report) -> String {
     let replans = counted(report.replans, "new plan");
     let time = nearest(&report.time);
     let width = Look::of_stdout().width;
@@ -52,6 +53,10 @@ pub(super) fn human(report: &Report) -> String {
             styled(BAD, "failed")
         ),
     };
+    if let Some(choice) = &answer.first_plan {
+        let words = wrapped(&tame(choice), width, 2);
+        let _ = writeln!(text, "\n{}\n{words}", styled(STRONG, "The first plan"));
+    }
     for (heading, reasons) in [
         ("Why no plan reaches the goal", &report.dead_end),
         ("Why the plan was given up", &report.reasons),

@@ -1,0 +1,130 @@
+//! How good the best box is, in words.
+
+use elbowroom::answers::envelope::{Best, Probability, Relax, Room, Worth};
+use elbowroom::envelope::Objective;
+use elbowroom::num::Rational;
+
+use crate::number::{self, Rounding};
+
+/// Which bounds it would be worth most to relax.
+pub(super) fn gained(best: &Best) -> Option<String> {
+    /// Of a long list only the first are named.
+    const MOST_NAMED: usize = 3;
+    let gain = |worth: &Worth| match best.objective {
+        Objective::LeastSlack => {
+            let percent = &worth.gain * &Rational::from(100);
+            format!(
+                "{} % of least deviation",
+                number::rounded(&percent, 2, Rounding::Down)
+            )
+        }
+        Objective::Volume => {
+            let percent = &worth.gain * &Rational::from(100);
+            format!("{} % of volume", number::nearest(&percent))
+        }
+        Objective::Probability => {
+            let percent = &worth.gain * &Rational::from(100);
+            format!("{} % of probability", number::nearest(&percent))
+        }
+        _ => format!("{} in the sum of the widths", number::nearest(&worth.gain)),
+    };
+    let named = best.worth.iter().take(MOST_NAMED).map(|worth| {
+        let relax = match worth.relax {
+            Relax::More => "more",
+            Relax::Less => "less",
+        };
+        format!("1 {relax} of {} gains {}", worth.bound, gain(worth))
+    });
+    let named: Vec<String> = named.collect();
+    (!named.is_empty()).then(|| format!("Bounds that are worth most: {}.", named.join("; ")))
+}
+
+/// How large the product of the widths is.
+fn spacious(best: &Best, parameters: &[Room]) -> String {
+    let weights: Rational = parameters
+        .iter()
+        .map(|own| own.range.quantity.weight.clone())
+        .sum();
+    // The geometric mean says more to people than a product of many numbers.
+    let mean = |logarithm: &Rational| {
+        let mean = (logarithm.to_f64() / weights.to_f64().max(f64::MIN_POSITIVE)).exp();
+        let percent = Rational::from_f64_exactly(mean * 100.0).unwrap_or_default();
+        format!("{} %", number::rounded(&percent, 1, Rounding::Down))
+    };
+    let value = mean(&best.value);
+    let counted = number::nearest(&best.most);
+    let also = if best.is_proved {
+        "It is proved that no box has a volume that is more than a millionth greater".to_owned()
+    } else {
+        format!("No box has more than {}", mean(&best.bound))
+    };
+    format!(
+        "The geometric mean of the widths is {value} of the nominal values, counted up to {counted} \
+         times these. {also}"
+    )
+}
+
+/// How likely all durations stay inside.
+fn likely(best: &Best, probability: &Probability) -> String {
+    let percent = |value: &Rational, rounding| {
+        let percent = value * &Rational::from(100);
+        format!("{} %", number::rounded(&percent, 3, rounding))
+    };
+    if probability.most.is_zero() {
+        return "In no box is there any probability that all durations stay inside, as the world has \
+                them"
+            .to_owned();
+    }
+    let least = percent(&probability.least, Rounding::Down);
+    let most = percent(&probability.most, Rounding::Up);
+    let also = if best.is_proved {
+        format!(
+            "It is proved that no box is more likely by more than a millionth; none has more than {most}"
+        )
+    } else {
+        format!("No box has more than {most}")
+    };
+    format!(
+        "All durations stay inside with a probability of at least {least}, as the world has them. {also}"
+    )
+}
+
+/// How good the box is.
+pub(super) fn goodness(best: &Best, parameters: &[Room]) -> String {
+    if let Some(probability) = &best.probability {
+        return likely(best, probability);
+    }
+    if best.objective == Objective::Volume {
+        return spacious(best, parameters);
+    }
+    let number = |value: &Rational| match best.objective {
+        Objective::LeastSlack => {
+            let percent = value * &Rational::from(100);
+            format!("{} %", number::rounded(&percent, 1, Rounding::Down))
+        }
+        _ => number::nearest(value),
+    };
+    let value = number(&best.value);
+    let what = match best.objective {
+        Objective::LeastSlack => "least deviation that any end has room for",
+        _ => "sum of the widths",
+    };
+    let counted = format!(
+        "counted up to {} times the nominal values",
+        number::nearest(&best.most)
+    );
+    match (best.is_proved, best.objective) {
+        (true, Objective::LeastSlack) => format!(
+            "The {what} is {value}, {counted}. It is proved that none can have more unless one that \
+             has no more gets less"
+        ),
+        (true, _) => format!("The {what} is {value}, {counted}. It is proved that no box has more"),
+        (false, _) if best.value < best.bound => format!(
+            "The {what} is {value}, {counted}. No box has more than {}",
+            number(&best.bound)
+        ),
+        (false, _) => {
+            format!("The {what} is {value}, {counted}. No box has more, but other ends could have")
+        }
+    }
+}
