@@ -47,6 +47,7 @@ pub use violation::ViolationAnswer;
 pub use watch::{EnvelopeProgress, Event, Halt, PlanProgress, TrialsProgress, Unwatched, Watcher};
 
 use crate::box_text::BoxTextError;
+use crate::chances::ChanceError;
 use crate::flow::FlowError;
 
 /// Why there is no answer: the request cannot be understood, or is beyond what can be analysed.
@@ -63,6 +64,9 @@ pub enum RequestError {
     /// The judge cannot tell whether the plan is valid: why.
     #[error("cannot tell whether the plan is valid: {0}")]
     Undecided(String),
+    /// It cannot be told how likely the durations of the plan stay inside a box.
+    #[error(transparent)]
+    Chance(#[from] ChanceError),
     /// Something in the problem, which this names, is not supported.
     #[error("{0}")]
     Unsupported(String),

@@ -10,6 +10,7 @@ use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_plan::deorder::{DeorderError, Deordered, deorder};
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize, vary};
 use elbowroom_plan::{NodeId, ParametrizedPlan};
+use elbowroom_sim::WorldModel;
 use elbowroom_stn::ConsistentNetwork;
 
 use crate::answers::envelope::{Search, envelope};
@@ -27,6 +28,9 @@ pub struct Settings {
     pub search: elbowroom_envelope::Settings,
     /// What the box is to be the best of; without one, it is IRR's.
     pub objective: Option<Objective>,
+    /// The world in which durations are to stay inside most likely, with
+    /// [`Objective::Probability`].
+    pub world: Option<Arc<WorldModel>>,
 }
 
 impl Default for Settings {
@@ -38,6 +42,7 @@ impl Default for Settings {
             guarantee: Guarantee::default(),
             search: Search::default().settings(),
             objective: None,
+            world: None,
         }
     }
 }

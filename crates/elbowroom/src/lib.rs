@@ -160,6 +160,7 @@
 
 pub mod answers;
 mod box_text;
+mod chances;
 pub mod execute;
 pub mod executive;
 mod explain;
@@ -174,6 +175,7 @@ mod room;
 pub mod timed;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
+pub use chances::{ChanceError, chances};
 pub use elbowroom_envelope as envelope;
 pub use elbowroom_execution as execution;
 pub use elbowroom_external as external;

@@ -1,5 +1,6 @@
 //! How long a plan takes.
 
+use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 use elbowroom_plan::{Node, ParametrizedPlan, Valuation, network_node};
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network, NodeId};
@@ -15,6 +16,15 @@ pub fn earliest_end(plan: &ParametrizedPlan, valuation: &Valuation) -> Option<Ra
         .filter(|(_, node)| !matches!(node, Node::Timed(_)))
         .map(|(id, _)| schedule.times()[id.index()].clone())
         .max()
+}
+
+/// The end time of the last action.
+pub(crate) fn end(plan: &TimeTriggeredPlan) -> Rational {
+    let ends = plan.steps.iter().map(|step| {
+        let duration = step.duration.clone().unwrap_or_default();
+        &step.start + &duration
+    });
+    ends.max().unwrap_or_default()
 }
 
 /// The schedules of a plan in which the durations that the executor chooses are as planned, as it

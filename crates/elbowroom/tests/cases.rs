@@ -150,6 +150,16 @@ fn the_delivery_is_as_worked_by_hand() {
 }
 
 #[test]
+fn the_way_round_is_as_worked_by_hand() {
+    agrees("crossing", &["[0, 8999/500]", "[0, 3999/500]"], |point| {
+        let [round, hand_over] = point else {
+            panic!("two durations")
+        };
+        round + hand_over <= number("19.998") && !round.is_negative() && !hand_over.is_negative()
+    });
+}
+
+#[test]
 fn the_battery_is_as_worked_by_hand() {
     let thousandth = epsilon();
     agrees(

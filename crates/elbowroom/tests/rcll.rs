@@ -11,12 +11,12 @@ use std::sync::Arc;
 
 use elbowroom::flow::{FlowError, free, open};
 use elbowroom::{Explainer, plan::parametrize::VarySpec};
-use elbowroom_envelope::{Limit, limits};
+use elbowroom_envelope::limits;
 use elbowroom_model::Task;
 use elbowroom_model::ground::Change;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan};
-use elbowroom_plan::{ParameterId, Side};
+use elbowroom_plan::{BoxEnd, ParameterId, Side};
 use shared::case::{Case, number};
 
 /// The four productions run side by side. Written for the domain with uncertain durations.
@@ -72,16 +72,21 @@ fn deadline(task: &Task) -> Rational {
 fn upper_limit(case: &Case, parameter: usize) -> String {
     let [_, sharp] = case.found("1");
     let mut oracle = case.oracle();
-    let all = limits(
+    let end = BoxEnd {
+        parameter: ParameterId::from(parameter),
+        side: Side::Upper,
+    };
+    let steps = vec![Rational::ONE; sharp.intervals().len()];
+    let explainer = Explainer::new(&case.task, &case.plan);
+    let mut words = None;
+    limits(
         &mut oracle,
         &sharp,
-        &vec![Rational::ONE; sharp.intervals().len()],
+        (&[end], &steps),
         &mut || ControlFlow::Continue(()),
+        &mut |end, limit| words = explainer.limit(end.parameter, end.side, limit),
     );
-    let limit: &Limit = all[parameter][1].as_ref().expect("something limits it");
-    Explainer::new(&case.task, &case.plan)
-        .limit(ParameterId::from(parameter), Side::Upper, limit)
-        .expect("it is limited")
+    words.expect("it is limited")
 }
 
 fn duration_files(data: &Path) -> (PathBuf, PathBuf, String) {

@@ -79,6 +79,7 @@ impl Planner for PyPlanner {
         PlannerAnswer {
             answer: answer.unwrap_or_else(|why| PlanAnswer::NotFound { why }),
             seconds: Some(Rational::new(micros, 1_000_000)),
+            remark: None,
         }
     }
 }

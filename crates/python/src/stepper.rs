@@ -63,7 +63,7 @@ impl Stepper {
             } else {
                 let model = spec.model(task.problem());
                 let model = model.map_err(elbowroom::execute::SpecError::World)?;
-                execution.planned_by(spec.planner_for(model.as_ref(), NO_CLOCK, ALWAYS)?)
+                execution.planned_by(spec.planner_for(&task, model.as_ref(), NO_CLOCK, ALWAYS)?)
             };
             let tape = if has_trace {
                 Some(Tape::of(&task, &spec)?)

@@ -434,6 +434,9 @@ pub struct PlannedLine {
     /// Whether it is certain that there is none.
     #[serde(rename = "unsolvable")]
     pub is_unsolvable: bool,
+    /// What the planner has to say about it: why it is this plan; left out where it is nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
 }
 
 /// An action has used most of the time that the plan can bear.

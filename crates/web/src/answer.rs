@@ -20,6 +20,7 @@ use elbowroom::pddl::{self, Diagnostic};
 use elbowroom::plan::format;
 use elbowroom::plan::parametrize::VarySpec;
 use elbowroom::report::trace::TraceWriter;
+use elbowroom::sim::WorldModel;
 use elbowroom::{AnyPlan, PlanKind};
 use serde_json::json;
 
@@ -205,6 +206,14 @@ fn widened(
         .collect();
     let vary = vary.map_err(Failure::new)?;
     let plan = read.plan(&question.plan)?;
+    let world = match &question.world {
+        Some(text) => {
+            let source = pddl::Source::new(text.name.as_str(), text.text.as_str());
+            let world = WorldModel::read(&source, read.task.problem());
+            Some(Arc::new(world.map_err(Failure::from)?))
+        }
+        None => None,
+    };
     let search = Search::default();
     let precision = match &question.precision {
         Some(text) => Some(positive("precision", text)?),
@@ -232,6 +241,7 @@ fn widened(
                 ..search.best
             },
         },
+        world,
         ..EnvelopeRequest::new(&Arc::new(read.task), plan)
     };
     if question.method == Method::Exact {

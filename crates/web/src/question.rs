@@ -136,6 +136,10 @@ pub struct EnvelopeQuestion {
     /// What the best box is the greatest of.
     #[serde(default)]
     pub objective: Objective,
+    /// With the objective `probability`: the world that says how long actions take
+    /// (`docs/formats/world.md`).
+    #[serde(default)]
+    pub world: Option<Text>,
     /// Whether both ends of the best box's intervals are equally far from the nominal value.
     #[serde(default)]
     pub symmetric: bool,

@@ -12,7 +12,7 @@ use elbowroom::plan::format;
 use elbowroom::verify::{AnswerError, verify_answer};
 
 use crate::instances::Instance;
-use crate::{read, sought};
+use crate::{around, read, sought};
 
 /// A row for each family, guarantee and objective.
 #[allow(
@@ -26,7 +26,12 @@ pub(crate) fn times(families: &[(String, Vec<Instance>)], steps: usize) {
     println!("|---|---|---|---|---|---|---|---|---|");
     for (family, instances) in families {
         for guarantee in [Guarantee::Weak, Guarantee::Dynamic, Guarantee::Strong] {
-            for objective in [Objective::LeastSlack, Objective::Widths, Objective::Volume] {
+            for objective in [
+                Objective::LeastSlack,
+                Objective::Widths,
+                Objective::Volume,
+                Objective::Probability,
+            ] {
                 let (mut boxes, mut checks, mut proved) = (Vec::new(), Vec::new(), 0);
                 for instance in instances {
                     let Some((task, text)) = read(instance) else {
@@ -82,6 +87,7 @@ fn checked(
     request.guarantee = guarantee;
     request.search.method = Method::Best;
     request.search.best.objective = objective;
+    request.world = around(task).map(Arc::new);
     let outcome = envelope(&request, &mut Patience(steps)).ok()?;
     let answer = serde_json::to_string(&outcome.answer).expect("a document");
     let begun = Instant::now();

@@ -45,6 +45,9 @@ pub struct RunAnswer {
     /// The answer itself, as the last line of a trace has it.
     #[serde(flatten)]
     pub report: ReportLine,
+    /// Among what the first plan was chosen, in words; left out where it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_plan: Option<String>,
     /// Always the same.
     pub format: RunFormat,
     /// Always the same.
@@ -137,12 +140,14 @@ pub fn run(
     let goes_on = || shared.get().flow().is_continue();
     let planner = match request.planner {
         Some(planner) => planner,
-        None => spec.planner_for(model.as_ref(), &clock, &goes_on)?,
+        None => spec.planner_for(request.task, model.as_ref(), &clock, &goes_on)?,
     };
+    let remark = Arc::new(Mutex::new(None));
     let recorder = Heard {
         inner: request.recorder,
         watched: &shared,
         plans: 0,
+        remark: Arc::clone(&remark),
     };
     let mut listener = request.listener;
     let report = execution
@@ -157,8 +162,12 @@ pub fn run(
         .ending_when(|| matches!(shared.get().flow(), ControlFlow::Break(_)))
         .explaining()
         .run_in(world);
+    let first_plan = remark.lock().unwrap_or_else(PoisonError::into_inner).take();
     Ok(RunOutcome {
-        answer: RunAnswer::of(&report),
+        answer: RunAnswer {
+            first_plan,
+            ..RunAnswer::of(&report)
+        },
         report,
     })
 }
@@ -187,6 +196,7 @@ impl RunAnswer {
     pub fn of(report: &Report) -> Self {
         Self {
             report: ReportLine::of(report),
+            first_plan: None,
             format: RunFormat::Run,
             version: Version,
         }
@@ -214,12 +224,22 @@ struct Heard<'a, 'w> {
     inner: Box<dyn Recorder + 'a>,
     watched: &'a Watched<'w>,
     plans: usize,
+    /// What the planner said of the first plan.
+    remark: Arc<Mutex<Option<String>>>,
 }
 
 impl Recorder for Heard<'_, '_> {
     fn record(&mut self, entry: &Entry<'_>) {
         self.inner.record(entry);
         self.plans += usize::from(matches!(entry, Entry::Mission(_)));
+        if let Entry::Planned {
+            remark: Some(remark),
+            ..
+        } = entry
+        {
+            let mut first = self.remark.lock().unwrap_or_else(PoisonError::into_inner);
+            first.get_or_insert_with(|| (*remark).to_owned());
+        }
         let plans = self.plans;
         self.watched
             .get()

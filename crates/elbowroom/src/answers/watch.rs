@@ -77,6 +77,8 @@ pub struct PlanProgress<'a> {
     pub makespan: Option<&'a Rational>,
     /// The value of the problem's metric, if this is about a new plan and it has one.
     pub metric: Option<&'a Rational>,
+    /// What a new best plan is worth, in words, where plans are not compared by metric or makespan.
+    pub worth: Option<&'a str>,
     /// The number of plans so far.
     pub plans: usize,
     /// The number of states that have been looked at; the embedded planner only.

@@ -81,12 +81,14 @@ impl Line {
                 plan,
                 why_not,
                 is_unsolvable,
+                remark,
             } => Self::Planned(PlannedLine {
                 now: exact(now),
                 took: exact(took),
                 plan: plan.map(steps),
                 why_not: why_not.map(str::to_owned),
                 is_unsolvable,
+                remark: remark.map(str::to_owned),
             }),
             Entry::Warning {
                 now,
@@ -98,10 +100,7 @@ impl Line {
                 ticket: ticket.0,
                 action: action.to_owned(),
                 until: exact(until),
-                words: format!(
-                    "{action} has used its room: {} s until a new plan is needed",
-                    (until - now).to_decimal(3)
-                ),
+                words: room_is_used(action, &(until - now)),
             }),
             Entry::Kept { now, reason } => Self::Kept(KeptLine {
                 now: exact(now),
@@ -417,4 +416,9 @@ fn situation_line(task: &Task, situation: &Situation) -> SituationLine {
             })
             .collect(),
     }
+}
+
+fn room_is_used(action: &str, left: &Rational) -> String {
+    let left = left.to_decimal(3);
+    format!("{action} has used its room: {left} s until a new plan is needed")
 }

@@ -216,12 +216,9 @@ impl ReplayPlanner {
 impl Planner for ReplayPlanner {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let Some((line, planned)) = self.plans.pop_front() else {
-            return PlannerAnswer {
-                answer: PlanAnswer::NotFound {
-                    why: END.to_owned(),
-                },
-                seconds: None,
-            };
+            return PlannerAnswer::from(PlanAnswer::NotFound {
+                why: END.to_owned(),
+            });
         };
         let answer = match &planned.plan {
             Some(steps) => match read_plan(steps, task, Some(situation), line) {
@@ -238,6 +235,7 @@ impl Planner for ReplayPlanner {
         PlannerAnswer {
             answer,
             seconds: Some(planned.took.0),
+            remark: planned.remark,
         }
     }
 }

@@ -196,6 +196,7 @@ fn a_plan_that_was_made_for_goals_that_have_changed_since_is_not_begun() {
             PlannerAnswer {
                 answer,
                 seconds: Some(Rational::from(5)),
+                remark: None,
             }
         }
     }
