@@ -9,7 +9,9 @@
 //!   either certain leaves the other.
 //! - *What would retrying gain?* P(A ∩ G) if failed attempts to start one action did not end the
 //!   order, but were repeated. Each attempt is a step after which facts may change by themselves.
-//!   The sum over the number of failed attempts is exact but for what is left of it in the end.
+//!   The same for ends that fail: the action is started again at once, with what the failure left
+//!   behind. The sum over the number of failed attempts is exact but for what is left of it in the
+//!   end.
 
 use elbowroom_model::ground::FactId;
 use elbowroom_plan::{InstanceId, Node, NodeId};
@@ -50,11 +52,15 @@ pub struct Account {
 pub struct ActionShare {
     /// Which action.
     pub instance: InstanceId,
-    /// P(A ∩ G) if its start and its effects were certain.
+    /// P(A ∩ G) if its start, its end and its effects were certain.
     pub if_certain: f64,
     /// P(A ∩ G) if failed attempts to start it were repeated; `None` where that would take too
     /// long to calculate.
     pub if_retried: Option<f64>,
+    /// P(A ∩ G) if the action was started again at once whenever its end fails; `None` where its
+    /// end does not fail, where a failure may leave one thing or another behind, or where it would
+    /// take too long to calculate.
+    pub if_done_again: Option<f64>,
 }
 
 /// The part of a fact in an order.
@@ -92,6 +98,10 @@ impl Account {
                 if_certain: probabilities(&certain, circumstances, sequence)?.1,
                 if_retried: match &retries {
                     Some(retries) => Some(retries.at(at)?),
+                    None => None,
+                },
+                if_done_again: match &retries {
+                    Some(retries) => retries.done_again(instance, at)?,
                     None => None,
                 },
             });
@@ -188,6 +198,42 @@ impl<'a> Retries<'a> {
         }
         Ok(whole)
     }
+
+    /// P(A ∩ G) if the action that starts at this position is started again, as often as its end
+    /// fails.
+    fn done_again(&self, instance: InstanceId, start: usize) -> Result<Option<f64>, TooCoupled> {
+        let end = self.model.end(instance);
+        let can_fail = self.model.event(end).success < 1.0;
+        let after = &self.sequence[start..];
+        let Some(end) = after
+            .iter()
+            .position(|node| *node == end)
+            .filter(|_| can_fail)
+        else {
+            return Ok(None);
+        };
+        let end = start + end;
+        if self.model.failed_end(self.sequence[end]).is_none() {
+            return Ok(None);
+        }
+        let mut before = PrunedNetwork::new(self.model, self.circumstances)?;
+        for &node in &self.sequence[..end] {
+            before.push(node)?;
+        }
+        let mut whole = 0.0;
+        for _ in 0..=MOST_ATTEMPTS {
+            let mut rest = before.clone();
+            for &node in &self.sequence[end..] {
+                rest.push(node)?;
+            }
+            whole += rest.success_probability()?;
+            before.fail(self.sequence[end])?;
+            if before.push(self.sequence[start])? <= NEGLIGIBLE {
+                break;
+            }
+        }
+        Ok(Some(whole))
+    }
 }
 
 impl Model {
@@ -197,6 +243,7 @@ impl Model {
         for node in [self.start(instance), self.end(instance)] {
             let event = &mut model.events[node.index()];
             event.success = 1.0;
+            event.failures_per_second = 0.0;
             for effect in &mut event.effects {
                 effect.probability = 1.0;
             }

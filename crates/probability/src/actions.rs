@@ -2,7 +2,11 @@
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, Condition, SnapAction};
-use elbowroom_model::reachability::{self, Answer};
+use elbowroom_model::problem::{ObjectId, SchemaId, TimedChange, TimedInitial};
+use elbowroom_model::reachability::{self, Answer, Grounding};
+use elbowroom_num::Rational;
+
+use crate::likelihoods::Likelihoods;
 
 /// The problem is not one for a world without time.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -19,6 +23,62 @@ pub struct Unsupported {
 /// When there are numbers, conditional effects, derived facts or timed initials, or too many
 /// actions.
 pub fn all_actions(task: &Task) -> Result<Vec<Action>, Unsupported> {
+    check(task)?;
+    of(task, grounding(task)?.instances())
+}
+
+/// The same, with the actions that can be reached only after a failure, because of what it leaves
+/// behind.
+///
+/// # Errors
+/// As [`all_actions`].
+pub fn all_actions_under(
+    task: &Task,
+    likelihoods: &Likelihoods,
+) -> Result<Vec<Action>, Unsupported> {
+    let mut actions = all_actions(task)?;
+    if !likelihoods.has_failures() {
+        return Ok(actions);
+    }
+    // What failures leave behind comes about at some time, like what timed initials do.
+    let mut problem = task.problem().clone();
+    loop {
+        let known = problem.timed.len();
+        for change in left_behind(task, &actions, likelihoods) {
+            if problem.timed.iter().all(|timed| timed.change != change) {
+                let time = Rational::ONE;
+                problem.timed.push(TimedInitial { time, change });
+            }
+        }
+        if problem.timed.len() == known {
+            return Ok(actions);
+        }
+        actions = of(task, grounding(&Task::new(problem.clone()))?.instances())?;
+    }
+}
+
+/// What failures of these actions may do to facts.
+fn left_behind(task: &Task, actions: &[Action], likelihoods: &Likelihoods) -> Vec<TimedChange> {
+    let mut left = Vec::new();
+    for action in actions {
+        if likelihoods.lasts(action, 1.0) >= 1.0 {
+            continue;
+        }
+        for aftermath in likelihoods.aftermaths(task, action) {
+            for (fact, becomes) in aftermath.changes {
+                let (predicate, objects) = task.atom(fact);
+                left.push(if becomes {
+                    TimedChange::Add(predicate, objects)
+                } else {
+                    TimedChange::Delete(predicate, objects)
+                });
+            }
+        }
+    }
+    left
+}
+
+fn check(task: &Task) -> Result<(), Unsupported> {
     let refuse = |what: String| Err(Unsupported { what });
     if let Some(feature) = task.only_judged() {
         return refuse(format!("the problem has {feature}"));
@@ -26,19 +86,32 @@ pub fn all_actions(task: &Task) -> Result<Vec<Action>, Unsupported> {
     if !task.timed().is_empty() {
         return refuse("the problem has timed initials".to_owned());
     }
+    Ok(())
+}
+
+fn grounding(task: &Task) -> Result<Grounding, Unsupported> {
+    let refuse = |what: &str| {
+        let what = what.to_owned();
+        Err(Unsupported { what })
+    };
     let Answer::Complete(grounding) =
         reachability::ground(task, &reachability::Settings::default())
     else {
-        return refuse("there are more actions than can be listed".to_owned());
+        return refuse("there are more actions than can be listed");
     };
     if !grounding.rules.is_empty() {
-        return refuse("the domain has derived predicates".to_owned());
+        return refuse("the domain has derived predicates");
     }
     if has_numbers(task.goal()) {
-        return refuse("the goal is about numbers".to_owned());
+        return refuse("the goal is about numbers");
     }
+    Ok(grounding)
+}
+
+fn of(task: &Task, instances: Vec<(SchemaId, Vec<ObjectId>)>) -> Result<Vec<Action>, Unsupported> {
+    let refuse = |what: String| Err(Unsupported { what });
     let mut actions = Vec::new();
-    for (schema, arguments) in grounding.instances() {
+    for (schema, arguments) in instances {
         let name = task.action_name(schema, &arguments);
         let Ok(action) = task.instantiate(schema, &arguments) else {
             return refuse(format!("{name} cannot be instantiated"));

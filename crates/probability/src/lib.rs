@@ -3,8 +3,8 @@
 //! In: a partially ordered plan, the likelihoods of failures and spontaneous changes, and the
 //! belief about the present state. Out: the order most likely to succeed, and the next happening.
 //!
-//! 1. [`Likelihoods`]: facts that change by themselves, starts and effects that fail; read from
-//!    files by [`likelihoods`].
+//! 1. [`Likelihoods`]: facts that change by themselves, starts, ends and effects that fail, and
+//!    what failures leave behind; read from files by [`likelihoods`].
 //! 2. [`Model`]: a plan's happenings as steps of a stochastic process.
 //! 3. [`PrunedNetwork`]: P(A) and P(A ∩ G) of an order, happening by happening.
 //! 4. [`OrderSearch`] (`PGen`): the best order, from [`Circumstances`].
@@ -74,7 +74,7 @@ pub mod optimum;
 pub mod search;
 mod total_order;
 
-pub use actions::{Unsupported, all_actions};
+pub use actions::{Unsupported, all_actions, all_actions_under};
 pub use belief::Belief;
 pub use circumstances::{Circumstances, Running};
 pub use dispatch::{Choice, LayerDispatch, NextHappening, Reconsider};

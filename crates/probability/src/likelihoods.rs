@@ -1,6 +1,7 @@
 //! How likely things are to go otherwise than planned: [`Likelihoods`].
 
 mod authors;
+mod failing;
 mod file;
 mod names;
 mod write;
@@ -16,6 +17,7 @@ use elbowroom_text::{Diagnostics, Source};
 use crate::belief::Belief;
 
 pub use authors::read as read_authors;
+pub use failing::{Aftermath, Argument, Failing, Outcome, OutcomeChange};
 pub use write::write;
 
 /// Reads a likelihood file, in our own format or in that of Olisipo's authors: theirs has a line
@@ -93,7 +95,7 @@ impl Rate {
     }
 }
 
-/// The success probabilities of an action: its start and its effects.
+/// The success probabilities of an action: its start, its effects, and what is after its start.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Success {
     /// The probability that an attempt to start it succeeds, its conditions being true.
@@ -102,10 +104,12 @@ pub struct Success {
     pub effects: BTreeMap<PredicateId, f64>,
     /// The same for effects that make facts false, where it differs.
     pub deletions: BTreeMap<PredicateId, f64>,
+    /// Failures after its start.
+    pub failing: Failing,
 }
 
 /// Default probabilities, for what has no more specific entry.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Defaults {
     /// For facts that are false.
     pub becomes_true: Option<f64>,
@@ -119,6 +123,8 @@ pub struct Defaults {
     pub start: Option<f64>,
     /// For effects.
     pub effect: Option<f64>,
+    /// For failures of actions after their start.
+    pub failing: Failing,
 }
 
 /// The part of a [`Flip`] and of a [`Rate`] that an entry states.
@@ -238,7 +244,7 @@ impl Likelihoods {
         }
     }
 
-    /// Whether facts may change with time, and not only with steps.
+    /// Whether facts may change with time, and not only with steps, or actions fail with time.
     pub fn has_rates(&self) -> bool {
         let some = |rate: Option<f64>| rate.is_some_and(|rate| rate > 0.0);
         let entries = self.predicates.values().chain(self.facts.values());
@@ -247,6 +253,12 @@ impl Likelihoods {
         rates.any(some)
             || some(self.defaults.becomes_true_per_second)
             || some(self.defaults.becomes_false_per_second)
+            || self.has_failures_during()
+    }
+
+    /// Whether actions may fail after their start.
+    pub fn has_failures(&self) -> bool {
+        self.has_failing_ends() || self.has_failures_during()
     }
 
     /// What the entries of a fact and of its predicate say.

@@ -43,7 +43,7 @@ pub struct Model {
     pub(crate) flips: Vec<Flip>,
     /// How often facts change with time.
     pub(crate) rates: Vec<Rate>,
-    /// Whether any of them is above 0.
+    /// Whether any of them is above 0, or actions fail with time.
     pub(crate) has_rates: bool,
     /// The fluents that some happening changes, sorted.
     pub(crate) fluents: Vec<FluentId>,
@@ -59,8 +59,13 @@ pub struct Model {
 pub(crate) struct Event {
     /// Needed on arrival.
     pub(crate) condition: Requirement,
-    /// P(it succeeds | its condition); 1 for ends and timed initials.
+    /// P(it succeeds | its condition); 1 for timed initials.
     pub(crate) success: f64,
+    /// How often per second the action that starts here fails while it is under way.
+    pub(crate) failures_per_second: f64,
+    /// What a failure of this end leaves behind; empty for all other happenings, which leave
+    /// everything as it was.
+    pub(crate) aftermaths: Vec<Leftover>,
     /// Whether it is a snap action, after which facts change by themselves.
     pub(crate) is_step: bool,
     /// The conditions from right after this start to the end of its action.
@@ -86,6 +91,15 @@ pub(crate) struct FactEffect {
     pub(crate) guard: Option<Condition>,
     /// The fact's truth is set without a chance to fail or change (memories, timed initials).
     pub(crate) is_certain: bool,
+}
+
+/// How things may stand after a failed end.
+#[derive(Clone, Debug)]
+pub(crate) struct Leftover {
+    /// Given the failure.
+    pub(crate) probability: f64,
+    /// The facts that are set, each once, sorted.
+    pub(crate) changes: Vec<(usize, bool)>,
 }
 
 /// An effect on a number.
@@ -138,9 +152,42 @@ impl Model {
         effects.iter().any(|effect| Some(effect.fact) == position)
     }
 
-    /// Whether facts change with time, and not only with steps.
+    /// Whether facts change with time, and not only with steps, or actions fail with time.
     pub fn has_rates(&self) -> bool {
         self.has_rates
+    }
+
+    /// An end that fails, as a happening of its own: it has none of its end effects, and things
+    /// stand as they stand then. `None` where there is more than one way in which they may.
+    pub(crate) fn failed_end(&self, node: NodeId) -> Option<Event> {
+        let event = self.event(node);
+        let [aftermath] = event.aftermaths.as_slice() else {
+            return None;
+        };
+        let Node::End(id) = self.plan.nodes[node.index()] else {
+            return None;
+        };
+        // What the start has remembered is forgotten.
+        let start = self.event(self.start(id)).effects.iter();
+        let memories = start.filter(|effect| effect.is_certain);
+        let memories = memories.map(|effect| (effect.fact, false, true));
+        let changes = aftermath.changes.iter();
+        let changes = changes.map(|&(fact, becomes)| (fact, becomes, false));
+        let effect = |(fact, makes_true, is_certain)| FactEffect {
+            fact,
+            makes_true,
+            probability: 1.0,
+            guard: None,
+            is_certain,
+        };
+        let mut effects: Vec<FactEffect> = memories.chain(changes).map(effect).collect();
+        effects.sort_by_key(|effect| effect.fact);
+        Some(Event {
+            success: 1.0 - event.success,
+            effects,
+            updates: Vec::new(),
+            ..event.clone()
+        })
     }
 
     /// How long an action takes at least, in seconds.

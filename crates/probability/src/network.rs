@@ -13,7 +13,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use crate::circumstances::Circumstances;
-use crate::model::{Model, Requirement};
+use crate::model::{Event, Model, Requirement};
 use clock::Clock;
 use facts::Facts;
 pub(crate) use facts::Snapshot;
@@ -232,14 +232,26 @@ impl<'m> PrunedNetwork<'m> {
         Ok(self.probability)
     }
 
-    /// Adds an attempt to start an action that fails, though it could succeed: facts change by
-    /// themselves, and the attempt can be made again. Returns how likely all that is.
+    /// Adds an attempt to start an action, or an end, that fails, though it could succeed: facts
+    /// change by themselves, and the attempt can be made again. After a failed end things stand as
+    /// that failure leaves them behind; where there are several ways, none of them is counted.
+    /// Returns how likely all that is.
     ///
     /// It cannot be taken back.
     ///
     /// # Errors
     /// When its condition couples too many facts.
     pub(crate) fn fail(&mut self, node: NodeId) -> Result<f64, TooCoupled> {
+        if let Node::End(id) = self.model.plan().nodes[node.index()] {
+            let Some(failed) = self.model.failed_end(node) else {
+                self.probability = 0.0;
+                return Ok(0.0);
+            };
+            self.happen(node, &failed)?;
+            // Whenever it is started again, it takes as long as it takes.
+            self.remaining.retain(|(running, _)| *running != id);
+            return Ok(self.probability);
+        }
         let event = self.model.event(node);
         self.require(&event.condition, node, Reading::OnArrival)?;
         self.probability *= 1.0 - event.success;
@@ -258,11 +270,21 @@ impl<'m> PrunedNetwork<'m> {
 
     fn try_push(&mut self, node: NodeId) -> Result<(), TooCoupled> {
         let model = self.model;
-        let event = model.event(node);
+        self.happen(node, model.event(node))
+    }
+
+    /// What a happening does, given as an event.
+    fn happen(&mut self, node: NodeId, event: &Event) -> Result<(), TooCoupled> {
+        let model = self.model;
         self.pass(node)?;
         self.require(&event.condition, node, Reading::OnArrival)?;
+        let is_end = matches!(model.plan().nodes[node.index()], Node::End(_));
         self.multiply(event.success, (node, Reading::OnArrival), || {
-            LossCause::Start
+            if is_end {
+                LossCause::End
+            } else {
+                LossCause::Start
+            }
         });
         let updates = self.updates(node, event);
         self.facts_change(node, event)?;

@@ -6,7 +6,10 @@
 //! - *Try to start* an action that is not under way and whose condition holds. With the action's
 //!   success probability it is then under way and its start effects take place, each with its own
 //!   probability, deletions first; else nothing happens.
-//! - *End* an action under way whose end condition holds: its end effects take place likewise.
+//! - *End* an action under way whose end condition holds. With the probability of its end, its end
+//!   effects take place likewise; else it has failed, none of them takes place, and facts are as
+//!   one of its failure's outcomes leaves them
+//!   ([`Aftermath`](crate::likelihoods::Aftermath)). Either way it is no longer under way.
 //!   Instantaneous actions are tried like starts and leave nothing under way.
 //! - *Abandon* an action under way: its end effects will not take place. That takes no step.
 //!

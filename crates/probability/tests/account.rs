@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use elbowroom_plan::{Node, NodeId};
 use elbowroom_probability::account::Account;
-use elbowroom_probability::likelihoods::{PartialFlip, Success};
+use elbowroom_probability::likelihoods::{Failing, PartialFlip, Success};
 use elbowroom_probability::search::{LatticeLimits, TooLarge};
 use elbowroom_probability::{
     Likelihoods, LossCause, Model, OrderSearch, Reading, SearchSettings, Semantics,
@@ -17,7 +17,7 @@ use elbowroom_probability::{
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use twin::Worlds;
-use twin::random::{Case, Taste, case, order};
+use twin::random::{Case, Taste, case, failing_in_time, order, with_failing_ends};
 
 const BOTH: [Semantics; 2] = [Semantics::Paper, Semantics::World];
 
@@ -30,6 +30,19 @@ const TASTE: Taste = Taste {
     timed: true,
     numbers: true,
 };
+
+/// A random case; in half of them actions fail after their start as well.
+fn mixed(rng: &mut ChaCha8Rng, round: usize) -> Case {
+    let plain = case(rng, TASTE);
+    match round % 4 {
+        0 | 1 => plain,
+        2 => with_failing_ends(rng, plain),
+        _ => {
+            let case = with_failing_ends(rng, plain);
+            failing_in_time(rng, case)
+        }
+    }
+}
 
 fn model(case: &Case, semantics: Semantics) -> Model {
     let (task, plan) = (case.task.clone(), case.plan.clone());
@@ -60,8 +73,8 @@ fn assert_close(found: f64, expected: f64, what: &str) {
 fn what_is_lost_and_what_is_left_are_all_worlds() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut lossy = 0;
-    for _ in 0..400 {
-        let case = case(&mut rng, TASTE);
+    for round in 0..400 {
+        let case = mixed(&mut rng, round);
         for semantics in BOTH {
             let order = order(&mut rng, &case);
             let model = model(&case, semantics);
@@ -101,8 +114,8 @@ fn what_is_lost_and_what_is_left_are_all_worlds() {
 fn certainty_gains_what_it_gains_in_the_world_in_which_there_is_certainty() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     let (mut actions, mut facts) = (0, 0);
-    for _ in 0..400 {
-        let case = case(&mut rng, TASTE);
+    for round in 0..400 {
+        let case = mixed(&mut rng, round);
         for semantics in BOTH {
             let order = order(&mut rng, &case);
             let model = model(&case, semantics);
@@ -123,6 +136,11 @@ fn certainty_gains_what_it_gains_in_the_world_in_which_there_is_certainty() {
                     start: Some(1.0),
                     effects: all.clone(),
                     deletions: all,
+                    failing: Failing {
+                        end: Some(1.0),
+                        during_per_second: Some(0.0),
+                        ..Failing::default()
+                    },
                 };
                 let mut likelihoods = case.likelihoods.clone();
                 let key = (own.schema, own.arguments.clone());
@@ -194,6 +212,57 @@ fn retrying_gains_the_sum_over_all_numbers_of_failed_attempts() {
         }
     }
     assert!(gains > 30, "{gains} gains");
+}
+
+#[test]
+fn doing_again_gains_the_sum_over_all_numbers_of_failed_ends() {
+    let mut rng = ChaCha8Rng::seed_from_u64(15);
+    let (mut gains, mut shares) = (0, 0);
+    for round in 0..200 {
+        let plain = case(&mut rng, TASTE);
+        let mut case = with_failing_ends(&mut rng, plain);
+        if round % 2 == 0 {
+            case = failing_in_time(&mut rng, case);
+        }
+        for semantics in BOTH {
+            let order = order(&mut rng, &case);
+            let model = model(&case, semantics);
+            let account = Account::of(&model, &case.circumstances, &order).unwrap();
+            for share in &account.actions {
+                let place = |node| order.iter().position(|other| *other == node).unwrap();
+                let start = place(model.start(share.instance));
+                let end = place(model.end(share.instance));
+                let schema = case.plan.instance(share.instance).action.schema;
+                let success = case.likelihoods.schemas[&schema].failing.end.unwrap();
+                let is_durative = start != end;
+                assert_eq!(share.if_done_again.is_some(), is_durative && success < 1.0);
+                let Some(found) = share.if_done_again else {
+                    continue;
+                };
+                shares += 1;
+                let mut failed = worlds(&case, &case.likelihoods, semantics);
+                for &before in &order[..end] {
+                    failed.push(before);
+                }
+                let mut expected = 0.0;
+                for _ in 0..2000 {
+                    let mut rest = failed.clone();
+                    for &after in &order[end..] {
+                        rest.push(after);
+                    }
+                    expected += rest.success_probability();
+                    failed.fail(order[end]);
+                    failed.push(order[start]);
+                    if failed.actions_probability() < 1e-14 {
+                        break;
+                    }
+                }
+                assert_close(found, expected, &case.text);
+                gains += usize::from(found > account.probability + 1e-6);
+            }
+        }
+    }
+    assert!(gains > 30 && shares > 200, "{gains} gains, {shares} shares");
 }
 
 #[test]

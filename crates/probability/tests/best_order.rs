@@ -19,7 +19,7 @@ use elbowroom_probability::{
 };
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use twin::random::{Case, Taste, case, in_time};
+use twin::random::{Case, Taste, case, failing_in_time, in_time, with_failing_ends};
 
 struct Compared {
     /// The best order has more than one happening.
@@ -159,6 +159,33 @@ fn no_order_is_more_likely_to_succeed_where_facts_change_with_time() {
         long += usize::from(compare(&case, semantics, settings).is_long);
     }
     assert!(long > 80, "{long} orders had more than one happening");
+}
+
+#[test]
+fn no_order_is_more_likely_to_succeed_where_actions_fail_after_their_start() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut long = 0;
+    for round in 0..400 {
+        let taste = Taste {
+            couples: round % 4 == 0,
+            timed: round % 3 == 0,
+            numbers: round % 5 == 0,
+            ..EASY
+        };
+        let case = case(&mut rng, taste);
+        let mut case = with_failing_ends(&mut rng, case);
+        if round % 2 == 0 {
+            case = failing_in_time(&mut rng, case);
+        }
+        for semantics in [Semantics::Paper, Semantics::World] {
+            let compared = compare(&case, semantics, SearchSettings::default());
+            long += usize::from(compared.is_long);
+        }
+    }
+    assert!(
+        long > 60,
+        "{long} with a best order of two happenings or more"
+    );
 }
 
 #[test]

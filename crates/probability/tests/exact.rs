@@ -8,7 +8,7 @@ use elbowroom_probability::{Model, PrunedNetwork, Semantics};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use twin::Worlds;
-use twin::random::{Case, Taste, case, in_time, order};
+use twin::random::{Case, Taste, case, failing_in_time, in_time, order, with_failing_ends};
 
 const FACTORED: Taste = Taste {
     facts: 4,
@@ -124,4 +124,31 @@ fn facts_that_change_with_time_have_exact_probabilities() {
         }
     }
     assert!(possible > 15_000, "{possible} steps were possible at all");
+}
+
+#[test]
+fn actions_that_fail_after_their_start_have_exact_probabilities() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut possible = 0;
+    for round in 0..1500 {
+        let taste = Taste {
+            couples: round % 2 == 0,
+            actions: 3,
+            ..FACTORED
+        };
+        let case = case(&mut rng, taste);
+        let case = with_failing_ends(&mut rng, case);
+        let case = match round % 3 {
+            0 => case,
+            1 => failing_in_time(&mut rng, case),
+            _ => {
+                let case = in_time(&mut rng, case);
+                failing_in_time(&mut rng, case)
+            }
+        };
+        for semantics in [Semantics::Paper, Semantics::World] {
+            possible += compare(&case, semantics, &mut rng);
+        }
+    }
+    assert!(possible > 10_000, "{possible} steps were possible at all");
 }

@@ -134,6 +134,171 @@ fn rates_per_second_stand_beside_likelihoods_per_step() {
 }
 
 #[test]
+fn failures_after_the_start_leave_behind_what_the_file_says() {
+    let task = doors();
+    let text = format!(
+        "{HEAD}
+        [defaults]
+        becomes_true = 0
+        becomes_false = 0
+        start = 1
+        effect = 1
+        end = 0.9
+        during_per_second = 0.5
+        undone = true
+        [actions.shut]
+        end = 0.8
+        [[actions.shut.outcome]]
+        probability = 0.25
+        becomes_false = [\"(near ?d b)\", \"open b\"]
+        becomes_true = [\"(painted ?D)\"]
+        [actions.\"shut b\"]
+        end = 0.7
+        undone = false"
+    );
+    let likelihoods = read(text.as_bytes(), &task).unwrap();
+    assert!(likelihoods.has_failures() && likelihoods.has_rates());
+    let shut = |name: &str| {
+        let schema = task.problem().schema("shut").unwrap();
+        let object = task.problem().object(name).unwrap();
+        task.instantiate(schema, &[object]).unwrap()
+    };
+    let left = |name: &str| {
+        let aftermaths = likelihoods.aftermaths(&task, &shut(name)).into_iter();
+        let words = |(fact, truth): (_, bool)| format!("{} {truth}", task.fact_name(fact));
+        let told = aftermaths.map(|it| {
+            let changes = it.changes.into_iter().map(words);
+            (it.probability, changes.collect::<Vec<_>>().join(", "))
+        });
+        told.collect::<Vec<_>>()
+    };
+    let leaves = |p: f64, words: &str| (p, words.to_owned());
+    assert_eq!(
+        (likelihoods.end(&shut("a")), likelihoods.end(&shut("b"))),
+        (0.8, 0.7)
+    );
+    assert_eq!(
+        (likelihoods.during(&shut("a")), likelihoods.end(&shut("a"))),
+        (0.5, 0.8)
+    );
+    assert!((likelihoods.lasts(&shut("a"), 2.0) - 0.8 * (-1.0_f64).exp()).abs() < 1e-15);
+    // First what is undone, then what becomes true, then what becomes false.
+    assert_eq!(
+        left("a"),
+        [
+            leaves(
+                0.25,
+                "(open a) true, (painted a) true, (near a b) false, (open b) false"
+            ),
+            leaves(0.75, "(open a) true"),
+        ]
+    );
+    assert_eq!(
+        left("b"),
+        [
+            leaves(0.25, "(painted b) true, (near b b) false, (open b) false"),
+            leaves(0.75, ""),
+        ]
+    );
+    // What takes no time has no end, whatever the defaults say.
+    let wait = task.problem().schema("wait").unwrap();
+    let wait = task.instantiate(wait, &[]).unwrap();
+    assert_eq!(
+        (likelihoods.end(&wait), likelihoods.during(&wait)),
+        (1.0, 0.0)
+    );
+    let written = write(task.problem(), &likelihoods);
+    assert_eq!(
+        read(written.as_bytes(), &task).unwrap(),
+        likelihoods,
+        "{written}"
+    );
+}
+
+#[test]
+fn mistakes_about_failures_are_reported_with_their_place() {
+    let complete = "[defaults]\nbecomes_true = 0\nbecomes_false = 0\nstart = 1\neffect = 1\n";
+    let outcome = "end = 0.5\n[[actions.shut.outcome]]\n";
+    for (entry, expected) in [
+        (
+            "end = 1.5",
+            "text:9:7: error: 1.5 is not a probability; a number from 0 to 1",
+        ),
+        (
+            "during_per_second = -1",
+            "text:9:21: error: this is no number of failures per second; a rate, 0 or more",
+        ),
+        (
+            "undone = 1",
+            "text:9:10: error: a number stands here; true or false",
+        ),
+        (
+            "undone = true",
+            "text:8:10: error: this says what failures leave behind, but not that an action fails after its start; `end`: how likely its end is to succeed",
+        ),
+        (
+            "ende = 0.5",
+            "text:9:1: error: unknown entry `ende`; did you mean `end`?",
+        ),
+        (
+            "outcome = 1",
+            "text:9:11: error: `outcome` is a number; tables: [[actions.NAME.outcome]]",
+        ),
+        (
+            &format!("{outcome}becomes_true = [\"(open ?d)\"]"),
+            "error: the outcome has no `probability`; how likely it is if the action fails",
+        ),
+        (
+            &format!("{outcome}probability = 0.5"),
+            "error: this outcome changes nothing; becomes_true or becomes_false",
+        ),
+        (
+            &format!("{outcome}probability = 0.5\ndelay = 3"),
+            "text:12:1: error: unknown entry `delay`; one of probability, becomes_true, becomes_false",
+        ),
+        (
+            &format!("{outcome}probability = 0.5\nbecomes_true = [\"(open ?door)\"]"),
+            "text:12:17: error: `shut` has no parameter `?door`; it has ?d",
+        ),
+        (
+            &format!("{outcome}probability = 0.5\nbecomes_true = [\"(open)\"]"),
+            "text:12:17: error: `open` takes 1 arguments, not 0",
+        ),
+        (
+            &format!("{outcome}probability = 0.5\nbecomes_true = [\"(quiet)\"]"),
+            "text:12:17: error: `quiet` follows from rules",
+        ),
+        (
+            &format!(
+                "{outcome}probability = 0.5\nbecomes_true = [\"(open ?d)\"]\nbecomes_false = [\"open ?D\"]"
+            ),
+            "text:13:18: error: one outcome changes `open ?D` twice",
+        ),
+        (
+            &format!(
+                "{outcome}probability = 0.6\nbecomes_true = [\"(open ?d)\"]\n[[actions.shut.outcome]]\nprobability = 0.5\nbecomes_true = [\"(open ?d)\"]"
+            ),
+            "error: with this outcome the probabilities add up to 1.1; shares of the failures, so 1 is the most",
+        ),
+        (
+            "[actions.wait]\nend = 0.5",
+            "text:10:1: error: `wait` takes no time, so it does not fail after its start; `start`",
+        ),
+        (
+            "end = 0.5\n[[defaults.outcome]]\nprobability = 0.5\nbecomes_true = [\"(open ?d)\"]",
+            "text:12:17: error: `?d` is a parameter of no action that is named here; [[actions.NAME.outcome]]",
+        ),
+    ] {
+        let text = format!("{HEAD}{complete}[actions.shut]\n{entry}\n");
+        let found = mistakes(&text);
+        assert!(
+            found.contains(expected),
+            "{text}\nfound: {found}\nexpected: {expected}"
+        );
+    }
+}
+
+#[test]
 fn mistakes_are_reported_with_their_place_and_what_to_do() {
     let complete = "[defaults]\nbecomes_true = 0\nbecomes_false = 0\nstart = 1\neffect = 1\n";
     for (text, expected) in [

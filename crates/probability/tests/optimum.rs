@@ -7,9 +7,10 @@ mod twin;
 use std::sync::Arc;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Body, Change, Condition, SnapAction};
+use elbowroom_model::ground::{Action, Body, Change, Condition, SnapAction};
 use elbowroom_plan::{InstanceId, PartialOrderPlan};
 use elbowroom_probability::dispatch::patient;
+use elbowroom_probability::likelihoods::Failing;
 use elbowroom_probability::optimum::{DeadEnds, Horizon, Move, Perturbed, Settings};
 use elbowroom_probability::{
     Choice, Circumstances, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider,
@@ -17,7 +18,7 @@ use elbowroom_probability::{
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use twin::random::{Case, Taste, case};
+use twin::random::{Case, Taste, case, with_failing_ends, with_outcomes};
 
 fn steps(count: usize) -> Settings {
     Settings {
@@ -66,8 +67,14 @@ const SMALL: Taste = Taste {
 fn the_optimum_is_that_of_a_plain_recursion() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let (mut between, mut dead_ends_matter) = (0, 0);
-    for _ in 0..150 {
+    for round in 0..300 {
         let mut case = case(&mut rng, SMALL);
+        if round >= 150 {
+            case = with_failing_ends(&mut rng, case);
+        }
+        if round >= 220 {
+            case = with_outcomes(&mut rng, case);
+        }
         case.circumstances = Circumstances::initial(&case.task);
         let model = Model::new(
             case.task.clone(),
@@ -103,8 +110,8 @@ fn the_optimum_is_that_of_a_plain_recursion() {
             dead_ends_matter += usize::from(values[1] < values[2] - 1e-9);
         }
     }
-    assert!(between > 50, "{between}");
-    assert!(dead_ends_matter > 10, "{dead_ends_matter}");
+    assert!(between > 100, "{between}");
+    assert!(dead_ends_matter > 20, "{dead_ends_matter}");
 }
 
 /// What of a run is left.
@@ -174,8 +181,10 @@ fn best(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 
     };
     for (snap, id, next) in steps_from(case, state, running) {
         let action = &case.plan.instance(id).action;
-        let success = if running.contains(&id) {
-            1.0
+        let failing = &case.likelihoods.schemas[&action.schema].failing;
+        let is_end = running.contains(&id);
+        let success = if is_end {
+            failing.end.unwrap_or(1.0)
         } else {
             case.likelihoods.start(action).unwrap()
         };
@@ -183,10 +192,55 @@ fn best(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 
         for (after, weight) in effects(case, action, snap, state) {
             value += success * weight * perturbed(case, &after, &next, fewer);
         }
-        value += (1.0 - success) * perturbed(case, state, running, fewer);
+        let failures = if is_end {
+            left_behind(case, action, failing, state)
+        } else {
+            vec![(state.to_vec(), 1.0)]
+        };
+        let after_failure = if is_end { &next[..] } else { running };
+        for (after, weight) in failures {
+            value += (1.0 - success) * weight * perturbed(case, &after, after_failure, fewer);
+        }
         most = most.max(value);
     }
     most
+}
+
+/// How things may stand after a failed end, by what the file format says.
+fn left_behind(
+    case: &Case,
+    action: &Action,
+    failing: &Failing,
+    state: &[bool],
+) -> Vec<(Vec<bool>, f64)> {
+    let mut undone = state.to_vec();
+    if failing.undone == Some(true) {
+        let effects = || action.durative().unwrap().start.effects.iter();
+        for effect in effects() {
+            if let Change::Delete(fact) = effect.change {
+                undone[fact.index()] = true;
+            }
+        }
+        for effect in effects() {
+            if let Change::Add(fact) = effect.change {
+                undone[fact.index()] = false;
+            }
+        }
+    }
+    let mut left = 1.0;
+    let mut states = Vec::new();
+    for outcome in failing.outcomes.iter().flatten() {
+        left -= outcome.probability;
+        let mut after = undone.clone();
+        for change in &outcome.changes {
+            let name = &case.task.problem().predicates[change.predicate.index()].name;
+            let fact = case.task.fact_named(&format!("({name})")).unwrap();
+            after[fact.index()] = change.becomes;
+        }
+        states.push((after, outcome.probability));
+    }
+    states.push((undone, left));
+    states
 }
 
 /// The starts and ends that are possible: what each does, whose it is, and what is under way after

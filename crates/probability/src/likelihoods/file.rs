@@ -1,5 +1,8 @@
 //! Our own likelihood files, TOML: [`read()`]. The format is in `docs/formats/likelihoods.md`.
 
+mod complete;
+mod failing;
+
 use std::ops::Range;
 
 use elbowroom_model::Task;
@@ -8,7 +11,7 @@ use elbowroom_text::{Diagnostics, Report, Source, nearest};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{Likelihoods, PartialFlip, Success, is_changed, names};
+use super::{Failing, Likelihoods, PartialFlip, Success, names};
 
 /// The value of `format` in our files.
 pub(super) const FORMAT: &str = "elbowroom-likelihoods";
@@ -27,6 +30,7 @@ pub(super) fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods
         problem: task.problem(),
         likelihoods: Likelihoods::default(),
         mistakes: Report::new(&source),
+        leftovers: Vec::new(),
     };
     for error in &errors {
         let span = error.span().unwrap_or(0..0);
@@ -49,6 +53,8 @@ struct Reader<'a> {
     problem: &'a Problem,
     likelihoods: Likelihoods,
     mistakes: Report,
+    /// The sections that say what failures leave behind.
+    leftovers: Vec<(Range<usize>, failing::About)>,
 }
 
 impl Reader<'_> {
@@ -73,6 +79,7 @@ impl Reader<'_> {
         }
         if !self.mistakes.is_failed() {
             self.check_complete(document);
+            self.check_leftovers();
         }
     }
 
@@ -141,8 +148,9 @@ impl Reader<'_> {
         }
     }
 
-    fn defaults(&mut self, key: &Key<'_>, value: &Value<'_>) {
-        self.each(key, value, &mut |reader, key, value| {
+    fn defaults(&mut self, section: &Key<'_>, value: &Value<'_>) {
+        let mut failing = Failing::default();
+        self.each(section, value, &mut |reader, key, value| {
             let name = key.get_ref().as_ref();
             let known = [
                 "becomes_true",
@@ -151,9 +159,16 @@ impl Reader<'_> {
                 "becomes_false_per_second",
                 "start",
                 "effect",
+                "end",
+                "during_per_second",
+                "undone",
+                "outcome",
             ];
             if !known.contains(&name) {
                 return reader.unknown(key, &known);
+            }
+            if failing::KEYS.contains(&name) {
+                return reader.failing(None, key, value, &mut failing);
             }
             if name.ends_with("_per_second") {
                 let rate = reader.rate(value);
@@ -173,6 +188,8 @@ impl Reader<'_> {
                 _ => defaults.effect = probability,
             }
         });
+        self.note_leftovers(section, &failing, failing::About::Defaults);
+        self.likelihoods.defaults.failing = failing;
     }
 
     fn fact(&mut self, key: &Key<'_>, value: &Value<'_>) {
@@ -233,9 +250,17 @@ impl Reader<'_> {
                 "effects" => reader.each(key, value, &mut |reader, key, value| {
                     reader.effect(schema, key, value, &mut success);
                 }),
-                _ => reader.unknown(key, &["start", "effects"]),
+                name if failing::KEYS.contains(&name) => {
+                    reader.failing(Some(schema), key, value, &mut success.failing);
+                }
+                _ => {
+                    let known = [&["start", "effects"][..], &failing::KEYS].concat();
+                    reader.unknown(key, &known);
+                }
             },
         );
+        let about = failing::About::Action(schema, arguments.clone());
+        self.note_leftovers(key, &success.failing, about);
         let is_new = match arguments {
             Some(arguments) => {
                 let key = (schema, arguments);
@@ -374,89 +399,6 @@ impl Reader<'_> {
                 .mistake(value.span(), message, expected.to_owned());
         }
         rate
-    }
-
-    /// Something is said of each fact and each action.
-    fn check_complete(&mut self, document: &DeTable<'_>) {
-        let section = |name: &str| {
-            let entry = document.iter().find(|(key, _)| key.get_ref() == name);
-            entry.map_or(0..0, |(key, _)| key.span())
-        };
-        for (index, predicate) in self.problem.predicates.iter().enumerate() {
-            let id = PredicateId::from(index);
-            let is_mentioned = self.likelihoods.predicates.contains_key(&id)
-                || self.likelihoods.facts.keys().any(|(p, _)| *p == id);
-            if predicate.is_derived {
-                continue;
-            }
-            if !is_mentioned && !is_changed(self.problem, id) {
-                // What never changes, and is not mentioned, stays as it is.
-                let never = PartialFlip::NEVER;
-                self.likelihoods.predicates.insert(id, never);
-                continue;
-            }
-            let all = self.likelihoods.predicates.get(&id).copied();
-            let all = all.unwrap_or_default();
-            let defaults = &self.likelihoods.defaults;
-            if all.becomes_true.or(defaults.becomes_true).is_some()
-                && all.becomes_false.or(defaults.becomes_false).is_some()
-            {
-                continue;
-            }
-            let mut missing = None;
-            // Stops at the first that is not listed, so it takes no longer than the list is.
-            names::for_each_tuple(self.problem, &predicate.parameters, &mut |tuple| {
-                if self.likelihoods.flip_of(id, tuple).is_none() {
-                    missing = Some(self.problem.apply_name(&predicate.name, tuple));
-                }
-                missing.is_none()
-            });
-            if let Some(fact) = missing {
-                self.mistakes.mistake(
-                    section("facts"),
-                    format!("the file does not say how {fact} changes by itself"),
-                    format!("[facts.{}], or [defaults]", predicate.name),
-                );
-            }
-        }
-        for (index, schema) in self.problem.schemas.iter().enumerate() {
-            self.check_action(SchemaId::from(index), schema, &section("actions"));
-        }
-    }
-
-    fn check_action(
-        &mut self,
-        id: SchemaId,
-        schema: &elbowroom_model::problem::Schema,
-        section: &Range<usize>,
-    ) {
-        let affected = names::affected(self.problem, id);
-        if self.likelihoods.says_enough_of(id, &affected) {
-            return;
-        }
-        let mut missing = None;
-        names::for_each_tuple(self.problem, &schema.parameters, &mut |tuple| {
-            if self.likelihoods.start_of(id, tuple).is_none() {
-                let name = self.problem.apply_name(&schema.name, tuple);
-                missing = Some(format!("how likely {name} is to start"));
-            }
-            for &(predicate, makes_true) in &affected {
-                let effect = self.likelihoods.effect_of(id, tuple, predicate, makes_true);
-                if missing.is_none() && effect.is_none() {
-                    let name = self.problem.apply_name(&schema.name, tuple);
-                    let predicate = &self.problem.predicates[predicate.index()].name;
-                    missing = Some(format!("how likely the effect of {name} on {predicate} is"));
-                }
-            }
-            missing.is_none()
-        });
-        if let Some(missing) = missing {
-            self.mistakes.mistake(
-                section.clone(),
-                format!("the file does not say {missing}"),
-                format!("[actions.{}], or [defaults]", schema.name),
-            );
-        }
     }
 }
 

@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use elbowroom_model::problem::{ObjectId, Problem};
+use elbowroom_model::problem::{ObjectId, Problem, SchemaId};
 
 use super::file::{FORMAT, VERSION};
-use super::{Likelihoods, PartialFlip, Success};
+use super::{Failing, Likelihoods, Outcome, PartialFlip, Success};
 
 /// The likelihoods in our own format; [`read`](super::read) gives the same ones back.
 pub fn write(problem: &Problem, likelihoods: &Likelihoods) -> String {
@@ -22,9 +22,11 @@ pub fn write(problem: &Problem, likelihoods: &Likelihoods) -> String {
         ("start", defaults.start),
         ("effect", defaults.effect),
     ];
-    if entries.iter().any(|(_, value)| value.is_some()) {
+    let failing = &defaults.failing;
+    if entries.iter().any(|(_, value)| value.is_some()) || *failing != Failing::default() {
         text.push_str("\n[defaults]\n");
         numbers(&mut text, &entries);
+        failures(&mut text, problem, None, failing);
     }
     for (predicate, flip) in &likelihoods.predicates {
         let name = &problem.predicates[predicate.index()].name;
@@ -36,11 +38,13 @@ pub fn write(problem: &Problem, likelihoods: &Likelihoods) -> String {
     }
     for (schema, success) in &likelihoods.schemas {
         let name = &problem.schemas[schema.index()].name;
-        action(&mut text, problem, &key(problem, name, &[]), success);
+        header(&mut text, "actions", &key(problem, name, &[]));
+        action(&mut text, problem, *schema, success);
     }
     for ((schema, arguments), success) in &likelihoods.actions {
         let name = &problem.schemas[schema.index()].name;
-        action(&mut text, problem, &key(problem, name, arguments), success);
+        header(&mut text, "actions", &key(problem, name, arguments));
+        action(&mut text, problem, *schema, success);
     }
     if !likelihoods.beliefs.is_empty() {
         text.push_str("\n[beliefs]\n");
@@ -76,9 +80,9 @@ fn fact(text: &mut String, key: &str, flip: &PartialFlip) {
     );
 }
 
-fn action(text: &mut String, problem: &Problem, key: &str, success: &Success) {
-    header(text, "actions", key);
+fn action(text: &mut String, problem: &Problem, schema: SchemaId, success: &Success) {
     numbers(text, &[("start", success.start)]);
+    failures(text, problem, Some(schema), &success.failing);
     for (stated, prefix) in [(&success.effects, ""), (&success.deletions, "not ")] {
         for (predicate, probability) in stated {
             let name = &problem.predicates[predicate.index()].name;
@@ -86,6 +90,36 @@ fn action(text: &mut String, problem: &Problem, key: &str, success: &Success) {
             number(text, &key, *probability);
         }
     }
+}
+
+fn failures(text: &mut String, problem: &Problem, schema: Option<SchemaId>, failing: &Failing) {
+    let entries = [
+        ("end", failing.end),
+        ("during_per_second", failing.during_per_second),
+    ];
+    numbers(text, &entries);
+    // Writing into a string cannot fail.
+    if let Some(undone) = failing.undone {
+        let _ = writeln!(text, "undone = {undone}");
+    }
+    let Some(outcomes) = &failing.outcomes else {
+        return;
+    };
+    let one = |outcome: &Outcome| {
+        let facts = |truth| {
+            let changes = outcome.changes.iter().filter(|it| it.becomes == truth);
+            let facts = changes.map(|change| format!("\"{}\"", change.text(problem, schema)));
+            facts.collect::<Vec<_>>().join(", ")
+        };
+        format!(
+            "{{ probability = {:?}, becomes_true = [{}], becomes_false = [{}] }}",
+            outcome.probability,
+            facts(true),
+            facts(false)
+        )
+    };
+    let outcomes: Vec<String> = outcomes.iter().map(one).collect();
+    let _ = writeln!(text, "outcome = [{}]", outcomes.join(", "));
 }
 
 fn header(text: &mut String, section: &str, key: &str) {

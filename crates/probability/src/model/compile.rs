@@ -1,6 +1,6 @@
 //! From ground actions and likelihoods to a [`Model`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_model::Task;
@@ -11,7 +11,7 @@ use elbowroom_model::problem::UpdateOperator;
 use elbowroom_plan::{Node, PartialOrderPlan};
 
 use super::requirement::{Requirement, is_derived, visit_facts};
-use super::{Event, FactEffect, Model, Semantics, Update};
+use super::{Event, FactEffect, Leftover, Model, Semantics, Update};
 use crate::likelihoods::{Flip, Likelihoods, Missing, Rate};
 
 pub(super) fn model(
@@ -97,7 +97,8 @@ pub(super) fn model(
         semantics,
         facts,
         flips,
-        has_rates: rates.iter().any(|rate| *rate != Rate::NEVER),
+        has_rates: rates.iter().any(|rate| *rate != Rate::NEVER)
+            || events.iter().any(|event| event.failures_per_second > 0.0),
         rates,
         fluents,
         events,
@@ -205,6 +206,11 @@ impl Compiler<'_> {
         }
         start.effects.sort_by_key(|effect| effect.fact);
         let mut end = self.snap(action, &ending)?;
+        start.failures_per_second = self.likelihoods.during(action);
+        end.success = self.likelihoods.end(action);
+        if end.success < 1.0 || start.failures_per_second > 0.0 {
+            end.aftermaths = self.aftermaths(action);
+        }
         for effect in &body.continuous {
             let Some(fluent) = self.fluents.binary_search(&effect.fluent).ok() else {
                 continue;
@@ -219,6 +225,25 @@ impl Compiler<'_> {
             end.continuous.push((fluent, rate));
         }
         Ok((start, end))
+    }
+
+    /// What a failed end leaves behind. Facts that nothing in the model reads or writes are left out.
+    fn aftermaths(&self, action: &Action) -> Vec<Leftover> {
+        let aftermaths = self.likelihoods.aftermaths(self.task, action).into_iter();
+        let leftover = |aftermath: crate::likelihoods::Aftermath| {
+            // Of several changes of a fact the last one counts.
+            let mut changes = BTreeMap::new();
+            for (fact, becomes) in aftermath.changes {
+                if let Ok(position) = self.facts.binary_search(&fact) {
+                    changes.insert(position, becomes);
+                }
+            }
+            Leftover {
+                probability: aftermath.probability,
+                changes: changes.into_iter().collect(),
+            }
+        };
+        aftermaths.map(leftover).collect()
     }
 
     /// Replaces what a guard says of start and interval by a memory that the start sets.

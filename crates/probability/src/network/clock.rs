@@ -32,8 +32,8 @@ impl Clock {
 const SAME: f64 = 1e-9;
 
 impl PrunedNetwork<'_> {
-    /// Time passes until a happening. What is required throughout the actions under way must last:
-    /// a fact that changes and changes back has not. Other facts change by themselves.
+    /// Time passes until a happening. What is under way may fail, and what is required throughout
+    /// it must last: a fact that changes and changes back has not. Other facts change by themselves.
     pub(super) fn pass(&mut self, node: NodeId) -> Result<(), TooCoupled> {
         let model = self.model;
         if !model.has_rates() {
@@ -55,6 +55,12 @@ impl PrunedNetwork<'_> {
         let mut held: Vec<(usize, bool)> = Vec::new();
         for place in 0..self.running.len() {
             let id = self.running[place];
+            let failures = model.event(model.start(id)).failures_per_second;
+            if failures > 0.0 {
+                let lasts = (-failures * seconds).exp();
+                let reading = Reading::Throughout(id);
+                self.multiply(lasts, (node, reading), || LossCause::During);
+            }
             for &(fact, truth) in &model.event(model.start(id)).over_all.literals {
                 if held.iter().any(|(other, _)| *other == fact) {
                     continue;

@@ -23,7 +23,8 @@ pub struct Loss {
 pub enum Reading {
     /// The conditions of the happening.
     OnArrival,
-    /// An over-all condition of an action under way, after the happening.
+    /// An over-all condition of an action under way, after the happening; or, for
+    /// [`LossCause::During`], the action itself, before it.
     Throughout(InstanceId),
     /// The goal, after the last happening.
     Goal,
@@ -34,6 +35,10 @@ pub enum Reading {
 pub enum LossCause {
     /// The attempt to start fails.
     Start,
+    /// The end fails.
+    End,
+    /// An action fails while it is under way: that of [`Reading::Throughout`].
+    During,
     /// A fact does not have the truth that is needed.
     Fact {
         /// Which one.

@@ -241,7 +241,13 @@ impl Perturbed {
                 let event = self.model.event(node);
                 let after = &flipped[self.set_after(set, node)];
                 let success = self.expected(event, state, after);
-                event.success * success + (1.0 - event.success) * flipped[set][state]
+                // Who fails to start leaves everything as it was.
+                let failure = if event.aftermaths.is_empty() {
+                    flipped[set][state]
+                } else {
+                    expected_aftermath(event, state, after)
+                };
+                event.success * success + (1.0 - event.success) * failure
             }
         }
     }
@@ -357,4 +363,20 @@ impl Perturbed {
         }
         after
     }
+}
+
+/// The expected value after an end that has failed.
+fn expected_aftermath(event: &Event, state: usize, after: &[f64]) -> f64 {
+    let values = event.aftermaths.iter().map(|aftermath| {
+        let changes = aftermath.changes.iter();
+        let state = changes.fold(state, |state, &(fact, becomes)| {
+            if becomes {
+                state | (1 << fact)
+            } else {
+                state & !(1 << fact)
+            }
+        });
+        aftermath.probability * after[state]
+    });
+    values.sum()
 }

@@ -9,7 +9,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Instance, PartialOrderPlan};
 
 use super::{NotSmall, Optimum, Perturbed, Settings};
-use crate::actions::all_actions;
+use crate::actions::all_actions_under;
 use crate::circumstances::Circumstances;
 use crate::dispatch::Choice;
 use crate::likelihoods::Likelihoods;
@@ -42,7 +42,7 @@ impl Table {
     /// an action's end takes away what another needs.
     pub fn new(task: &Task, likelihoods: &Likelihoods) -> Option<Self> {
         let task = task.clone();
-        let actions = all_actions(&task).ok()?;
+        let actions = all_actions_under(&task, likelihoods).ok()?;
         if ends_break_others(&actions) || has_negations(&task, &actions) {
             return None;
         }

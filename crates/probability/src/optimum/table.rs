@@ -17,7 +17,9 @@ pub(super) fn check(model: &Model) -> Result<(), NotSmall> {
         return Err(unsupported("actions change numbers"));
     }
     if model.has_rates() {
-        return Err(unsupported("facts change with time, at rates per second"));
+        return Err(unsupported(
+            "facts change, or actions fail, with time, at rates per second",
+        ));
     }
     if !model.task().timed().is_empty() {
         return Err(unsupported("facts change at fixed times"));

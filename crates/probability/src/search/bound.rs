@@ -272,6 +272,7 @@ impl Run<'_, '_, '_> {
                 steps += 1;
             }
             if start != end {
+                self.bound *= self.model.event(end).success;
                 steps += 1;
                 ends.push(id);
             }

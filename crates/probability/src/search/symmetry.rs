@@ -35,7 +35,7 @@ enum Seen {
 struct Signature {
     is_durative: bool,
     duration: (elbowroom_num::Rational, Option<elbowroom_num::Rational>),
-    success: [f64; 2],
+    success: [f64; 3],
     /// Conditions at start, throughout, at the end.
     needs: [Vec<(Seen, bool)>; 3],
     /// Effects at start and end: with their probability, and whether they cannot fail.
@@ -203,7 +203,7 @@ fn signature(
     let signature = Signature {
         is_durative,
         duration: separations.durations[id.index()].clone(),
-        success: [start.success, end.success],
+        success: [start.success, end.success, start.failures_per_second],
         needs,
         effects,
         own: flips.collect(),

@@ -14,6 +14,7 @@ use elbowroom_model::ground::{
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
+use elbowroom_probability::likelihoods::Failing;
 use elbowroom_probability::{Circumstances, Flip, Likelihoods, Semantics};
 
 /// A world: which facts hold, and which end effects of running actions will take place.
@@ -131,6 +132,10 @@ impl<'a> Worlds<'a> {
         }
         let mut held = Vec::new();
         for &id in &self.running {
+            let failures = self.failing(id).during_per_second.unwrap_or(0.0);
+            for (_, weight) in &mut self.possible {
+                *weight *= (-failures * seconds).exp();
+            }
             if let Body::Durative(body) = &self.plan.instance(id).action.body {
                 self.literals(&body.over_all, &mut held);
             }
@@ -216,21 +221,102 @@ impl<'a> Worlds<'a> {
             }
             Node::End(id) => {
                 if let Body::Durative(body) = &self.plan.instance(id).action.body {
-                    self.do_snap(id, &body.end, 1.0, &[]);
+                    let success = self.failing(id).end.unwrap_or(1.0);
+                    self.do_snap(id, &body.end, success, &[]);
                 }
-                self.running.retain(|running| *running != id);
-                for (world, _) in &mut self.possible {
-                    world.memories.retain(|(owner, _), _| *owner != id);
-                }
+                self.is_over(id);
             }
         }
         self.look_throughout();
     }
 
-    /// A start that could succeed, and does not; it is not pushed.
+    fn failing(&self, id: InstanceId) -> Failing {
+        let action = &self.plan.instance(id).action;
+        let key = (action.schema, action.arguments.clone());
+        let own = self.likelihoods.actions.get(&key);
+        let success = own.or(self.likelihoods.schemas.get(&action.schema));
+        success.map_or_else(Failing::default, |success| success.failing.clone())
+    }
+
+    /// An action is no longer under way.
+    fn is_over(&mut self, id: InstanceId) {
+        self.running.retain(|running| *running != id);
+        for (world, _) in &mut self.possible {
+            world.memories.retain(|(owner, _), _| *owner != id);
+        }
+    }
+
+    /// An end that could succeed, and does not; it is not pushed. Numbers only change if the end
+    /// takes place.
+    fn fail_at_end(&mut self, node: NodeId, id: InstanceId) {
+        self.pass(node);
+        let Body::Durative(body) = &self.plan.instance(id).action.body else {
+            panic!("it has an end");
+        };
+        let failing = self.failing(id);
+        assert_eq!(failing.outcomes, None, "one way in which things stand then");
+        let mut left = Vec::new();
+        if failing.undone == Some(true) {
+            for effect in &body.start.effects {
+                let is_added = |fact| {
+                    let mut all = body.start.effects.iter();
+                    all.any(|other| other.change == Change::Add(fact))
+                };
+                match effect.change {
+                    _ if !effect.guard.is_trivial() => {}
+                    Change::Add(fact) => left.push((fact, false)),
+                    Change::Delete(fact) if !is_added(fact) => left.push((fact, true)),
+                    Change::Delete(_) | Change::Update { .. } => {}
+                }
+            }
+        }
+        let mut after = BTreeMap::new();
+        for (world, weight) in std::mem::take(&mut self.possible) {
+            if !self.holds(&body.end.condition, &world) {
+                continue;
+            }
+            let weight = weight * (1.0 - failing.end.unwrap_or(1.0));
+            let mut worlds = vec![(world.clone(), weight)];
+            for index in 0..self.task.fact_count() {
+                let fact = FactId(u32::try_from(index).unwrap());
+                if self.task.is_derived(fact) {
+                    continue;
+                }
+                let set = left.iter().rev().find(|(own, _)| *own == fact);
+                let was = set.map_or(world.facts[index], |(_, truth)| *truth);
+                let flip = self.likelihoods.flip(self.task, fact).unwrap();
+                let p = f64::from(u8::from(was));
+                // What is set is an effect: in the paper's network it does not change as well.
+                let stays = set.is_some() && self.semantics == Semantics::Paper;
+                let p = if stays { p } else { flip.after(p) };
+                worlds = worlds
+                    .into_iter()
+                    .flat_map(|(world, weight)| {
+                        [(true, p), (false, 1.0 - p)].map(|(truth, p)| {
+                            let mut world = world.clone();
+                            world.facts[index] = truth;
+                            (world, weight * p)
+                        })
+                    })
+                    .filter(|(_, weight)| *weight > 0.0)
+                    .collect();
+            }
+            for (world, weight) in worlds {
+                *after.entry(world).or_insert(0.0) += weight;
+            }
+        }
+        self.possible = after.into_iter().collect();
+        self.is_over(id);
+        self.look_throughout();
+    }
+
+    /// A start, or an end, that could succeed, and does not; it is not pushed.
     pub(crate) fn fail(&mut self, node: NodeId) {
+        if let Node::End(id) = self.plan.nodes[node.index()] {
+            return self.fail_at_end(node, id);
+        }
         let (Node::Instant(id) | Node::Start(id)) = self.plan.nodes[node.index()] else {
-            panic!("only starts fail");
+            panic!("only what somebody does fails");
         };
         let action = &self.plan.instance(id).action;
         let failure = 1.0 - self.likelihoods.start(action).unwrap();

@@ -8,7 +8,7 @@ use elbowroom_model::ground::{Action, Change, FactId, SnapAction};
 use elbowroom_model::problem::{PredicateId, SchemaId};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
-use elbowroom_probability::likelihoods::{PartialFlip, Success};
+use elbowroom_probability::likelihoods::{Failing, Outcome, OutcomeChange, PartialFlip, Success};
 use elbowroom_probability::{Circumstances, Likelihoods, Running};
 use rand::Rng;
 use rand::seq::IndexedRandom;
@@ -266,6 +266,61 @@ fn likelihoods(rng: &mut impl Rng, task: &Task) -> Likelihoods {
         likelihoods.schemas.insert(SchemaId::from(index), success);
     }
     likelihoods
+}
+
+/// The same case, with actions that fail at their ends.
+pub(crate) fn with_failing_ends(rng: &mut impl Rng, mut case: Case) -> Case {
+    for success in case.likelihoods.schemas.values_mut() {
+        success.failing = Failing {
+            end: Some(match rng.random_range(0..5) {
+                0 => 1.0,
+                1 => 0.0,
+                _ => rng.random_range(0.3..1.0),
+            }),
+            undone: [None, Some(true), Some(false)]
+                .choose(rng)
+                .copied()
+                .flatten(),
+            ..Failing::default()
+        };
+    }
+    case
+}
+
+/// The same case, with one or two outcomes of each failure, as far as there are facts.
+pub(crate) fn with_outcomes(rng: &mut impl Rng, mut case: Case) -> Case {
+    let predicates: Vec<PredicateId> = (0..case.task.problem().predicates.len())
+        .map(PredicateId::from)
+        .filter(|predicate| !case.task.problem().predicates[predicate.index()].is_derived)
+        .collect();
+    for success in case.likelihoods.schemas.values_mut() {
+        let mut left = 1.0;
+        let count = rng.random_range(1..3);
+        let outcomes = (0..count).map(|_| {
+            let probability = left * [0.5, 0.7, 1.0].choose(rng).unwrap();
+            left -= probability;
+            let chosen: Vec<_> = predicates.choose_multiple(rng, 2).copied().collect();
+            let changes = chosen.into_iter().map(|predicate| OutcomeChange {
+                predicate,
+                arguments: Vec::new(),
+                becomes: rng.random_bool(0.5),
+            });
+            Outcome {
+                probability,
+                changes: changes.collect(),
+            }
+        });
+        success.failing.outcomes = Some(outcomes.collect());
+    }
+    case
+}
+
+/// The same case, with actions that fail while they are under way.
+pub(crate) fn failing_in_time(rng: &mut impl Rng, mut case: Case) -> Case {
+    for success in case.likelihoods.schemas.values_mut() {
+        success.failing.during_per_second = Some(probability(rng) * 0.2);
+    }
+    case
 }
 
 /// The same case, with facts that also change with time.

@@ -151,7 +151,7 @@ impl Rest {
                 if is_explained {
                     return None;
                 }
-                failed(&step.action, failures, ending, likelihoods)
+                failed(step, failures, ending, likelihoods)
             }
             // The belief knows it already, and layers are held against the belief.
             News::Fact(_) | News::Value(_) => None,
@@ -366,12 +366,14 @@ impl Rest {
 /// Why an action is given up that has failed so often in a row: it is tried again as long as its
 /// likelihoods explain that.
 fn failed(
-    action: &Action,
+    step: &Step,
     failures: i32,
     ending: &Ending,
     likelihoods: &Likelihoods,
 ) -> Option<Reason> {
-    let success = likelihoods.start(action).unwrap_or(1.0);
+    let action = &step.action;
+    let seconds = step.duration.as_ref().map_or(0.0, Rational::to_f64);
+    let success = likelihoods.start(action).unwrap_or(1.0) * likelihoods.lasts(action, seconds);
     if (1.0 - success).powi(failures) >= TOO_UNLIKELY && failures < MOST_FAILURES {
         return None;
     }

@@ -1,0 +1,94 @@
+//! What a likelihood file must say.
+
+use std::ops::Range;
+
+use elbowroom_model::problem::{PredicateId, SchemaId};
+use toml::de::DeTable;
+
+use super::super::{PartialFlip, is_changed, names};
+use super::Reader;
+
+impl Reader<'_> {
+    /// Something is said of each fact and each action.
+    pub(super) fn check_complete(&mut self, document: &DeTable<'_>) {
+        let section = |name: &str| {
+            let entry = document.iter().find(|(key, _)| key.get_ref() == name);
+            entry.map_or(0..0, |(key, _)| key.span())
+        };
+        for (index, predicate) in self.problem.predicates.iter().enumerate() {
+            let id = PredicateId::from(index);
+            let is_mentioned = self.likelihoods.predicates.contains_key(&id)
+                || self.likelihoods.facts.keys().any(|(p, _)| *p == id);
+            if predicate.is_derived {
+                continue;
+            }
+            if !is_mentioned && !is_changed(self.problem, id) {
+                // What never changes, and is not mentioned, stays as it is.
+                let never = PartialFlip::NEVER;
+                self.likelihoods.predicates.insert(id, never);
+                continue;
+            }
+            let all = self.likelihoods.predicates.get(&id).copied();
+            let all = all.unwrap_or_default();
+            let defaults = &self.likelihoods.defaults;
+            if all.becomes_true.or(defaults.becomes_true).is_some()
+                && all.becomes_false.or(defaults.becomes_false).is_some()
+            {
+                continue;
+            }
+            let mut missing = None;
+            // Stops at the first that is not listed, so it takes no longer than the list is.
+            names::for_each_tuple(self.problem, &predicate.parameters, &mut |tuple| {
+                if self.likelihoods.flip_of(id, tuple).is_none() {
+                    missing = Some(self.problem.apply_name(&predicate.name, tuple));
+                }
+                missing.is_none()
+            });
+            if let Some(fact) = missing {
+                self.mistakes.mistake(
+                    section("facts"),
+                    format!("the file does not say how {fact} changes by itself"),
+                    format!("[facts.{}], or [defaults]", predicate.name),
+                );
+            }
+        }
+        for (index, schema) in self.problem.schemas.iter().enumerate() {
+            self.check_action(SchemaId::from(index), schema, &section("actions"));
+        }
+    }
+
+    fn check_action(
+        &mut self,
+        id: SchemaId,
+        schema: &elbowroom_model::problem::Schema,
+        section: &Range<usize>,
+    ) {
+        let affected = names::affected(self.problem, id);
+        if self.likelihoods.says_enough_of(id, &affected) {
+            return;
+        }
+        let mut missing = None;
+        names::for_each_tuple(self.problem, &schema.parameters, &mut |tuple| {
+            if self.likelihoods.start_of(id, tuple).is_none() {
+                let name = self.problem.apply_name(&schema.name, tuple);
+                missing = Some(format!("how likely {name} is to start"));
+            }
+            for &(predicate, makes_true) in &affected {
+                let effect = self.likelihoods.effect_of(id, tuple, predicate, makes_true);
+                if missing.is_none() && effect.is_none() {
+                    let name = self.problem.apply_name(&schema.name, tuple);
+                    let predicate = &self.problem.predicates[predicate.index()].name;
+                    missing = Some(format!("how likely the effect of {name} on {predicate} is"));
+                }
+            }
+            missing.is_none()
+        });
+        if let Some(missing) = missing {
+            self.mistakes.mistake(
+                section.clone(),
+                format!("the file does not say {missing}"),
+                format!("[actions.{}], or [defaults]", schema.name),
+            );
+        }
+    }
+}
