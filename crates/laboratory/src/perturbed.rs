@@ -18,7 +18,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::untimed::{
     ActionName, Course, ExecutorName, Foresighted, Game, Limits, Means, NoForesight, Plans,
-    Shortest, Trial, UntimedExecutor, UntimedWorld, all_actions, trial,
+    Shortest, Trial, UntimedExecutor, UntimedWorld, all_actions_under, trial,
 };
 use crate::worlds::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
 use elbowroom_model::ground::Action;
@@ -177,7 +177,6 @@ impl<'e> Setting<'e> {
         let wrong = |error: &dyn std::fmt::Display| {
             PerturbedError::other(format!("{}: {error}", case.name))
         };
-        let actions = all_actions(&task).map_err(|error| wrong(&error))?;
         let likelihoods = elbowroom_probability::likelihoods::read(
             Source::new(
                 format!("likelihoods of {}", case.name),
@@ -189,9 +188,18 @@ impl<'e> Setting<'e> {
         if likelihoods.has_rates() {
             return Err(wrong(
                 &"the likelihoods have rates per second, and a perturbed world has steps and no \
-                  seconds: give `becomes_true` and `becomes_false` instead",
+                  seconds: give `becomes_true` and `becomes_false` instead, and `end` instead of \
+                  `during_per_second`",
             ));
         }
+        let is_published = experiment.worlds.contains(&WorldKind::AsPublished);
+        if is_published && likelihoods.has_failing_ends() {
+            return Err(wrong(
+                &"the likelihoods have actions whose ends fail, and in the world `as-published` \
+                  they do not: take the world `sound`",
+            ));
+        }
+        let actions = all_actions_under(&task, &likelihoods).map_err(|error| wrong(&error))?;
         let chances = Chances::new(&task, &actions, &likelihoods).map_err(|error| wrong(&error))?;
         let perturbed = match &experiment.perturbation {
             Some(names) => Some(names.find(&task)?.facts(&task, &chances)),

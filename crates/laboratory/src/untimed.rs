@@ -35,7 +35,7 @@ use elbowroom_model::{State, Task, TimeTriggeredPlan};
 
 pub use adaptable::Adaptable;
 pub use course::{Course, Entry, StepKind};
-pub use elbowroom_probability::{Unsupported, all_actions};
+pub use elbowroom_probability::{Unsupported, all_actions, all_actions_under};
 pub use esterel::Esterel;
 pub use lookahead::{Foresighted, NoForesight};
 pub use published::AsPublished;
@@ -51,8 +51,9 @@ pub trait UntimedWorld {
     /// instantaneous action is then done.
     fn attempt(&mut self, action: &Action) -> bool;
 
-    /// Ends an action that has started and whose end condition holds.
-    fn end(&mut self, action: &Action);
+    /// Ends an action that has started and whose end condition holds; says whether that has
+    /// succeeded. It is no longer under way in any case.
+    fn end(&mut self, action: &Action) -> bool;
 }
 
 /// An executor for worlds without time.
@@ -116,7 +117,7 @@ pub struct Game<'g> {
 pub struct Tally {
     /// Actions that have started.
     pub starts: u64,
-    /// Actions that have ended; of those that take time.
+    /// Actions that have ended, well or not; of those that take time.
     pub ends: u64,
     /// Attempts to start that failed.
     pub failed_starts: u64,
@@ -258,15 +259,22 @@ impl Stage<'_> {
         has_started
     }
 
-    /// Ends an action that has started and whose end condition holds.
-    pub fn end(&mut self, action: &Action) {
-        self.world.end(action);
+    /// Ends an action that has started and whose end condition holds; says whether that has
+    /// succeeded.
+    pub fn end(&mut self, action: &Action) -> bool {
+        let has_succeeded = self.world.end(action);
         self.tally.ends += 1;
         if self.dead_ends.is_some() {
             let name = name_of(action);
             self.running.retain(|other| *other != name);
         }
-        self.done(StepKind::Ended, action);
+        let kind = if has_succeeded {
+            StepKind::Ended
+        } else {
+            StepKind::Failed
+        };
+        self.done(kind, action);
+        has_succeeded
     }
 
     /// Lets an action go that has started: it will not be ended. That is no step.

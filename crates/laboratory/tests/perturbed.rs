@@ -133,6 +133,54 @@ fn the_lookahead_succeeds_as_often_as_its_table_says() {
 }
 
 #[test]
+fn where_ends_fail_the_lookahead_succeeds_as_often_as_its_table_says_and_nobody_more_often() {
+    let trials = 3000.0_f64;
+    let mut shares = Vec::new();
+    for row in rows("grasp.toml", WorldKind::Sound, 3000) {
+        let optimum = row.optimum.unwrap();
+        let share = row.success.share().unwrap();
+        let deviation = (optimum * (1.0 - optimum) / trials).sqrt();
+        let distance = (share - optimum) / deviation;
+        assert!(distance < 4.0, "{row:?}");
+        if row.executor.name() == "lookahead" {
+            assert!(distance > -4.0, "{}: {share} {optimum}", row.case);
+        }
+        shares.push((row.case, row.executor.name().to_owned(), share));
+    }
+    // What is undone can be done again; what has fallen has to be lifted, and may break.
+    let share = |case: &str, executor: &str| {
+        let mut all = shares.iter();
+        let found = all.find(|(own, by, _)| own == case && by == executor);
+        found.unwrap().2
+    };
+    assert!(share("undone", "adaptable") > share("it may fall", "adaptable") + 0.03);
+    // Who lifts what has fallen, or takes more care, does not think of it by chance.
+    assert!(share("it may fall", "lookahead") > share("it may fall", "adaptable") + 0.01);
+}
+
+#[test]
+fn likelihoods_that_a_world_without_time_cannot_follow_are_refused_by_name() {
+    let mut experiment = experiment("grasp.toml");
+    experiment.cases.truncate(1);
+    let said = |experiment: &PerturbedExperiment| {
+        let answer = perturbed::run(experiment, part(1, 1), &|_| true);
+        answer.unwrap_err().to_string()
+    };
+    let per_second = "[actions.lift]\nduring_per_second = 0.1\n";
+    let likelihoods = experiment.cases[0].likelihoods.clone();
+    experiment.cases[0].likelihoods = format!("{likelihoods}{per_second}");
+    let told = said(&experiment);
+    assert!(
+        told.contains("`end` instead of `during_per_second`"),
+        "{told}"
+    );
+    experiment.cases[0].likelihoods = likelihoods;
+    experiment.worlds = vec![WorldKind::AsPublished];
+    let told = said(&experiment);
+    assert!(told.contains("take the world `sound`"), "{told}");
+}
+
+#[test]
 fn olisipo_succeeds_more_often_than_esterel_in_a_sound_world_and_no_more_often_than_can_be() {
     for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
         let rows = rows(name, WorldKind::Sound, 2000);

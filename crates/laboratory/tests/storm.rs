@@ -24,7 +24,7 @@ use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::PartialOrderPlan;
 use elbowroom_probability::optimum::{self as without_time, DeadEnds, Perturbed};
 use elbowroom_probability::{
-    Circumstances, Likelihoods, Model, Semantics, all_actions, likelihoods,
+    Circumstances, Likelihoods, Model, Semantics, all_actions_under, likelihoods,
 };
 use elbowroom_sim::WorldModel;
 use rand::SeedableRng;
@@ -91,7 +91,7 @@ fn task(domain: &str, problem: &str) -> Task {
 /// The best value in a world without time.
 fn best(task: &Task, likelihoods: &Likelihoods, settings: &without_time::Settings) -> f64 {
     let task = Arc::new(task.clone());
-    let actions = all_actions(&task).expect("there is no time in it");
+    let actions = all_actions_under(&task, likelihoods).expect("there is no time in it");
     let plan = PartialOrderPlan::unordered(&task, actions);
     let model = Model::new(Arc::clone(&task), plan, likelihoods, Semantics::World);
     let model = model.expect("all likelihoods are there");
@@ -212,6 +212,41 @@ fn cases_with_beliefs_and_instantaneous_actions_are_those_of_storm() {
     };
     for ((rules, ours), said) in ours.iter().zip(&said) {
         assert_the_same(&format!("{rules:?}"), *ours, said);
+    }
+}
+
+#[test]
+fn worlds_in_which_ends_fail_are_those_of_storm() {
+    let file = |name: &str| {
+        let path = root().join("experiments/grasp").join(name);
+        fs::read_to_string(path).expect("it is there")
+    };
+    let task = task(&file("domain.pddl"), &file("problem.pddl"));
+    let (mut ours, mut texts) = (Vec::new(), Vec::new());
+    for name in ["undone.toml", "falls.toml"] {
+        let source = Source::new(name, file(name));
+        let likelihoods = likelihoods::read(source, &task).expect("likelihoods");
+        for dead_ends in [DeadEnds::Patience(2), DeadEnds::Lost] {
+            for enforces_over_all in [false, true] {
+                let rules = without_time::Settings {
+                    most_running: 1,
+                    dead_ends,
+                    enforces_over_all,
+                    ..without_time::Settings::default()
+                };
+                let name = format!("{name} {rules:?}");
+                ours.push((name, best(&task, &likelihoods, &rules)));
+                texts.push(untimed(&task, &likelihoods, &rules).expect("it can be written"));
+            }
+        }
+    }
+    // What is said of failures matters.
+    assert!(ours[0].1 > ours[4].1 + 0.01, "{ours:?}");
+    let Some(said) = storm("grasp", &texts, texts.len()) else {
+        return;
+    };
+    for ((name, ours), said) in ours.iter().zip(&said) {
+        assert_the_same(name, *ours, said);
     }
 }
 

@@ -212,6 +212,7 @@ fn after(cause: &str) -> &str {
         "after-start" => "it started",
         "start-failed" => "its start failed",
         "after-end" => "it ended",
+        "end-failed" => "its end failed",
         other => other,
     }
 }
@@ -221,6 +222,7 @@ fn came(step: &StoredStep) -> String {
         "started" => "it started",
         "not-started" => "its start failed",
         "ended" => "it ended",
+        "failed" => "its end failed",
         other => other,
     };
     if step.is_dead_end {

@@ -133,6 +133,7 @@ fn step(task: &Task, entry: &Entry) -> Option<StoredStep> {
         StepKind::Started => "started",
         StepKind::NotStarted => "not-started",
         StepKind::Ended => "ended",
+        StepKind::Failed => "failed",
     };
     Some(StoredStep {
         step: kind.to_owned(),

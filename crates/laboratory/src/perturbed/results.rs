@@ -153,6 +153,7 @@ fn after(step: StepKind) -> &'static str {
         StepKind::Started => "after-start",
         StepKind::NotStarted => "start-failed",
         StepKind::Ended => "after-end",
+        StepKind::Failed => "end-failed",
     }
 }
 

@@ -12,8 +12,10 @@ pub enum StepKind {
     Started,
     /// A start that failed.
     NotStarted,
-    /// An end.
+    /// An end that succeeded.
     Ended,
+    /// An end that failed.
+    Failed,
 }
 
 /// What is told of a trial.

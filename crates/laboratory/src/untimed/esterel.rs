@@ -74,7 +74,10 @@ impl UntimedExecutor for Esterel {
                     return;
                 }
                 if body.is_some() {
-                    stage.end(action);
+                    // An action that has failed is the end of the plan.
+                    if !stage.end(action) {
+                        return;
+                    }
                 } else if !stage.attempt(action) {
                     break;
                 }

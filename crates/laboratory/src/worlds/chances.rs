@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, FactId, SnapAction};
 use elbowroom_model::problem::{ObjectId, SchemaId};
-use elbowroom_probability::likelihoods::Missing;
+use elbowroom_probability::likelihoods::{Aftermath, Missing};
 use elbowroom_probability::{Flip, Likelihoods};
 
 /// The random events of a perturbed world, with their probabilities.
@@ -22,6 +22,10 @@ pub(super) struct ActionChances {
     pub(super) start: f64,
     pub(super) start_effects: Vec<EffectChance>,
     pub(super) end_effects: Vec<EffectChance>,
+    /// The end succeeds.
+    pub(super) end: f64,
+    /// What a failed end leaves behind.
+    pub(super) aftermaths: Vec<Aftermath>,
 }
 
 /// An effect; in lists of them, deletions come first.
@@ -61,6 +65,8 @@ impl Chances {
                     start,
                     start_effects,
                     end_effects,
+                    end: likelihoods.end(action),
+                    aftermaths: likelihoods.aftermaths(task, action),
                 },
             );
         }

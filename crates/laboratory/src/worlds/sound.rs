@@ -3,6 +3,7 @@
 use crate::untimed::UntimedWorld;
 use elbowroom_model::State;
 use elbowroom_model::ground::Action;
+use elbowroom_probability::likelihoods::Aftermath;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -11,18 +12,20 @@ use elbowroom_sim::draw::{Purpose, keyed};
 
 /// Every draw is independent of all others.
 ///
-/// An attempt to start succeeds with its probability; an effect takes place with its own, and
-/// otherwise leaves the fact as it was, deletions before additions. After each attempt, successful
-/// or not, and each end, every fact may change by itself once.
+/// An attempt to start, and an end, succeeds with its probability; an effect takes place with its
+/// own, and otherwise leaves the fact as it was, deletions before additions. An end that fails has
+/// none of its effects, but one of its failure's outcomes. After each attempt and each end,
+/// successful or not, every fact may change by itself once.
 ///
-/// It is the world of [`optimum`](elbowroom_probability::optimum). Starts, effects and changes draw
-/// from three sources that depend on the seed only, so two executors that do the same meet the
-/// same.
+/// It is the world of [`optimum`](elbowroom_probability::optimum). Starts, ends, effects and
+/// changes draw from sources of their own that depend on the seed only, so two executors that do
+/// the same meet the same.
 #[derive(Clone, Debug)]
 pub struct SoundWorld<'a> {
     chances: &'a Chances,
     state: State,
     starts: ChaCha8Rng,
+    ends: ChaCha8Rng,
     effects: ChaCha8Rng,
     changes: ChaCha8Rng,
 }
@@ -34,6 +37,7 @@ impl<'a> SoundWorld<'a> {
             chances,
             state: initial.clone(),
             starts: keyed(seed, "", 0, Purpose::Failure),
+            ends: keyed(seed, "", 1, Purpose::Failure),
             effects: keyed(seed, "", 0, Purpose::Effect),
             changes: keyed(seed, "", 0, Purpose::Change),
         }
@@ -48,6 +52,26 @@ impl<'a> SoundWorld<'a> {
                 self.state.facts.insert(effect.fact);
             } else {
                 self.state.facts.remove(&effect.fact);
+            }
+        }
+    }
+
+    /// One of the ways in which things may stand after a failure.
+    fn leave(&mut self, aftermaths: &[Aftermath]) {
+        let mut left = self.ends.random::<f64>();
+        let drawn = aftermaths.iter().find(|aftermath| {
+            left -= aftermath.probability;
+            left < 0.0
+        });
+        // What does not add up to 1 by a rounding is the last one's.
+        let Some(aftermath) = drawn.or(aftermaths.last()) else {
+            return;
+        };
+        for &(fact, becomes) in &aftermath.changes {
+            if becomes {
+                self.state.facts.insert(fact);
+            } else {
+                self.state.facts.remove(&fact);
             }
         }
     }
@@ -82,10 +106,17 @@ impl UntimedWorld for SoundWorld<'_> {
         started.is_some()
     }
 
-    fn end(&mut self, action: &Action) {
+    fn end(&mut self, action: &Action) -> bool {
+        let mut has_succeeded = true;
         if let Some(chances) = self.chances.of(action) {
-            self.take_effect(&chances.end_effects);
+            has_succeeded = self.ends.random::<f64>() < chances.end;
+            if has_succeeded {
+                self.take_effect(&chances.end_effects);
+            } else {
+                self.leave(&chances.aftermaths);
+            }
         }
         self.change();
+        has_succeeded
     }
 }

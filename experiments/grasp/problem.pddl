@@ -1,0 +1,5 @@
+(define (problem cup-and-jar)
+  (:domain grasp)
+  (:objects cup jar - vessel)
+  (:init (at-table) (free) (charged) (on-shelf cup) (on-shelf jar))
+  (:goal (and (on-table cup) (on-table jar))))
