@@ -60,7 +60,7 @@ pub enum PrismError {
     /// Likelihoods are rates per second.
     #[error(
         "the likelihoods have rates per second, and the process without time has steps only: give \
-         `becomes_true` and `becomes_false` instead"
+         `becomes_true` and `becomes_false` instead, and `end` instead of `during_per_second`"
     )]
     Seconds,
     /// It has too many commands.

@@ -146,6 +146,49 @@ fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
 
 /// Someone takes the rock away while the command to sample it is on its way: no wonder that it
 /// fails, and no reason to give the plan up, where rocks come back.
+/// The parcel of `cases/delivery`, whose picks fail at their end three times in ten.
+#[test]
+fn a_pick_that_fails_at_its_end_and_is_undone_is_tried_again() {
+    // What follows the header.
+    let sections = |name: &str| {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/delivery/");
+        let text = std::fs::read_to_string(format!("{folder}{name}")).expect("it is there");
+        let (_, sections) = text.split_once("version = 1").expect("it has a header");
+        sections.to_owned()
+    };
+    let (told, world) = (sections("likelihoods.toml"), sections("slips.toml"));
+    let world = world.as_str();
+    let scene = |likelihoods: &str| Scene::case("delivery").with_likelihoods(likelihoods);
+    for executor in ["adaptable", "lookahead"] {
+        let (mut again, mut more) = (0, 0);
+        for seed in 0..40 {
+            let scene = scene(&told);
+            let report = scene.run(executor, &scene.world(world), seed);
+            assert_eq!(report.verdict, Verdict::GoalReached, "{executor} {seed}");
+            // Nobody needs another plan for that.
+            assert_eq!(report.replans, 0, "{executor} {seed}");
+            let picks = done(&report)
+                .iter()
+                .filter(|name| name.starts_with("pick"))
+                .count();
+            again += usize::from(picks == 2);
+            more += usize::from(picks > 2);
+        }
+        assert!(
+            again >= 4 && more >= 1,
+            "{executor}: {again} twice, {more} more often"
+        );
+    }
+    // Whoever is told that picks are certain gives the plan up.
+    let certain = told.replace("end = 0.7", "end = 1.0");
+    let scene = scene(&certain);
+    let given_up = (0..40).filter(|seed| {
+        let report = scene.run("adaptable", &scene.world(world), *seed);
+        report.verdict != Verdict::GoalReached || report.replans > 0
+    });
+    assert!(given_up.count() >= 4);
+}
+
 #[test]
 fn a_failure_that_is_explained_by_what_was_seen_does_not_count() {
     let domain = DOMAIN.replace("(over all (rock))", "(at start (rock))");

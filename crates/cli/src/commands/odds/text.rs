@@ -144,6 +144,8 @@ fn reason(reason: &LossReason) -> String {
     };
     match reason {
         LossReason::Start => "it does not start".to_owned(),
+        LossReason::End => "it fails".to_owned(),
+        LossReason::During { action } => format!("{action} fails on its way"),
         LossReason::Condition {
             condition,
             since: by,
@@ -170,6 +172,8 @@ fn gains(text: &mut String, odds: &Odds, look: Look) {
         ways.push((action.if_certain, format!("{name} never failed")));
         let retried = action.if_retried.filter(|p| *p < action.if_certain);
         ways.extend(retried.map(|p| (p, format!("{name} were tried until it starts"))));
+        let again = action.if_done_again.filter(|p| *p < action.if_certain);
+        ways.extend(again.map(|p| (p, format!("{name} were done again until it succeeds"))));
     }
     for fact in &order.facts {
         ways.push((

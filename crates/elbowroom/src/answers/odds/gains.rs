@@ -3,7 +3,7 @@
 use elbowroom_execution::PlanAnswer;
 use elbowroom_model::ground::Action;
 use elbowroom_probability::optimum::best_value;
-use elbowroom_probability::{SearchStop, all_actions};
+use elbowroom_probability::{SearchStop, all_actions_under};
 use serde::{Deserialize, Serialize};
 
 use super::{OrderAnswer, Subject, planned};
@@ -78,7 +78,7 @@ impl GainsAnswer {
                 None => None,
             },
             as_the_state_asks: ValueAnswer::of(subject, own),
-            any_action: match all_actions(request.task) {
+            any_action: match all_actions_under(request.task, request.likelihoods) {
                 Ok(actions) => ValueAnswer::of(subject, actions),
                 Err(error) => ValueAnswer::Unknown(error.to_string()),
             },

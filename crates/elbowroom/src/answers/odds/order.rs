@@ -94,6 +94,13 @@ pub struct LossAnswer {
 pub enum LossReason {
     /// The attempt to start fails.
     Start,
+    /// The end fails.
+    End,
+    /// An action under way fails.
+    During {
+        /// The action.
+        action: String,
+    },
     /// Something that the happening needs does not hold.
     Condition {
         /// The condition.
@@ -127,10 +134,13 @@ pub struct ActionAnswer {
     pub action: String,
     /// The position of its start in the order.
     pub happening: usize,
-    /// P(A ∩ G) if its start and effects never failed.
+    /// P(A ∩ G) if its start, its end and its effects never failed.
     pub if_certain: f64,
     /// P(A ∩ G) if failed attempts to start it were repeated; `None`: the order is too long.
     pub if_retried: Option<f64>,
+    /// P(A ∩ G) if it was started again at once whenever its end fails; `None`: its end does not
+    /// fail, a failure may leave one thing or another behind, or the order is too long.
+    pub if_done_again: Option<f64>,
 }
 
 /// The part of a fact.
@@ -202,6 +212,7 @@ impl OrderAnswer {
                     happening,
                     if_certain: share.if_certain,
                     if_retried: share.if_retried,
+                    if_done_again: share.if_done_again,
                 })
                 .collect(),
             facts: account
@@ -258,7 +269,7 @@ fn literal(model: &Model, fact: FactId, truth: bool) -> String {
 impl LossAnswer {
     fn of(model: &Model, sequence: &[NodeId], loss: &Loss) -> Self {
         let (condition, since) = match &loss.cause {
-            LossCause::Start => (None, None),
+            LossCause::Start | LossCause::End | LossCause::During => (None, None),
             LossCause::Fact { fact, truth } => {
                 let since = since(model, sequence, loss, *fact);
                 (Some(literal(model, *fact, *truth)), since)
@@ -268,6 +279,10 @@ impl LossAnswer {
             }
         };
         let reason = match (condition, loss.reading) {
+            (None, Reading::Throughout(id)) => LossReason::During {
+                action: model.plan().instance(id).action.name.clone(),
+            },
+            (None, _) if loss.cause == LossCause::End => LossReason::End,
             (None, _) => LossReason::Start,
             (Some(condition), Reading::OnArrival) => LossReason::Condition { condition, since },
             (Some(condition), Reading::Throughout(id)) => LossReason::Throughout {

@@ -9,7 +9,7 @@ use elbowroom_model::{State, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, PartialOrderPlan};
 use elbowroom_probability::optimum::{DeadEnds, Horizon, NotSmall, Perturbed, Settings};
-use elbowroom_probability::{Likelihoods, Model, Semantics, all_actions};
+use elbowroom_probability::{Likelihoods, Model, Semantics, all_actions_under};
 
 use super::formula::{Formula, choice, exact};
 use super::{PrismError, bare, checked, dead_ends};
@@ -34,7 +34,7 @@ pub fn untimed(
     }
     // Facts are entered into the table of facts as they are met.
     let task = Arc::new(task.clone());
-    let plan = PartialOrderPlan::unordered(&task, all_actions(&task)?);
+    let plan = PartialOrderPlan::unordered(&task, all_actions_under(&task, likelihoods)?);
     let model = Model::new(Arc::clone(&task), plan, likelihoods, Semantics::World)?;
     let process = Process::new(model, likelihoods, settings)?;
     checked(process.text()?)
@@ -59,6 +59,24 @@ struct Happening<'p> {
     action: usize,
     kind: Kind,
     snap: &'p SnapAction,
+}
+
+/// One of the ways in which things may stand after a failed end.
+struct Failure {
+    /// The place of the end among the happenings.
+    happening: usize,
+    /// Given that it fails.
+    probability: Rational,
+    /// In order.
+    changes: Vec<(FactId, bool)>,
+}
+
+impl Failure {
+    /// What it does to a fact, as certain effects.
+    fn effects(&self, fact: FactId) -> Vec<(bool, Rational)> {
+        let own = self.changes.iter().filter(|(other, _)| *other == fact);
+        own.map(|(_, becomes)| (*becomes, Rational::ONE)).collect()
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -252,7 +270,8 @@ impl<'p> Process<'p> {
     /// The agent, and what is under way.
     fn agent(&self, text: &mut String) -> Result<(), PrismError> {
         let happenings = self.happenings();
-        let phases = Phases::new(happenings.len(), self);
+        let failures = self.failures();
+        let phases = Phases::new(happenings.len() + failures.len(), self);
         text.push_str("module agent\n");
         let _ = writeln!(
             text,
@@ -261,6 +280,14 @@ impl<'p> Process<'p> {
             happenings.len(),
             phases.nothing
         );
+        if !failures.is_empty() {
+            let _ = writeln!(
+                text,
+                "  // {} to {}: what failed ends leave behind.",
+                happenings.len() + 1,
+                happenings.len() + failures.len()
+            );
+        }
         let begin = if self.uncertain().next().is_some() {
             phases.begin
         } else {
@@ -287,7 +314,12 @@ impl<'p> Process<'p> {
             let _ = writeln!(text, "  [begin] phase={begin} -> (phase'=0);");
         }
         for (index, happening) in happenings.iter().enumerate() {
-            self.command(happening, index + 1, phases.nothing, text)?;
+            let own = failures.iter().enumerate();
+            let own = own.filter(|(_, failure)| failure.happening == index);
+            let own: Vec<_> = own
+                .map(|(place, failure)| (happenings.len() + 1 + place, failure))
+                .collect();
+            self.command(happening, index + 1, (phases.nothing, &own), text)?;
         }
         for action in self.durative() {
             let name = &self.names[action];
@@ -311,7 +343,7 @@ impl<'p> Process<'p> {
         &self,
         happening: &Happening<'_>,
         step: usize,
-        nothing: usize,
+        (nothing, failures): (usize, &[(usize, &Failure)]),
         text: &mut String,
     ) -> Result<(), PrismError> {
         let (_, action) = &self.actions[happening.action];
@@ -333,18 +365,52 @@ impl<'p> Process<'p> {
             Kind::End => (Formula::all([own, needs]), format!("&(u_{name}'=false)")),
         };
         let success = match happening.kind {
-            Kind::End => Rational::ONE,
+            Kind::End => exact(self.likelihoods.end(action)),
             Kind::Start | Kind::Instant => exact(self.likelihoods.start(action)?),
         };
         let failure = &Rational::ONE - &success;
-        let ways = [
-            (success, format!("(phase'={step}){after}")),
-            (failure, format!("(phase'={nothing})")),
-        ];
+        let mut ways = vec![(success, format!("(phase'={step}){after}"))];
+        if happening.kind == Kind::End {
+            ways.extend(failures.iter().map(|(phase, of_it)| {
+                let p = &failure * &of_it.probability;
+                (p, format!("(phase'={phase}){after}"))
+            }));
+        } else {
+            ways.push((failure, format!("(phase'={nothing})")));
+        }
         let guard = Formula::all([Formula::atom("ready"), guard]);
         let word = happening.kind.word();
         let _ = writeln!(text, "  [{word}_{name}] {guard} -> {};", choice(&ways));
         Ok(())
+    }
+
+    /// What failed ends may leave behind, happening by happening.
+    fn failures(&self) -> Vec<Failure> {
+        let mut failures = Vec::new();
+        for (index, happening) in self.happenings().iter().enumerate() {
+            let (_, action) = &self.actions[happening.action];
+            if happening.kind != Kind::End || self.likelihoods.end(action) >= 1.0 {
+                continue;
+            }
+            let aftermaths = self.likelihoods.aftermaths(self.task(), action);
+            let last = aftermaths.len().saturating_sub(1);
+            let mut left = Rational::ONE;
+            for (place, aftermath) in aftermaths.into_iter().enumerate() {
+                // The last one has all that is left, so that they add up to 1 exactly.
+                let probability = if place == last {
+                    left.clone()
+                } else {
+                    exact(aftermath.probability)
+                };
+                left = &left - &probability;
+                failures.push(Failure {
+                    happening: index,
+                    probability,
+                    changes: aftermath.changes,
+                });
+            }
+        }
+        failures
     }
 
     /// What comes of a step once facts have changed.
@@ -403,11 +469,13 @@ impl<'p> Process<'p> {
         if initial > 0.0 && initial < 1.0 {
             line("begin", "true", exact(initial));
         }
-        let happenings = self.happenings();
-        for step in 0..=happenings.len() {
+        let (happenings, failures) = (self.happenings(), self.failures());
+        for step in 0..=happenings.len() + failures.len() {
             let effects = match happenings.get(step) {
                 Some(happening) => self.effects(happening, fact)?,
-                None => Vec::new(),
+                None => failures
+                    .get(step - happenings.len())
+                    .map_or_else(Vec::new, |failure| failure.effects(fact)),
             };
             if effects.is_empty() && rises.is_zero() && falls.is_zero() {
                 continue;
@@ -465,7 +533,7 @@ impl<'p> Process<'p> {
     }
 }
 
-/// The values of the variable `phase` after those of the happenings.
+/// The values of the variable `phase` after those of the happenings and of failed ends.
 struct Phases {
     nothing: usize,
     settle: Option<usize>,
