@@ -188,6 +188,20 @@ impl<W: Weight> Dispatchable<W> {
         })
     }
 
+    /// All waits found beside those of links for their own ends: the node, the link whose end it waits
+    /// for, and for how long at most after the link's activation; `None` is without limit.
+    ///
+    /// Also those of nodes that the world decides on. Nobody has to see to these, but other waits
+    /// follow from them.
+    pub fn waits_found(&self) -> impl Iterator<Item = (NodeId, LinkId, Option<W>)> {
+        self.graph.edges.iter().filter_map(|edge| match edge.kind {
+            Kind::Upper(link) if !matches!(edge.origin, Origin::Link(_)) => {
+                Some((edge.from, link, edge.bound.negated().into_finite()))
+            }
+            _ => None,
+        })
+    }
+
     pub(super) fn waits_at(&self, node: NodeId) -> &[Wait<W>] {
         &self.waits_at[node.index()]
     }
