@@ -1,5 +1,7 @@
 //! The first half of the box check: for every value in the box there is a schedule.
 
+mod rules;
+
 use std::collections::BTreeMap;
 
 use crate::reduction::{Edge, Reduction};

@@ -72,7 +72,7 @@ pub(crate) enum Controllability {
 /// The data shared by the dynamic and the strong guarantee.
 #[derive(Clone, Debug)]
 pub(crate) struct Control {
-    plan: Arc<ParametrizedPlan>,
+    pub(crate) plan: Arc<ParametrizedPlan>,
     /// That there is no schedule at all is the better reason, where it is one.
     feasibility: Feasibility,
 }

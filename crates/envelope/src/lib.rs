@@ -75,6 +75,7 @@ mod method;
 mod objection;
 pub mod obligations;
 mod oracle;
+mod proved;
 mod ray;
 pub mod reduction;
 mod repair;
@@ -97,6 +98,10 @@ pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};
 pub use method::Method;
 pub use objection::Objection;
 pub use oracle::Oracle;
+pub use proved::{
+    ConditionProof, ControlProof, Impossible, Refutation, ScheduleCase, Strategy, Summand,
+    TimeRule, Unfailing,
+};
 pub use repair::{Changeable, Hindrance, Repair, RepairRun, repair};
 pub use row::Row;
 pub use sharpen::sharpen;

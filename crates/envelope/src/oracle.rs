@@ -1,5 +1,6 @@
 //! The exact box check.
 
+mod inside;
 mod learn;
 
 use std::sync::Arc;

@@ -10,7 +10,7 @@ use elbowroom_stn::{
 
 use crate::obligations::{BadCase, Substitution};
 use elbowroom_plan::{
-    Bound, BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Schedule, Side,
+    Bound, BoxEnd, DecoupledEnvelope, NodeId, Origin, ParameterId, ParametrizedPlan, Schedule, Side,
 };
 
 /// `t_to - t_from <= constant + reach(end)`, over classes.
@@ -24,6 +24,10 @@ pub struct Edge {
     pub constant: Rational,
     /// The end whose reach is added.
     pub end: Option<BoxEnd>,
+    /// The bound of the plan that it comes from.
+    pub origin: Origin,
+    /// The node at which that bound begins.
+    pub node: NodeId,
 }
 
 /// The plan's network over classes of rigidly connected nodes.
@@ -67,31 +71,35 @@ impl Reduction {
             coupled: Vec::new(),
         };
         for (node, _) in plan.plan.nodes().skip(1) {
-            reduction.add_edge(node, NodeId::ZERO, Rational::ZERO, None);
+            let ends = (node, NodeId::ZERO);
+            reduction.add_edge(ends, Rational::ZERO, None, Origin::Beginning);
         }
-        for constraint in &plan.plan.constraints {
+        for (index, constraint) in plan.plan.constraints.iter().enumerate() {
+            let (most, least) = (Origin::AtMost(index), Origin::AtLeast(index));
             let (from, to) = (constraint.from, constraint.to);
             reduction.note_parameters(plan, from, to, &constraint.lower, &constraint.upper);
             match &constraint.upper {
                 Bound::Infinite => {}
-                Bound::Finite(upper) => reduction.add_edge(from, to, upper.clone(), None),
+                Bound::Finite(upper) => {
+                    reduction.add_edge((from, to), upper.clone(), None, most);
+                }
                 Bound::Parameter(parameter) => {
                     let end = BoxEnd {
                         parameter: *parameter,
                         side: Side::Upper,
                     };
-                    reduction.add_edge(from, to, Rational::ZERO, Some(end));
+                    reduction.add_edge((from, to), Rational::ZERO, Some(end), most);
                 }
             }
             match &constraint.lower {
                 Bound::Infinite => {}
-                Bound::Finite(lower) => reduction.add_edge(to, from, -lower, None),
+                Bound::Finite(lower) => reduction.add_edge((to, from), -lower, None, least),
                 Bound::Parameter(parameter) => {
                     let end = BoxEnd {
                         parameter: *parameter,
                         side: Side::Lower,
                     };
-                    reduction.add_edge(to, from, Rational::ZERO, Some(end));
+                    reduction.add_edge((to, from), Rational::ZERO, Some(end), least);
                 }
             }
         }
@@ -180,7 +188,14 @@ impl Reduction {
     }
 
     /// Adds `to - from <= constant + reach(end)`.
-    fn add_edge(&mut self, from: NodeId, to: NodeId, constant: Rational, end: Option<BoxEnd>) {
+    fn add_edge(
+        &mut self,
+        (from, to): (NodeId, NodeId),
+        constant: Rational,
+        end: Option<BoxEnd>,
+        origin: Origin,
+    ) {
+        let node = from;
         let (from_class, from_offset) = &self.places[from.index()];
         let (to_class, to_offset) = &self.places[to.index()];
         let constant = constant + from_offset - to_offset;
@@ -191,6 +206,8 @@ impl Reduction {
                 to: *to_class,
                 constant,
                 end,
+                origin,
+                node,
             });
         }
     }

@@ -17,6 +17,7 @@ mod linear_program;
 mod proof;
 mod scale;
 mod sound_box;
+mod told;
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;

@@ -7,7 +7,7 @@ use elbowroom_stn::{
 };
 
 use super::Counterexample;
-use super::certificate::Certificate;
+use super::certificate::{Certificate, Term};
 use super::corner::corners;
 use super::flow;
 use super::linear_program;
@@ -30,6 +30,8 @@ pub(crate) struct Schedules<'a, S: Scale> {
     edges: Vec<usize>,
     /// The constraints after these: what is assumed.
     assumed: Vec<Constraint<Delta>>,
+    /// Whether proofs tell what they add up.
+    tells: bool,
 }
 
 /// A moment to come back to.
@@ -94,7 +96,13 @@ impl<'a, S: Scale> Schedules<'a, S> {
             base,
             edges,
             assumed: Vec::new(),
+            tells: false,
         })
+    }
+
+    /// Lets proofs tell what they add up from now on.
+    pub(crate) fn tell(&mut self) {
+        self.tells = true;
     }
 
     /// Tightens by a difference.
@@ -149,6 +157,11 @@ impl<'a, S: Scale> Schedules<'a, S> {
         let mut certificate = Certificate::default();
         for id in &cycle.constraints {
             let assumed = id.index().checked_sub(self.edges.len());
+            if self.tells {
+                let edge = || Term::Edge(self.edges[id.index()]);
+                let term = assumed.map_or_else(edge, Term::Assumed);
+                certificate.terms.push((term, Rational::ONE));
+            }
             match assumed.map(|index| self.assumed.get(index)) {
                 None => {
                     let edge = self.edges[id.index()];
@@ -239,14 +252,19 @@ impl<'a, S: Scale> Schedules<'a, S> {
     /// itself.
     fn each_possible(&mut self, case: &BadCase, parameter: ParameterId) -> Outcome {
         if case.inequalities.len() > 1 {
-            for inequality in &case.inequalities {
+            for (index, inequality) in case.inequalities.iter().enumerate() {
                 let alone = BadCase {
                     differences: Vec::new(),
                     inequalities: vec![inequality.clone()],
                 };
-                let outcome = self.inequalities_possible(&alone);
-                if matches!(outcome, Outcome::Impossible(_)) {
-                    return outcome;
+                if let Outcome::Impossible(mut proofs) = self.inequalities_possible(&alone) {
+                    let terms = proofs.iter_mut().flat_map(|proof| &mut proof.terms);
+                    for (term, _) in terms {
+                        if matches!(term, Term::Inequality(_)) {
+                            *term = Term::Inequality(index);
+                        }
+                    }
+                    return Outcome::Impossible(proofs);
                 }
             }
         }
@@ -256,8 +274,12 @@ impl<'a, S: Scale> Schedules<'a, S> {
     /// A proof that the inequalities, free of products, cannot all hold; `None` if they can.
     fn linear_possible(&mut self, inequalities: &[Inequality]) -> Option<Certificate> {
         // Each inequality alone, without what couples parameters, is a problem of flows.
-        for inequality in inequalities {
-            if let Some(certificate) = self.flow_certificate(inequality) {
+        for (index, inequality) in inequalities.iter().enumerate() {
+            if let Some(mut certificate) = self.flow_certificate(inequality) {
+                if self.tells {
+                    let own = (Term::Inequality(index), Rational::ONE);
+                    certificate.terms.push(own);
+                }
                 return Some(certificate);
             }
         }
@@ -298,6 +320,11 @@ impl<'a, S: Scale> Schedules<'a, S> {
             .enumerate()
             .filter(|(_, amount)| amount.is_positive())
         {
+            if self.tells {
+                let edge = self.edges.get(index).copied().map(Term::Edge);
+                let term = edge.unwrap_or_else(|| Term::Assumed(index - self.edges.len()));
+                certificate.terms.push((term, amount.clone()));
+            }
             if let Some(&edge) = self.edges.get(index) {
                 certificate.add_edge(&self.reduction.edges()[edge], amount);
             } else {

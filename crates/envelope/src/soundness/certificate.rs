@@ -17,6 +17,19 @@ pub(crate) struct Certificate {
     ends: Vec<(BoxEnd, Rational)>,
     /// Ends on which the factors themselves depend: once one moves, the proof is void.
     pub(crate) fixed: Vec<BoxEnd>,
+    /// What is added up, and how often; only where that [is told](super::bad_case::Schedules::tell).
+    pub(crate) terms: Vec<(Term, Rational)>,
+}
+
+/// A constraint in a [`Certificate`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Term {
+    /// The edge of the reduced network at this position.
+    Edge(usize),
+    /// What is assumed, by position.
+    Assumed(usize),
+    /// The inequality of the case at this position.
+    Inequality(usize),
 }
 
 impl Certificate {

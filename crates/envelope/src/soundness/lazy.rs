@@ -49,6 +49,20 @@ impl<'a> AnySchedules<'a> {
         }
     }
 
+    /// The same, whose proofs tell what they add up.
+    pub(crate) fn telling(
+        reduction: &'a Reduction,
+        envelope: &'a DecoupledEnvelope,
+        numbers: Option<&Numbers>,
+    ) -> Option<Self> {
+        let mut schedules = Self::new(reduction, envelope, numbers)?;
+        match &mut schedules {
+            Self::Whole(schedules) => schedules.tell(),
+            Self::Exact(schedules) => schedules.tell(),
+        }
+        Some(schedules)
+    }
+
     pub(crate) fn possible(&mut self, case: &BadCase) -> Outcome {
         match self {
             Self::Whole(schedules) => schedules.possible(case),

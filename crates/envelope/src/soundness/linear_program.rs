@@ -7,7 +7,7 @@ use elbowroom_num::{Delta, Rational};
 use elbowroom_stn::Constraint;
 
 use super::bad_case::spread;
-use super::certificate::Certificate;
+use super::certificate::{Certificate, Term};
 use crate::linear::Linear;
 use crate::obligations::Inequality;
 use crate::reduction::Reduction;
@@ -17,7 +17,9 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side, Valuation};
 enum Meaning {
     Edge(usize),
     End(BoxEnd),
-    Constant(Delta),
+    /// What is assumed, or an inequality.
+    Given(Term, Delta),
+    Zero,
 }
 
 struct Program<'a> {
@@ -40,6 +42,15 @@ pub(crate) fn refute(
     let infeasible = program.simplex.check().err()?;
     let mut certificate = Certificate::default();
     for (tag, factor) in infeasible.certificate {
+        let term = match program.meanings[tag] {
+            Meaning::Edge(index) => Some(Term::Edge(index)),
+            Meaning::Given(term, _) => Some(term),
+            // Which ends count follows from the rest.
+            Meaning::End(_) | Meaning::Zero => None,
+        };
+        certificate
+            .terms
+            .extend(term.map(|term| (term, factor.clone())));
         match &program.meanings[tag] {
             Meaning::Edge(index) => {
                 certificate.add_constant(
@@ -48,7 +59,8 @@ pub(crate) fn refute(
                 );
             }
             Meaning::End(end) => certificate.add_end(*end, &factor),
-            Meaning::Constant(constant) => certificate.add_constant(constant, &factor),
+            Meaning::Given(_, constant) => certificate.add_constant(constant, &factor),
+            Meaning::Zero => {}
         }
     }
     Some(certificate.complete())
@@ -113,7 +125,7 @@ impl<'a> Program<'a> {
         for index in 0..reduction.edges().len() {
             program.add_edge(index);
         }
-        for constraint in assumed {
+        for (index, constraint) in assumed.iter().enumerate() {
             let row = [
                 (program.classes[constraint.to.index()], Rational::ONE),
                 (program.classes[constraint.from.index()], Rational::from(-1)),
@@ -121,18 +133,18 @@ impl<'a> Program<'a> {
             program.at_most(
                 &row,
                 constraint.bound.clone(),
-                Meaning::Constant(constraint.bound.clone()),
+                Meaning::Given(Term::Assumed(index), constraint.bound.clone()),
             );
         }
-        for inequality in inequalities {
-            program.add_inequality(inequality);
+        for (index, inequality) in inequalities.iter().enumerate() {
+            program.add_inequality(index, inequality);
         }
         program
     }
 
     fn fix_zero(&mut self) {
         let zero = self.classes[0];
-        let tag = self.tag(Meaning::Constant(Delta::ZERO));
+        let tag = self.tag(Meaning::Zero);
         self.simplex.assert_upper(zero, Delta::ZERO, tag);
         self.simplex.assert_lower(zero, Delta::ZERO, tag);
     }
@@ -193,14 +205,15 @@ impl<'a> Program<'a> {
         (row.into_iter().collect(), constant)
     }
 
-    fn add_inequality(&mut self, inequality: &Inequality) {
+    fn add_inequality(&mut self, index: usize, inequality: &Inequality) {
         let (row, constant) = self.row(&inequality.expression);
         let bound = if inequality.is_strict {
             Delta::just_below(-constant)
         } else {
             Delta::from(-constant)
         };
-        self.at_most(&row, bound.clone(), Meaning::Constant(bound));
+        let meaning = Meaning::Given(Term::Inequality(index), bound.clone());
+        self.at_most(&row, bound, meaning);
     }
 
     fn at_most(&mut self, row: &[(VariableId, Rational)], bound: Delta, meaning: Meaning) {

@@ -1,0 +1,173 @@
+//! Schedules for all values in a box, as rules by which times follow from values.
+//!
+//! A parameter that is the difference of two times, and by which constraints are only broken if it
+//! is too small, can grow: its later time, and all that bounds the latest time of this one, move by as
+//! much. Nothing is broken by that, because what does not move is only later than something else
+//! by less. The other way round, the later time and what has to come soon after it can move back. So from a
+//! schedule at the worst ends of these parameters follows one for all of their values. Of the other
+//! parameters both ends are looked at: between two schedules lie those for the values between.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, Side};
+use elbowroom_stn::{ConsistentNetwork, Constraint, Network, NodeId as ClassId};
+
+use super::Feasibility;
+use crate::cycles::Role;
+use crate::proved::{ScheduleCase, TimeRule};
+use crate::reduction::{Edge, Reduction};
+
+/// The limit on parameters of which both ends are looked at.
+const MOST_SPLITS: usize = 6;
+
+impl Feasibility {
+    /// Rules for all values in a box, which has a schedule for each of them; `None` if there are
+    /// too many cases, or an end whose two sides both matter is infinite.
+    pub(crate) fn rules(
+        &self,
+        reduction: &Reduction,
+        envelope: &DecoupledEnvelope,
+    ) -> Option<Vec<ScheduleCase>> {
+        let all = (0..self.roles.len()).map(ParameterId::from);
+        let role = |id: &ParameterId| self.roles[id.index()];
+        let splits: Vec<ParameterId> = all.filter(|id| role(id) == Role::Both).collect();
+        if splits.len() > MOST_SPLITS {
+            return None;
+        }
+        let mut cases = Vec::new();
+        self.split(
+            reduction,
+            envelope,
+            &splits,
+            &mut BTreeMap::new(),
+            &mut cases,
+        )?;
+        Some(cases)
+    }
+
+    /// Appends the cases of the parameters that are still to be split; the position of the first.
+    fn split(
+        &self,
+        reduction: &Reduction,
+        envelope: &DecoupledEnvelope,
+        splits: &[ParameterId],
+        values: &mut BTreeMap<ParameterId, Rational>,
+        cases: &mut Vec<ScheduleCase>,
+    ) -> Option<usize> {
+        let place = cases.len();
+        let Some((&parameter, rest)) = splits.split_first() else {
+            let rule = self.rule(reduction, envelope, values)?;
+            cases.push(ScheduleCase::Rule(rule));
+            return Some(place);
+        };
+        cases.push(ScheduleCase::Split(parameter, [0; 2]));
+        let mut parts = [0; 2];
+        for side in Side::BOTH {
+            let value = side.of(envelope.interval(parameter)).value()?;
+            values.insert(parameter, value.clone());
+            parts[side.index()] = self.split(reduction, envelope, rest, values, cases)?;
+        }
+        values.remove(&parameter);
+        cases[place] = ScheduleCase::Split(parameter, parts);
+        Some(place)
+    }
+
+    /// A rule for all values of the parameters that are not fixed.
+    fn rule(
+        &self,
+        reduction: &Reduction,
+        envelope: &DecoupledEnvelope,
+        fixed: &BTreeMap<ParameterId, Rational>,
+    ) -> Option<Vec<TimeRule>> {
+        // What the schedule that all others follow from is for, and which end moves times.
+        let mut base = fixed.clone();
+        let mut moving = Vec::new();
+        for (index, role) in self.roles.iter().enumerate() {
+            let id = ParameterId::from(index);
+            let interval = envelope.interval(id);
+            let side = match role {
+                Role::Both => continue,
+                Role::Lower => Side::Lower,
+                Role::None if interval.lower.value().is_some() => Side::Lower,
+                Role::Upper | Role::None => Side::Upper,
+            };
+            let value = side.of(interval).value().cloned().unwrap_or_default();
+            base.insert(id, value);
+            moving.push((id, side));
+        }
+        let mut network = Network::with_nodes(self.class_count);
+        for edge in &self.edges {
+            let bound = match edge.end {
+                None => edge.constant.clone(),
+                Some(BoxEnd { parameter, side }) => match side {
+                    Side::Upper => &edge.constant + &base[&parameter],
+                    Side::Lower => &edge.constant - &base[&parameter],
+                },
+            };
+            network.add(Constraint {
+                from: edge.from,
+                to: edge.to,
+                bound,
+            });
+        }
+        let network = ConsistentNetwork::try_from(network).ok()?;
+        let earliest = network.earliest_schedule(ClassId(0));
+        let mut classes: Vec<TimeRule> = earliest
+            .times()
+            .iter()
+            .map(|time| TimeRule {
+                constant: time - &earliest.times()[0],
+                factors: Vec::new(),
+            })
+            .collect();
+        for (parameter, side) in moving {
+            let moves = self.moved_by(parameter, side);
+            for (class, rule) in classes.iter_mut().enumerate() {
+                // Times count from time zero.
+                let factor = i64::from(moves[class]) - i64::from(moves[0]);
+                if factor != 0 {
+                    let factor = Rational::from(factor);
+                    rule.constant -= &base[&parameter] * &factor;
+                    rule.factors.push((parameter, factor));
+                }
+            }
+        }
+        let rules = (0..reduction.node_count()).map(|node| {
+            let (class, offset) = reduction.place(NodeId::from(node));
+            let mut rule = classes[class.index()].clone();
+            rule.constant += &offset;
+            rule
+        });
+        Some(rules.collect())
+    }
+
+    /// Of each class whether it moves with a parameter that is a difference of times: as its value
+    /// moves away from that end.
+    fn moved_by(&self, parameter: ParameterId, side: Side) -> Vec<bool> {
+        let mut moves = vec![false; self.class_count];
+        let is_own = |edge: &&Edge| edge.end.is_some_and(|end| end.parameter == parameter);
+        let own = |wanted: Side| {
+            let mut own = self.edges.iter().filter(is_own);
+            own.find(|edge| edge.end.is_some_and(|end| end.side == wanted))
+        };
+        // One that only bounds a difference from one side has nothing to move.
+        let (Some(most), Some(_)) = (own(Side::Upper), own(Side::Lower)) else {
+            return moves;
+        };
+        let mut open = vec![most.to];
+        while let Some(class) = open.pop() {
+            if std::mem::replace(&mut moves[class.index()], true) {
+                continue;
+            }
+            for edge in self.edges.iter().filter(|edge| !is_own(edge)) {
+                match side {
+                    Side::Lower if edge.to == class => open.push(edge.from),
+                    Side::Upper if edge.from == class => open.push(edge.to),
+                    _ => {}
+                }
+            }
+        }
+        moves
+    }
+}
