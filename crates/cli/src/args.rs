@@ -118,7 +118,7 @@ pub(crate) enum Command {
     Network(NetworkArgs),
     /// Write a plan's network, or its envelope, for other programs to check
     Export(Box<ExportArgs>),
-    /// Check, without any search, that an answer's box is the largest
+    /// Check, without any search, that an answer's box is inside the envelope and the largest there
     Verify(VerifyArgs),
     /// Validate plans and answer in VAL's words, for editors and scripts that know VAL
     Val(ValArgs),

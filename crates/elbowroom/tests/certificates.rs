@@ -3,6 +3,8 @@
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
+#[path = "certificates/judge.rs"]
+mod judge;
 mod shared;
 
 use std::ops::ControlFlow;
@@ -14,9 +16,11 @@ use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Relax, enve
 use elbowroom::answers::{EnvelopeOutcome, Halt, Unwatched, Watcher};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::Task;
+use elbowroom::num::Rational;
 use elbowroom::pddl::read_plan;
 use elbowroom::plan::ParametrizedPlan;
-use elbowroom::verify::{AnswerError, Flaw, verify_answer};
+use elbowroom::verify::sound::{Control, Failing, Schedules, Sound, Way};
+use elbowroom::verify::{AnswerError, Certificate, Flaw, Verified, added_up, verify_answer};
 use elbowroom::{AnyPlan, pddl};
 use serde_json::Value;
 use shared::case::Case;
@@ -104,6 +108,8 @@ fn certificates_of_all_cases_are_accepted() {
                                 (&best.value, &best.bound)
                             );
                             accepted += 1;
+                            let inside = verified.inside.expect("plans are small");
+                            assert!(inside.is_proved(), "{what}: {:?}", verified.assumes);
                             assumed += usize::from(verified.assumed > 0);
                         }
                         Err(AnswerError::NoCertificate) => {
@@ -131,25 +137,68 @@ const CLAIM: [&str; 5] = [
     "/best/certificate",
 ];
 
+/// Cases with certificates that have one of each kind of proof.
+const CHANGED: [(&str, Guarantee, Objective); 13] = [
+    ("delivery", Guarantee::Dynamic, Objective::LeastSlack),
+    ("delivery", Guarantee::Dynamic, Objective::Widths),
+    ("delivery", Guarantee::Strong, Objective::Widths),
+    ("delivery", Guarantee::Dynamic, Objective::Volume),
+    ("delivery", Guarantee::Strong, Objective::Volume),
+    ("hatchery", Guarantee::Dynamic, Objective::Volume),
+    ("hatchery", Guarantee::Dynamic, Objective::LeastSlack),
+    ("hatchery", Guarantee::Dynamic, Objective::Widths),
+    ("paintshop", Guarantee::Weak, Objective::LeastSlack),
+    ("lamp", Guarantee::Weak, Objective::Widths),
+    ("battery", Guarantee::Dynamic, Objective::LeastSlack),
+    ("battery", Guarantee::Weak, Objective::LeastSlack),
+    ("match", Guarantee::Strong, Objective::LeastSlack),
+];
+
+/// The certificate in an answer.
+fn certificate_in(answer: &Value) -> Certificate {
+    let certificate = answer.pointer("/best/certificate").expect("a certificate");
+    serde_json::from_value(certificate.clone()).expect("the form of a certificate")
+}
+
+/// Whether a change there says nothing about why no box is better: it is in why the box is inside, or
+/// in a constraint that no proof of an inequality mentions.
+fn is_about_the_box(answer: &Value, place: &str) -> bool {
+    if place.starts_with("/best/certificate/sound/") {
+        return true;
+    }
+    let Some(rest) = place.strip_prefix("/best/certificate/constraints/") else {
+        return false;
+    };
+    let index: u64 = rest
+        .split('/')
+        .next()
+        .and_then(|own| own.parse().ok())
+        .expect("a position");
+    let proofs = answer.pointer("/best/certificate/proofs").expect("proofs");
+    let mut mentioned = Vec::new();
+    numbers(proofs, "", &mut mentioned);
+    mentioned.iter().all(|at| {
+        let part = ["least", "most", "early", "late", "unlabelled"];
+        let is_part = part.iter().any(|own| at.ends_with(&format!("/{own}")));
+        !is_part || proofs.pointer(at).and_then(Value::as_u64) != Some(index)
+    })
+}
+
+/// What is changed and still accepted has to be a proof of what the answer then claims: where a bound
+/// of the network or of a way to fail leaves room, another number is as good.
 #[test]
-fn each_number_that_is_changed_in_turn_makes_a_certificate_refused() {
-    let mut count = 0;
-    let mut unnoticed = Vec::new();
-    for (name, guarantee, objective) in [
-        ("delivery", Guarantee::Dynamic, Objective::LeastSlack),
-        ("delivery", Guarantee::Dynamic, Objective::Widths),
-        ("delivery", Guarantee::Strong, Objective::Widths),
-        ("delivery", Guarantee::Dynamic, Objective::Volume),
-        ("delivery", Guarantee::Strong, Objective::Volume),
-        ("hatchery", Guarantee::Dynamic, Objective::Volume),
-        ("hatchery", Guarantee::Dynamic, Objective::LeastSlack),
-        ("hatchery", Guarantee::Dynamic, Objective::Widths),
-        ("paintshop", Guarantee::Weak, Objective::LeastSlack),
-    ] {
+fn each_number_that_is_changed_in_turn_makes_a_certificate_refused_or_leaves_it_a_proof() {
+    let (mut count, mut still) = (0, 0);
+    let mut wrong = Vec::new();
+    for (name, guarantee, objective) in CHANGED {
         let (task, plan) = case(name);
         let outcome = largest(&task, &plan, guarantee, objective, false);
         let answer: Value = serde_json::from_str(&written(&outcome)).expect("a document");
         verify_answer(&answer.to_string()).expect("it is right as it is");
+        assert!(
+            judge::is_inside(&certificate_in(&answer)),
+            "{name}, {guarantee:?}"
+        );
         let mut places = Vec::new();
         for place in CLAIM {
             numbers(answer.pointer(place).expect("a member"), place, &mut places);
@@ -159,14 +208,60 @@ fn each_number_that_is_changed_in_turn_makes_a_certificate_refused() {
             let mut broken = answer.clone();
             let number = broken.pointer_mut(&place).expect("a place of the document");
             *number = changed(number);
-            if verify_answer(&broken.to_string()).is_ok() {
-                unnoticed.push(format!("{name}, {guarantee:?}, {objective:?}: {place}"));
-            }
             count += 1;
+            if verify_answer(&broken.to_string()).is_err() {
+                continue;
+            }
+            still += 1;
+            let is_true = judge::is_inside(&certificate_in(&broken));
+            if !is_true || !is_about_the_box(&answer, &place) {
+                wrong.push(format!("{name}, {guarantee:?}, {objective:?}: {place}"));
+            }
         }
     }
-    assert!(unnoticed.is_empty(), "of {count}: {unnoticed:#?}");
-    println!("{count} changed numbers were noticed");
+    assert!(wrong.is_empty(), "of {count}: {wrong:#?}");
+    assert!(20 * still < count, "{still} of {count}");
+    println!("{count} numbers changed: {still} proofs stayed proofs");
+}
+
+/// A box that is a little too large is not proved to be inside by what proves it of the right one.
+#[test]
+fn a_box_with_an_end_beyond_the_envelope_is_refused() {
+    let (mut outside, mut inside) = (0, 0);
+    for name in [
+        "battery",
+        "delivery",
+        "hatchery",
+        "lamp",
+        "match",
+        "paintshop",
+        "tank",
+    ] {
+        let (task, plan) = case(name);
+        for guarantee in GUARANTEES {
+            let outcome = largest(&task, &plan, guarantee, Objective::Widths, false);
+            let answer: Value = serde_json::from_str(&written(&outcome)).expect("a document");
+            if answer.pointer("/best/certificate").is_none() {
+                continue;
+            }
+            let right = certificate_in(&answer);
+            for variable in 0..right.slacks.len() {
+                let mut larger = right.clone();
+                larger.slacks[variable].0 += Rational::new(1, 1000);
+                let is_inside = judge::is_inside(&larger);
+                let sound = added_up(larger).ok().and_then(|told| told.sound);
+                let is_proved = sound.is_some_and(|sound| {
+                    let mut conditions = sound.conditions.iter().flatten();
+                    sound.control != Control::Assumed && conditions.all(|own| !own.cases.is_empty())
+                });
+                assert!(is_inside || !is_proved, "{name}, {guarantee:?}, {variable}");
+                outside += usize::from(!is_inside);
+                inside += usize::from(is_inside);
+            }
+        }
+    }
+    println!("{outside} boxes that are outside, {inside} that are inside");
+    assert!(outside > 20);
 }
 
 #[test]
@@ -213,6 +308,8 @@ fn a_claim_that_says_more_than_is_proved_is_refused() {
     let answer: Value = serde_json::from_str(&written(&outcome)).expect("a document");
     let verified = verify_answer(&answer.to_string()).expect("it is right as it is");
     assert!(verified.assumed > 0, "conditions on a charge");
+    let inside = verified.inside.expect("the plan is small");
+    assert!(inside.is_proved(), "{inside:?}");
     assert_eq!(verified.assumes.len(), 2 + verified.assumed);
     for place in 0..verified.assumes.len() {
         let mut bold = answer.clone();
@@ -255,6 +352,129 @@ fn a_bound_is_worth_what_is_gained_when_it_is_relaxed() {
     }
 }
 
+/// A plan of which all is told, and what is left open in it.
+fn told_box(
+    [domain, problem, plan]: [&str; 3],
+    vary: &[&str],
+    guarantee: Guarantee,
+) -> (EnvelopeOutcome, Certificate) {
+    let source = |name: &str, text: &str| pddl::Source::new(name, text);
+    let read = pddl::read_problem(&source("domain", domain), &source("problem", problem));
+    let task = Arc::new(Task::new(read.expect("no mistakes").0));
+    let plan = read_plan(&source("plan", plan), &task)
+        .expect("no mistakes")
+        .0;
+    let mut request = EnvelopeRequest::new(&task, plan);
+    request.vary = vary
+        .iter()
+        .map(|own| own.parse().expect("what varies"))
+        .collect();
+    request.guarantee = guarantee;
+    request.search.method = Method::Best;
+    request.search.best.objective = Objective::Widths;
+    let outcome = envelope(&request, &mut Unwatched).expect("within exact reasoning");
+    let text = written(&outcome);
+    let verified = verify_answer(&text).expect("a certificate");
+    let inside = verified.inside.expect("the plan is small");
+    assert!(inside.is_proved(), "{:?}", verified.assumes);
+    let answer: Value = serde_json::from_str(&text).expect("a document");
+    (outcome, certificate_in(&answer))
+}
+
+const PASSAGE: [&str; 3] = [
+    "(define (domain passage)
+       (:requirements :durative-actions :timed-initial-literals)
+       (:predicates (early) (open) (done))
+       (:durative-action sail :parameters () :duration (= ?duration 15)
+         :condition (and (at start (early)) (at end (open))) :effect (at end (done))))",
+    "(define (problem tide) (:domain passage)
+       (:init (early) (at 1 (not (early))) (at 10 (open)) (at 30 (not (open))))
+       (:goal (done)))",
+    "0: (sail) [15]",
+];
+
+#[test]
+fn durations_that_may_be_neither_short_nor_long_take_schedules_for_both_ends() {
+    let (_, certificate) = told_box(PASSAGE, &[], Guarantee::Weak);
+    assert!(judge::is_inside(&certificate));
+    let sound = certificate.sound.clone().expect("why it is inside");
+    let Control::Schedules(cases) = &sound.control else {
+        panic!("{sound:?}");
+    };
+    let splits = cases
+        .iter()
+        .filter(|case| matches!(case, Schedules::Split { .. }));
+    assert!(splits.count() > 0, "{cases:?}");
+    // None of the cases can do without another one.
+    for place in 0..cases.len() {
+        let mut fewer = cases.clone();
+        fewer.remove(place);
+        let mut broken = certificate.clone();
+        broken.sound = Some(Sound {
+            control: Control::Schedules(fewer),
+            ..sound.clone()
+        });
+        let told = added_up(broken).expect("sums").sound.expect("some of it");
+        assert_eq!(told.control, Control::Assumed, "{place}");
+    }
+}
+
+const TANK: [&str; 3] = [
+    "(define (domain tank)
+       (:requirements :durative-actions :fluents :duration-inequalities :continuous-effects)
+       (:predicates (filled))
+       (:functions (level))
+       (:durative-action fill :parameters ()
+         :duration (= ?duration 10)
+         :condition (over all (<= (level) 30))
+         :effect (and (increase (level) (* #t 2)) (at end (filled)))))",
+    "(define (problem rain) (:domain tank) (:init (= (level) 0)) (:goal (and (filled) (>= (level) 15))))",
+    "0: (fill) [10]",
+];
+
+#[test]
+fn rates_that_are_multiplied_by_times_are_looked_at_at_both_ends() {
+    for guarantee in GUARANTEES {
+        let vary = ["constant fill level in [1, 4]", "duration fill"];
+        let (_, certificate) = told_box(TANK, &vary[..], guarantee);
+        assert!(judge::is_inside(&certificate));
+        let sound = certificate.sound.as_ref().expect("why it is inside");
+        let cases = sound.conditions.iter().flatten().flat_map(|own| &own.cases);
+        let ways = cases.flat_map(|case| match case {
+            Failing::Ways(ways) => &ways[..],
+            _ => &[],
+        });
+        let multiplied: Vec<&Way> = ways.filter(|way| !way.corners.is_empty()).collect();
+        assert!(!multiplied.is_empty(), "{guarantee:?}");
+        assert!(
+            multiplied
+                .iter()
+                .all(|way| way.sums.len() == 1 << way.corners.len())
+        );
+        // A sum for one end only is none for both.
+        let mut broken = certificate.clone();
+        let conditions = broken
+            .sound
+            .as_mut()
+            .and_then(|own| own.conditions.as_mut());
+        for case in conditions
+            .into_iter()
+            .flatten()
+            .flat_map(|own| &mut own.cases)
+        {
+            if let Failing::Ways(ways) = case {
+                for way in ways.iter_mut().filter(|way| way.sums.len() > 1) {
+                    way.sums.truncate(1);
+                    way.corners.clear();
+                }
+            }
+        }
+        let told = added_up(broken).expect("sums").sound.expect("some of it");
+        let mut conditions = told.conditions.iter().flatten();
+        assert!(conditions.any(|own| own.cases.is_empty()), "{guarantee:?}");
+    }
+}
+
 /// Ends a search after some steps.
 struct Patience(usize);
 
@@ -278,7 +498,7 @@ fn of_published(
     instance: &Instance,
     guarantee: Guarantee,
     objective: Objective,
-) -> Option<(usize, f64)> {
+) -> Option<(Verified, String, f64)> {
     let case = Case::read(&instance.domain, &instance.problem, &instance.plan);
     let plan = ParametrizedPlan::clone(&case.plan);
     let mut request = EnvelopeRequest::new(&case.task, plan);
@@ -291,7 +511,7 @@ fn of_published(
     let verdict = verify_answer(&text);
     let seconds = begun.elapsed().as_secs_f64();
     match verdict {
-        Ok(verified) => Some((verified.assumed, seconds)),
+        Ok(verified) => Some((verified, text, seconds)),
         Err(AnswerError::NoCertificate | AnswerError::NoBox) => None,
         Err(wrong) => panic!("{}, {guarantee:?}, {objective:?}: {wrong}", instance.name),
     }
@@ -300,20 +520,29 @@ fn of_published(
 #[test]
 fn certificates_of_published_plans_are_accepted() {
     let Some(data) = shared::data() else { return };
+    let mut kinds = Kinds::default();
     for (family, instances) in [
         ("AAAI-19", figure_3(&data)),
         ("robot deliveries", figure_4(&data)),
     ] {
         let (mut accepted, mut assuming, mut without) = (0, 0, 0);
-        let mut longest: f64 = 0.0;
+        let (mut longest, mut largest) = (0.0_f64, 0);
+        let mut conditions = 0;
         for instance in &instances {
             for guarantee in GUARANTEES {
                 for objective in OBJECTIVES {
                     match of_published(instance, guarantee, objective) {
-                        Some((assumed, seconds)) => {
+                        Some((verified, proof, seconds)) => {
+                            let size = proof.len();
                             accepted += 1;
-                            assuming += usize::from(assumed > 0);
+                            assuming += usize::from(verified.assumed > 0);
                             longest = longest.max(seconds);
+                            largest = largest.max(size);
+                            let inside = verified.inside.expect("plans are small");
+                            let what = format!("{}, {guarantee:?}, {objective:?}", instance.name);
+                            assert!(inside.is_proved(), "{what}: {:?}", verified.assumes);
+                            conditions += inside.conditions.unwrap_or_default();
+                            kinds.count(&proof);
                         }
                         None => without += 1,
                     }
@@ -322,9 +551,39 @@ fn certificates_of_published_plans_are_accepted() {
         }
         println!(
             "{family}: {accepted} certificates accepted, {assuming} with assumptions, {without} \
-             answers without; the longest check took {:.1} ms",
+             answers without; {conditions} conditions; the longest check took {:.1} ms, the largest \
+             answer has {largest} bytes",
             longest * 1000.0
         );
         assert!(accepted > 0);
+    }
+    println!("{kinds:?}");
+}
+
+/// How many proofs of each kind there are: a test that has none of a kind says nothing about it.
+#[derive(Debug, Default)]
+struct Kinds {
+    bounds: usize,
+    waits: usize,
+    splits: usize,
+    rules: usize,
+    moments: usize,
+    inequalities: usize,
+    products: usize,
+}
+
+impl Kinds {
+    fn count(&mut self, answer: &str) {
+        for (text, count) in [
+            ("\"most\":", &mut self.bounds),
+            ("\"delay\":", &mut self.waits),
+            ("\"split\":", &mut self.splits),
+            ("\"rule\":", &mut self.rules),
+            ("\"during\":", &mut self.moments),
+            ("\"inequalities\":[", &mut self.inequalities),
+            ("\"corners\":", &mut self.products),
+        ] {
+            *count += answer.matches(text).count();
+        }
     }
 }

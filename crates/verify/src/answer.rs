@@ -4,10 +4,11 @@ use elbowroom_num::Rational;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
-use crate::certificate::{Certificate, Chance, Guarantee, Reasons};
+use crate::certificate::{Certificate, Chance, End as Side, Guarantee, Reasons};
 use crate::check::{Verified, verify};
 use crate::flaw::Flaw;
 use crate::number;
+use crate::sound::Endless;
 
 /// Why nothing can be said of an answer, or what is wrong with it.
 #[derive(Debug, thiserror::Error)]
@@ -178,15 +179,31 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
         let lower = &own.nominal - slack(0);
         let upper = &own.nominal + slack(1);
         let sides = [
-            (&room.lower, lower, "-inf", slack(0), &own.most_below),
-            (&room.upper, upper, "inf", slack(1), &own.most_above),
+            (&room.lower, Side::Lower, lower, slack(0), &own.most_below),
+            (&room.upper, Side::Upper, upper, slack(1), &own.most_above),
         ];
-        for (end, value, endless, slack, most) in sides {
+        for (end, which, value, slack, most) in sides {
+            let endless = match which {
+                Side::Lower => "-inf",
+                Side::Upper => "inf",
+            };
             let is_that = end.exact.parse::<Rational>().is_ok_and(|end| end == value);
             // What reaches as far as counts, and is stopped by nothing, is infinite.
             let is_endless = end.exact == endless && *slack == counted;
+            let is_end = match &certificate.sound {
+                None => is_that || is_endless,
+                Some(sound)
+                    if sound.endless.contains(&Endless {
+                        parameter: index,
+                        end: which,
+                    }) =>
+                {
+                    is_endless
+                }
+                Some(_) => is_that,
+            };
             same(
-                (is_that || is_endless) && most.as_ref().is_none_or(|most| most.0 <= counted),
+                is_end && most.as_ref().is_none_or(|most| most.0 <= counted),
                 &format!("the interval of {}", own.name),
             )?;
         }

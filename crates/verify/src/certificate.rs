@@ -1,9 +1,12 @@
 //! What a certificate consists of (`docs/formats/certificate.md`).
 
+pub mod sound;
+
 use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
 
 use crate::number;
+use sound::Sound;
 
 pub use crate::chance::{Chance, Shape, Touch};
 pub use crate::number::Exact;
@@ -36,6 +39,9 @@ pub struct Certificate {
     pub proofs: Vec<Proof>,
     /// How it follows that no box is better.
     pub reasons: Reasons,
+    /// Why the box is inside the envelope; none if that is taken for granted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sound: Option<Sound>,
 }
 
 /// What is guaranteed inside the envelope.

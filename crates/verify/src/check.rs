@@ -7,8 +7,10 @@ use elbowroom_num::{Rational, enclosed};
 use crate::bounds::Ends;
 use crate::certificate::{Case, Certificate, Exact, Parameter, Proof, Reasons, Source, Stopped};
 use crate::flaw::Flaw;
+use crate::intervals::Intervals;
 use crate::probability::Chances;
-use crate::{claim, network, row, volume};
+use crate::sound::{Control, Sound};
+use crate::{claim, conditions, control, network, row, volume};
 
 /// What a certificate proves.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,10 +27,30 @@ pub struct Verified {
     pub proofs: usize,
     /// How many of these are not proved from the network, but taken from the certificate.
     pub assumed: usize,
+    /// What is proved of the box being inside the envelope; none if that is taken for granted.
+    pub inside: Option<Inside>,
     /// What is proved, in words.
     pub proves: String,
     /// What is taken for granted, in words.
     pub assumes: Vec<String>,
+}
+
+/// What is proved of the box being inside the envelope.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Inside {
+    /// Whether there are times for all points, as the guarantee demands; taken for granted otherwise.
+    pub is_controllable: bool,
+    /// The number of conditions of the plan; none if all of them are taken for granted.
+    pub conditions: Option<usize>,
+    /// How many of these are not proved to hold in the box, but only stated.
+    pub assumed: usize,
+}
+
+impl Inside {
+    /// Whether nothing of it is taken for granted.
+    pub fn is_proved(&self) -> bool {
+        self.is_controllable && self.conditions.is_some() && self.assumed == 0
+    }
 }
 
 /// `Σ factor · variable <= bound`.
@@ -48,6 +70,10 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
         return Err(Flaw::Claim);
     }
     let checker = Checker::new(certificate)?;
+    let inside = certificate.sound.as_ref();
+    let inside = inside
+        .map(|sound| inside_of(certificate, sound))
+        .transpose()?;
     let bound = match &certificate.reasons {
         Reasons::LeastSlack(stopped) => checker.least_slack(stopped)?,
         Reasons::Widths(cases) => checker.widths(cases)?,
@@ -77,13 +103,50 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
         tolerance,
         proofs: certificate.proofs.len(),
         assumed: certificate.proofs.iter().filter(is_assumed).count(),
-        proves: proves.to_owned(),
+        inside,
+        proves,
         assumes,
+    })
+}
+
+/// What is proved of the box being inside the envelope; the rest is taken for granted.
+fn proved(certificate: &Certificate, sound: &Sound) -> Result<Sound, Flaw> {
+    let mut proved = sound.clone();
+    let intervals = Intervals::new(certificate, &sound.endless)?;
+    if control::check(certificate, &intervals, &sound.control).is_err() {
+        proved.control = Control::Assumed;
+    }
+    for (index, condition) in proved.conditions.iter_mut().flatten().enumerate() {
+        if conditions::check(certificate, &intervals, (index, condition)).is_err() {
+            condition.cases.clear();
+        }
+    }
+    Ok(proved)
+}
+
+/// Checks that the box is inside the envelope, as far as that is not taken for granted.
+fn inside_of(certificate: &Certificate, sound: &Sound) -> Result<Inside, Flaw> {
+    let intervals = Intervals::new(certificate, &sound.endless)?;
+    control::check(certificate, &intervals, &sound.control)?;
+    let conditions = sound.conditions.as_deref().unwrap_or_default();
+    let mut assumed = 0;
+    for (index, condition) in conditions.iter().enumerate() {
+        if condition.cases.is_empty() {
+            assumed += 1;
+        } else {
+            conditions::check(certificate, &intervals, (index, condition))?;
+        }
+    }
+    Ok(Inside {
+        is_controllable: sound.control != Control::Assumed,
+        conditions: sound.conditions.as_ref().map(Vec::len),
+        assumed,
     })
 }
 
 /// The certificate with what its inequalities add up to filled in ([`Stopped::over`],
 /// [`crate::certificate::Total::bound`]), and with what it proves and assumes, whatever it says there.
+/// What does not prove that the box is inside the envelope is taken away from it.
 ///
 /// # Errors
 /// When nothing can be added up. Whether the certificate proves anything is not asked.
@@ -121,7 +184,12 @@ pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
         }
     }
     certificate.reasons = reasons;
-    certificate.proves = String::from(claim::proves(&certificate));
+    certificate.sound = certificate
+        .sound
+        .as_ref()
+        .map(|own| proved(&certificate, own))
+        .transpose()?;
+    certificate.proves = claim::proves(&certificate);
     certificate.assumes = claim::assumes(&certificate);
     Ok(certificate)
 }

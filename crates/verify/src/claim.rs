@@ -1,9 +1,25 @@
 //! What a certificate proves and what it takes for granted, in words.
 
 use crate::certificate::{Certificate, Proof, Reasons};
+use crate::sound::{Condition, Control};
 
 /// What follows if the certificate is right.
-pub(crate) fn proves(certificate: &Certificate) -> &'static str {
+pub(crate) fn proves(certificate: &Certificate) -> String {
+    let is_inside = certificate.sound.as_ref().is_some_and(|sound| {
+        let conditions = sound.conditions.as_ref();
+        let is_proved = |own: &Condition| !own.cases.is_empty();
+        sound.control != Control::Assumed && conditions.is_some_and(|own| own.iter().all(is_proved))
+    });
+    let best = is_best(certificate);
+    if is_inside {
+        format!("the box is inside the envelope, and {best}")
+    } else {
+        best.to_owned()
+    }
+}
+
+/// That no box is better.
+fn is_best(certificate: &Certificate) -> &'static str {
     match certificate.reasons {
         Reasons::LeastSlack(_) => {
             "in no box inside the envelope has an end more slack, in relation to the nominal value, \
@@ -25,11 +41,8 @@ pub(crate) fn proves(certificate: &Certificate) -> &'static str {
 
 /// What has to be known from elsewhere, the same in all certificates first.
 pub(crate) fn assumes(certificate: &Certificate) -> Vec<String> {
-    let mut assumes = vec![
-        "the box itself is inside the envelope (`elbowroom envelope --contains` checks that)"
-            .to_owned(),
-        "the time points and constraints are those of the plan".to_owned(),
-    ];
+    let mut assumes = is_inside(certificate);
+    assumes.push("the time points and constraints are those of the plan".to_owned());
     if matches!(certificate.reasons, Reasons::Probability(_)) {
         assumes.push(
             "the parameters are independent of each other, each distributed as its `chance` says, and \
@@ -40,6 +53,41 @@ pub(crate) fn assumes(certificate: &Certificate) -> Vec<String> {
     for (index, proof) in certificate.proofs.iter().enumerate() {
         if let Proof::Assumed { why, .. } = proof {
             assumes.push(format!("the inequalities of proof {index}: {why}"));
+        }
+    }
+    assumes
+}
+
+/// What is taken for granted of the box being inside the envelope.
+fn is_inside(certificate: &Certificate) -> Vec<String> {
+    const CHECKED: &str = "(`elbowroom envelope --contains` checks that)";
+    let Some(sound) = &certificate.sound else {
+        return vec![format!("the box itself is inside the envelope {CHECKED}")];
+    };
+    let mut assumes = Vec::new();
+    if sound.control == Control::Assumed {
+        assumes.push(format!(
+            "for all values in the box there are times for all points, as the guarantee demands \
+             {CHECKED}"
+        ));
+    }
+    match &sound.conditions {
+        None => assumes.push(format!(
+            "in all schedules for values in the box, the conditions of the plan hold {CHECKED}"
+        )),
+        Some(conditions) => {
+            let stated = conditions.iter().filter(|own| own.cases.is_empty());
+            assumes.extend(stated.map(|own| {
+                format!(
+                    "in all schedules for values in the box: {} {CHECKED}",
+                    own.why
+                )
+            }));
+            assumes.push(
+                "the conditions of the plan are those of `conditions`, and fail only in the ways \
+                 told there"
+                    .to_owned(),
+            );
         }
     }
     assumes

@@ -79,6 +79,29 @@ pub enum Flaw {
     /// A case uses an inequality that does not hold in it.
     #[error("case {0} uses an inequality that does not hold in it")]
     NotThere(usize),
+    /// A time is told for a point that the world decides on, or none for another.
+    #[error(
+        "a time has to be told for exactly those points that the executor chooses, not so for point {0}"
+    )]
+    NotChosen(usize),
+    /// A point may come before time zero, or time zero is not zero.
+    #[error("the times told for point {0} are not at 0 or later in all of the box")]
+    Early(usize),
+    /// Times do not satisfy a constraint.
+    #[error("the times told do not satisfy constraint {0} in all of the box")]
+    Unmet(usize),
+    /// Schedules are no tree.
+    #[error("schedule {0} is reached never or twice, or splits an interval that has no end")]
+    Schedules(usize),
+    /// Negative edges and waits form a circle.
+    #[error("what comes before point {0} comes after it, too")]
+    Circle(usize),
+    /// What two edges say together is not said beside them.
+    #[error("the network is not closed: an edge is missing beside two that meet at point {0}")]
+    Open(usize),
+    /// A sum of inequalities contradicts nothing.
+    #[error("it does not follow that condition {0} holds in all of the box")]
+    Condition(usize),
     /// The answer says something else than its certificate.
     #[error("the answer and its certificate differ in {0}")]
     Differs(String),

@@ -1,4 +1,4 @@
-//! Checks, without any search, that no box inside a robustness envelope is better than one.
+//! Checks, without any search, that a box is inside a robustness envelope, and that none is better.
 //!
 //! In: an answer of `elbowroom envelope --method best --json` ([`verify_answer`]), or its
 //! [`Certificate`] alone ([`verify`]). Out: what it proves ([`Verified`]), or the first thing in it
@@ -7,15 +7,17 @@
 //! A certificate holds the plan's temporal network, the box, *proofs* of linear inequalities that
 //! all boxes inside the envelope satisfy (each a cycle of the network's bounds), and how it follows
 //! from these that no box is better. The inequalities themselves are not in it: they are worked out
-//! here from the proofs ([`row`]), so that there is nothing to believe but
+//! here from the proofs ([`row`]). And it holds the reason why the box is inside ([`sound`]): times,
+//! rules for times or a closed network, by guarantee, and sums of bounds that refute each way in which
+//! a condition of the plan could fail. So there is nothing to believe but
 //!
-//! - that the network is that of the plan,
+//! - that the network and the conditions are those of the plan,
 //! - the theorems that make the cycles conflicts (Vidal & Fargier 1999; Morris & Muscettola 2005;
-//!   Morris 2006), and that a box inside the envelope has its sub-boxes there, too.
+//!   Morris 2006), and a closed network one that can be controlled (Morris & Muscettola 2005), and that
+//!   a box inside the envelope has its sub-boxes there, too.
 //!
-//! What the network does not show, such as conditions on numbers, is in it as an assumption with
-//! its reason in words; how many there are is part of the verdict. That the box itself is inside
-//! the envelope is not what a certificate proves: `elbowroom envelope --contains` checks that.
+//! What the network does not show, such as cuts by conditions on numbers, is in it as an assumption with
+//! its reason in words; how many there are is part of the verdict.
 //!
 //! This crate knows exact numbers, and nothing of planning, networks or search.
 //!
@@ -30,6 +32,7 @@
 //! let verified = verify_answer(answer)?;
 //! assert_eq!(verified.value, verified.bound, "no box is better than this one");
 //! assert_eq!((verified.proofs, verified.assumed), (1, 0));
+//! assert!(verified.inside.is_some_and(|inside| inside.is_proved()));
 //!
 //! let forged = answer.replace("2499/12500", "1/4");
 //! assert!(matches!(verify_answer(&forged), Err(AnswerError::Flaw(_))));
@@ -42,7 +45,10 @@ mod certificate;
 mod chance;
 mod check;
 mod claim;
+mod conditions;
+mod control;
 mod flaw;
+mod intervals;
 mod network;
 mod number;
 mod probability;
@@ -53,7 +59,7 @@ pub use answer::{AnswerError, verify_answer};
 pub use bounds::Ends;
 pub use certificate::{
     Case, Certificate, Chance, Constraint, End, Exact, Guarantee, Limit, Multiplier, Parameter,
-    Part, Proof, Reasons, Shape, Source, Stopped, Sum, Term, Total, Touch, Way,
+    Part, Proof, Reasons, Shape, Source, Stopped, Sum, Term, Total, Touch, Way, sound,
 };
-pub use check::{Verified, added_up, verify};
+pub use check::{Inside, Verified, added_up, verify};
 pub use flaw::Flaw;

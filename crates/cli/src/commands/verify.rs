@@ -1,6 +1,6 @@
-//! `elbowroom verify`: is that box really the largest?
+//! `elbowroom verify`: is that box really inside the envelope, and the largest there?
 
-use elbowroom::verify::{AnswerError, Verified, verify_answer};
+use elbowroom::verify::{AnswerError, Inside, Verified, verify_answer};
 use serde_json::{Value, json};
 
 use crate::args::VerifyArgs;
@@ -51,6 +51,12 @@ fn document(verdict: Result<&Verified, &AnswerError>) -> Value {
             "bound": exact(&verified.bound),
             "proofs": verified.proofs,
             "assumed": verified.assumed,
+            "inside": verified.inside.map(|inside| json!({
+                "proved": inside.is_proved(),
+                "controllable": inside.is_controllable,
+                "conditions": inside.conditions,
+                "assumed": inside.assumed,
+            })),
             "proves": verified.proves,
             "assumes": verified.assumes,
         }),
@@ -93,8 +99,44 @@ fn proven(name: &str, verified: &Verified, look: Look) -> String {
         ),
     };
     push_wrapped(&mut text, &how, 2, look.width);
-    let rest = "That the network is that of the plan, and that the box is inside, is not part of the \
-                certificate: `elbowroom envelope … --contains` checks the box.";
-    push_wrapped(&mut text, &rest.replace('…', "..."), 2, look.width);
+    push_wrapped(&mut text, &inside(verified.inside), 2, look.width);
     text
+}
+
+/// What is proved of the box being inside the envelope.
+fn inside(inside: Option<Inside>) -> String {
+    let Some(inside) = inside else {
+        return "That the network is that of the plan, and that the box is inside, is not part of the \
+                certificate: `elbowroom envelope ... --contains` checks the box."
+            .to_owned();
+    };
+    let conditions = match inside.conditions {
+        Some(0) => "the plan has no conditions beside the network's".to_owned(),
+        Some(1) => "its condition cannot fail".to_owned(),
+        Some(count) => format!("none of its {count} conditions can fail"),
+        None => String::new(),
+    };
+    if inside.is_proved() {
+        return format!(
+            "The box is inside the envelope: for all its values the plan can be scheduled, and \
+             {conditions}. That the network and the conditions are those of the plan is not part of \
+             the certificate."
+        );
+    }
+    let mut stated = Vec::new();
+    if !inside.is_controllable {
+        stated.push("that the plan can be scheduled for all its values".to_owned());
+    }
+    match (inside.conditions, inside.assumed) {
+        (None, _) => stated.push("that no condition of the plan can fail".to_owned()),
+        (Some(_), 0) => {}
+        (Some(count), assumed) => {
+            stated.push(format!("that {assumed} of {count} conditions cannot fail"));
+        }
+    }
+    format!(
+        "Of the box being inside the envelope, the certificate only states {}: `elbowroom envelope \
+         ... --contains` checks the box.",
+        stated.join(", and ")
+    )
 }

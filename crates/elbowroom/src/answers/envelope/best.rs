@@ -35,7 +35,8 @@ pub struct Best {
     /// Whether it is proved that there is no better box.
     #[serde(rename = "proved")]
     pub is_proved: bool,
-    /// Why no box has more than `bound`, for [`elbowroom_verify`] to check; `None` if the search
+    /// Why the box is inside the envelope, and no box has more than `bound`, for [`elbowroom_verify`] to
+    /// check; `None` if the search
     /// was ended before it was done, or if that could not be told of all ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certificate: Option<Certificate>,
@@ -130,18 +131,21 @@ pub(super) fn best(
         }
     });
     let run = run.map_err(FlowError::Refused)?;
-    let has_certificate = run.envelope.is_ok()
-        && !run.is_cancelled
-        && (run.is_proved || matches!(run.proof.reasons, Reasons::Tree(_)));
+    let has_certificate =
+        !run.is_cancelled && (run.is_proved || matches!(run.proof.reasons, Reasons::Tree(_)));
+    let certificate = match &run.envelope {
+        Ok(envelope) if has_certificate => {
+            certificate(subject, settings, &run.proof, (oracle, envelope))
+        }
+        _ => None,
+    };
     let best = Best {
         worth: if run.is_proved {
             worths(subject, &run.proof)
         } else {
             Vec::new()
         },
-        certificate: has_certificate
-            .then(|| certificate(subject, settings, &run.proof))
-            .flatten(),
+        certificate,
         probability: (settings.objective == Objective::Probability)
             .then(|| Probability::new(subject, settings, &run)),
         chances: settings

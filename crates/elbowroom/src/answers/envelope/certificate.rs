@@ -1,53 +1,38 @@
-//! The proof that a box is the largest, in the form that `elbowroom-verify` checks.
+//! The proof that a box is inside the envelope and the largest there, in the form that
+//! `elbowroom-verify` checks.
+
+mod inside;
+mod network;
 
 use std::collections::BTreeMap;
 
-use elbowroom_envelope::{BestProof, BestSettings, Cut, Ground, Guarantee, Moved, Objective};
+use elbowroom_envelope::{
+    BestProof, BestSettings, Cut, Ground, Guarantee, Moved, Objective, Oracle,
+};
 use elbowroom_envelope::{Case as KnownCase, Reasons as KnownReasons, Source as KnownSource};
 use elbowroom_envelope::{ProofPart, ProofWay, volume_foot};
 use elbowroom_num::Rational;
-use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, Origin, ParametrizedPlan, Side};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Origin, ParametrizedPlan, Side};
 use elbowroom_verify::{
-    Case, Certificate, Constraint, End, Exact, Limit, Multiplier, Parameter, Part, Proof, Reasons,
-    Source, Stopped, Sum, Term, Total, Way, added_up,
+    Case, Certificate, Constraint, End, Exact, Multiplier, Parameter, Part, Proof, Reasons, Source,
+    Stopped, Sum, Term, Total, Way, added_up,
 };
 
 use super::Subject;
+use network::{constraints, used_constraints};
 
-/// The certificate of a proof, with those of its cuts, and of the plan's constraints, that are
-/// used.
+/// The certificate of a proof that a box is the best one, with those of its cuts that are used; and of
+/// the plan's constraints those that are used, or all, where it is told why the box is inside.
 pub(super) fn certificate(
     subject: &Subject<'_>,
     settings: &BestSettings,
     proof: &BestProof,
+    (oracle, envelope): (&mut Oracle, &DecoupledEnvelope),
 ) -> Option<Certificate> {
     let plan = subject.plan;
     let guarantee = subject.request.guarantee;
     let mut cuts = Cuts::default();
-    let reasons = match &proof.reasons {
-        KnownReasons::Levels(levels) => {
-            let variable = |ends: &[_]| proof.variables.iter().position(|own| own.ends == ends);
-            let stopped = levels.iter().filter_map(|level| {
-                Some(Stopped {
-                    variable: variable(&level.ends)?,
-                    proof: level.cut.map(|cut| cuts.place(cut)),
-                    over: Vec::new(),
-                })
-            });
-            Reasons::LeastSlack(stopped.collect())
-        }
-        KnownReasons::Tree(tree) => {
-            let cases = tree.iter().map(|case| cuts.case(case)).collect();
-            match settings.objective {
-                Objective::Volume => Reasons::Volume {
-                    foot: volume_foot(),
-                    cases,
-                },
-                Objective::Probability => Reasons::Probability(cases),
-                _ => Reasons::Widths(cases),
-            }
-        }
-    };
+    let reasons = reasons(settings, proof, &mut cuts);
     let proofs = cuts.used.iter();
     let mut proofs: Vec<Proof> = proofs
         .map(|&cut| proof_of(subject, &proof.cuts[cut]))
@@ -56,7 +41,11 @@ pub(super) fn certificate(
     for proof in &mut proofs {
         begin(proof, &constraints);
     }
-    let constraints = used_constraints(constraints, &mut proofs);
+    let sound = inside::sound(subject, oracle, envelope);
+    let constraints = match sound {
+        Some(_) => constraints,
+        None => used_constraints(constraints, &mut proofs),
+    };
     let is_used = used_limits(&reasons, proof.variables.len());
     let limit = |side: Side, parameter: usize| {
         let moves = |end: &BoxEnd| end.parameter.index() == parameter && end.side == side;
@@ -117,8 +106,37 @@ pub(super) fn certificate(
             .collect(),
         proofs,
         reasons,
+        sound,
     };
     added_up(certificate).ok()
+}
+
+/// How it follows from the cuts that no box is better.
+fn reasons(settings: &BestSettings, proof: &BestProof, cuts: &mut Cuts) -> Reasons {
+    match &proof.reasons {
+        KnownReasons::Levels(levels) => {
+            let variable = |ends: &[_]| proof.variables.iter().position(|own| own.ends == ends);
+            let stopped = levels.iter().filter_map(|level| {
+                Some(Stopped {
+                    variable: variable(&level.ends)?,
+                    proof: level.cut.map(|cut| cuts.place(cut)),
+                    over: Vec::new(),
+                })
+            });
+            Reasons::LeastSlack(stopped.collect())
+        }
+        KnownReasons::Tree(tree) => {
+            let cases = tree.iter().map(|case| cuts.case(case)).collect();
+            match settings.objective {
+                Objective::Volume => Reasons::Volume {
+                    foot: volume_foot(),
+                    cases,
+                },
+                Objective::Probability => Reasons::Probability(cases),
+                _ => Reasons::Widths(cases),
+            }
+        }
+    }
 }
 
 /// How far out an end of the variable can gain anything; `None` without limit. Where more gains nothing,
@@ -163,45 +181,6 @@ fn used_limits(reasons: &Reasons, variables: usize) -> Vec<bool> {
         }
     }
     is_used
-}
-
-/// Those constraints that proofs are about, without numbers that no proof uses; the proofs get
-/// their new positions. A proof about times that are fixed in advance is also about all durations
-/// that are not.
-fn used_constraints(all: Vec<Constraint>, proofs: &mut [Proof]) -> Vec<Constraint> {
-    let mut is_used = vec![false; all.len()];
-    let mut sides = vec![[false; 2]; all.len()];
-    for proof in proofs.iter_mut() {
-        if matches!(proof, Proof::Fixed(_)) {
-            let observed = all.iter().map(|constraint| constraint.observed);
-            for (is_used, is_observed) in is_used.iter_mut().zip(observed) {
-                *is_used |= is_observed;
-            }
-        }
-        each_constraint(proof, &mut |index, _| is_used[*index] = true);
-        each_constraint(proof, &mut |index, side| sides[*index][side.index()] = true);
-    }
-    let mut places = vec![0; all.len()];
-    let mut used = Vec::new();
-    for (index, mut constraint) in all.into_iter().enumerate() {
-        if is_used[index] {
-            places[index] = used.len();
-            let [is_lower, is_upper] = sides[index];
-            for (limit, is_used) in [
-                (&mut constraint.lower, is_lower),
-                (&mut constraint.upper, is_upper),
-            ] {
-                if !is_used && !constraint.observed {
-                    *limit = Limit::None;
-                }
-            }
-            used.push(constraint);
-        }
-    }
-    for proof in proofs {
-        each_constraint(proof, &mut |index, _| *index = places[*index]);
-    }
-    used
 }
 
 /// Fills in which points come at 0 or later: those at which what comes before ends.
@@ -289,32 +268,6 @@ fn end_of(part: &Part, ways: &[Way], constraints: &[Constraint]) -> usize {
     }
 }
 
-/// Visits the positions of constraints in a proof, with the bound that is used.
-fn each_constraint(proof: &mut Proof, visit: &mut dyn FnMut(&mut usize, Side)) {
-    match proof {
-        Proof::Cycle(parts) | Proof::Fixed(parts) => each_in_parts(parts, visit),
-        Proof::Semireducible { ways, .. } => {
-            for way in ways {
-                each_in_parts(&mut way.parts, visit);
-                if let Some(index) = &mut way.unlabelled {
-                    visit(index, Side::Lower);
-                }
-            }
-        }
-        Proof::Assumed { .. } => {}
-    }
-}
-
-fn each_in_parts(parts: &mut [Part], visit: &mut dyn FnMut(&mut usize, Side)) {
-    for part in parts {
-        match part {
-            Part::Beginning(_) | Part::Way(_) => {}
-            Part::Least(index) | Part::Early(index) => visit(index, Side::Lower),
-            Part::Most(index) | Part::Late(index) => visit(index, Side::Upper),
-        }
-    }
-}
-
 /// The cuts that are used, in the order in which they first are.
 #[derive(Default)]
 struct Cuts {
@@ -377,35 +330,6 @@ impl Cuts {
             }
         }
     }
-}
-
-/// The plan's constraints, as an executor with this guarantee has to see to them.
-fn constraints(plan: &ParametrizedPlan, guarantee: Guarantee) -> Vec<Constraint> {
-    let nominal = DecoupledEnvelope::point(&plan.nominal());
-    // Without knowledge of the future it matters who decides on a difference.
-    let (is_weak, network) = match guarantee {
-        Guarantee::Weak => (true, None),
-        _ => (false, plan.uncertain_network(&nominal).ok()),
-    };
-    let observed = network.map(|network| network.links).unwrap_or_default();
-    let limit = |bound: &Bound| match bound {
-        Bound::Infinite => Limit::None,
-        Bound::Finite(value) => Limit::Number(Exact(value.clone())),
-        Bound::Parameter(id) => Limit::Parameter(id.index()),
-    };
-    let all = plan.plan.constraints.iter().enumerate();
-    all.map(|(index, constraint)| {
-        let told = plan.told_by(constraint).filter(|_| !is_weak);
-        let told = told.map(|planned| Limit::Number(Exact(planned.clone())));
-        Constraint {
-            from: constraint.from.index(),
-            to: constraint.to.index(),
-            lower: told.clone().unwrap_or_else(|| limit(&constraint.lower)),
-            upper: told.unwrap_or_else(|| limit(&constraint.upper)),
-            observed: observed.contains(&index),
-        }
-    })
-    .collect()
 }
 
 /// Why one of the rows of a cut holds in every box inside the envelope.

@@ -1,0 +1,123 @@
+//! Schedules that depend on the values, for the weak guarantee.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+
+use crate::certificate::{Certificate, Limit};
+use crate::flaw::Flaw;
+use crate::intervals::Intervals;
+use crate::sound::{Affine, Schedules};
+
+/// The limit on the times that are looked at, all cases together.
+const MOST_TIMES: usize = 1_000_000;
+
+/// Checks that the cases have a schedule for all values in the box.
+///
+/// # Errors
+/// The first thing that is not so.
+pub(super) fn check(
+    certificate: &Certificate,
+    intervals: &Intervals,
+    cases: &[Schedules],
+) -> Result<(), Flaw> {
+    let points = certificate.points.len();
+    if cases.len().saturating_mul(points) > MOST_TIMES {
+        return Err(Flaw::TooLong);
+    }
+    let mut is_seen = vec![false; cases.len()];
+    let mut open = vec![(0, intervals.clone())];
+    while let Some((index, intervals)) = open.pop() {
+        let case = cases.get(index).ok_or(Flaw::NoSuch("schedule", index))?;
+        if std::mem::replace(&mut is_seen[index], true) {
+            return Err(Flaw::Schedules(index));
+        }
+        match case {
+            Schedules::Split { parameter, cases } => {
+                for (case, is_upper) in cases.iter().zip([false, true]) {
+                    let part = intervals.at_end(*parameter, is_upper);
+                    open.push((*case, part.ok_or(Flaw::Schedules(index))?));
+                }
+            }
+            Schedules::Rule(times) if times.len() == points => {
+                rule(certificate, &intervals, times)?;
+            }
+            Schedules::Rule(times) => {
+                return Err(Flaw::Count {
+                    what: "times",
+                    found: times.len(),
+                    wanted: points,
+                });
+            }
+        }
+    }
+    match is_seen.iter().position(|is_seen| !is_seen) {
+        Some(index) => Err(Flaw::Schedules(index)),
+        None => Ok(()),
+    }
+}
+
+/// Checks that times which depend on the values satisfy everything, whatever the values are.
+fn rule(certificate: &Certificate, intervals: &Intervals, times: &[Affine]) -> Result<(), Flaw> {
+    for (point, time) in times.iter().enumerate() {
+        let is_zero = time.constant.is_zero() && time.parameters.is_empty();
+        let before = Sum::default().with(time, -1);
+        let is_early = before
+            .greatest(intervals)
+            .is_none_or(|own| own.is_positive());
+        if is_early || (point == 0 && !is_zero) {
+            return Err(Flaw::Early(point));
+        }
+    }
+    for (index, constraint) in certificate.constraints.iter().enumerate() {
+        let (from, to) = (&times[constraint.from], &times[constraint.to]);
+        for (limit, sign) in [(&constraint.upper, 1), (&constraint.lower, -1)] {
+            let sum = Sum::default().with(to, sign).with(from, -sign);
+            let Some(sum) = sum.less(limit, sign) else {
+                continue;
+            };
+            if sum.greatest(intervals).is_none_or(|own| own.is_positive()) {
+                return Err(Flaw::Unmet(index));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `constant + Σ factor · value`.
+#[derive(Default)]
+struct Sum {
+    constant: Rational,
+    factors: BTreeMap<usize, Rational>,
+}
+
+impl Sum {
+    fn with(mut self, other: &Affine, sign: i64) -> Self {
+        let sign = Rational::from(sign);
+        self.constant += &other.constant * &sign;
+        for own in &other.parameters {
+            *self.factors.entry(own.parameter).or_default() += &own.factor * &sign;
+        }
+        self
+    }
+
+    /// Less so many times a limit; `None` if there is no limit.
+    fn less(mut self, limit: &Limit, sign: i64) -> Option<Self> {
+        match limit {
+            Limit::None => return None,
+            Limit::Number(number) => self.constant -= &number.0 * &Rational::from(sign),
+            Limit::Parameter(parameter) => {
+                *self.factors.entry(*parameter).or_default() -= Rational::from(sign);
+            }
+        }
+        Some(self)
+    }
+
+    fn greatest(&self, intervals: &Intervals) -> Option<Rational> {
+        let factors = self
+            .factors
+            .iter()
+            .map(|(parameter, factor)| (*parameter, factor));
+        intervals.greatest(self.constant.clone(), factors)
+    }
+}

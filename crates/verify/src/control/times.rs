@@ -1,0 +1,127 @@
+//! Fixed times, for the strong guarantee.
+//!
+//! What the world decides on comes after the point that the executor chooses by the durations
+//! between them. Each bound has to hold for the worst of the durations that only one of its points
+//! comes after.
+
+use elbowroom_num::Rational;
+
+use crate::certificate::{Certificate, Constraint, Limit};
+use crate::flaw::Flaw;
+use crate::intervals::Intervals;
+use crate::network::{duration, ended_by};
+use crate::number::Exact;
+
+/// Checks that these times satisfy all constraints for all values in the box.
+///
+/// # Errors
+/// The first bound that they do not satisfy.
+pub(super) fn check(
+    certificate: &Certificate,
+    intervals: &Intervals,
+    times: &[Option<Exact>],
+) -> Result<(), Flaw> {
+    let points = certificate.points.len();
+    if times.len() != points {
+        return Err(Flaw::Count {
+            what: "times",
+            found: times.len(),
+            wanted: points,
+        });
+    }
+    let ended_by = ended_by(certificate);
+    for (point, time) in times.iter().enumerate() {
+        let is_observed = ended_by[point].is_some();
+        if time.is_some() == is_observed {
+            return Err(Flaw::NotChosen(point));
+        }
+        let is_zero = time.as_ref().is_some_and(|time| time.0.is_zero());
+        let is_early = time.as_ref().is_some_and(|time| time.0.is_negative());
+        if is_early || (point == 0 && !is_zero) {
+            return Err(Flaw::Early(point));
+        }
+    }
+    let schedule = Times {
+        certificate,
+        intervals,
+        told: times,
+        ended_by: &ended_by,
+    };
+    for (index, constraint) in certificate.constraints.iter().enumerate() {
+        if constraint.observed {
+            duration(certificate, intervals, index)?;
+            continue;
+        }
+        let Constraint { from, to, .. } = *constraint;
+        let broken = || Flaw::Unmet(index);
+        // An upper bound at its least value, a lower one at its greatest.
+        if let Some(most) = limit(&constraint.upper, intervals, false, index)? {
+            let difference = schedule.greatest(from, to)?.ok_or_else(broken)?;
+            (difference <= most).then_some(()).ok_or_else(broken)?;
+        }
+        if let Some(least) = limit(&constraint.lower, intervals, true, index)? {
+            let difference = schedule.greatest(to, from)?.ok_or_else(broken)?;
+            (difference <= -&least).then_some(()).ok_or_else(broken)?;
+        }
+    }
+    Ok(())
+}
+
+/// What a limit is if it has to be kept whatever its parameter is; `None` without one.
+pub(super) fn limit(
+    limit: &Limit,
+    intervals: &Intervals,
+    is_lower: bool,
+    constraint: usize,
+) -> Result<Option<Rational>, Flaw> {
+    match limit {
+        Limit::None => Ok(None),
+        Limit::Number(number) => Ok(Some(number.0.clone())),
+        Limit::Parameter(parameter) => {
+            let end = &intervals.of(*parameter)?[usize::from(is_lower)];
+            end.clone().map(Some).ok_or(Flaw::Unmet(constraint))
+        }
+    }
+}
+
+struct Times<'a> {
+    certificate: &'a Certificate,
+    intervals: &'a Intervals,
+    told: &'a [Option<Exact>],
+    ended_by: &'a [Option<usize>],
+}
+
+impl Times<'_> {
+    /// The durations between a point and the one, chosen by the executor, from which they count.
+    fn chain(&self, mut point: usize) -> (usize, Vec<usize>) {
+        let mut links = Vec::new();
+        while let Some(link) = self.ended_by[point] {
+            links.push(link);
+            point = self.certificate.constraints[link].from;
+        }
+        links.reverse();
+        (point, links)
+    }
+
+    /// The greatest difference of the times of two points; `None` if there is none.
+    fn greatest(&self, from: usize, to: usize) -> Result<Option<Rational>, Flaw> {
+        let ((from, before), (to, after)) = (self.chain(from), self.chain(to));
+        let time = |point: usize| {
+            let time = self.told[point].as_ref();
+            time.ok_or(Flaw::NotChosen(point))
+        };
+        let mut difference = &time(to)?.0 - &time(from)?.0;
+        let pairs = before.iter().zip(&after);
+        let shared = pairs.take_while(|(one, other)| one == other).count();
+        for &link in &before[shared..] {
+            difference -= &duration(self.certificate, self.intervals, link)?.0;
+        }
+        for &link in &after[shared..] {
+            match duration(self.certificate, self.intervals, link)?.1 {
+                Some(greatest) => difference += &greatest,
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(difference))
+    }
+}

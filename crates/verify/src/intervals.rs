@@ -1,0 +1,79 @@
+//! The box of a certificate: [`Intervals`].
+
+use elbowroom_num::Rational;
+
+use crate::certificate::{Certificate, End};
+use crate::flaw::Flaw;
+use crate::sound::Endless;
+
+/// For each parameter its least and its greatest value; `None` is infinite.
+#[derive(Clone, Debug)]
+pub(crate) struct Intervals(Vec<[Option<Rational>; 2]>);
+
+impl Intervals {
+    /// The box that the slacks are of, with some ends infinite.
+    ///
+    /// # Errors
+    /// When an end that is told is none, or is told twice, or slacks are missing.
+    pub(crate) fn new(certificate: &Certificate, endless: &[Endless]) -> Result<Self, Flaw> {
+        let parameters = certificate.parameters.iter().enumerate();
+        let intervals = parameters.map(|(index, own)| {
+            let places = if certificate.symmetric {
+                [index, index]
+            } else {
+                [2 * index, 2 * index + 1]
+            };
+            let slack = |place: usize| {
+                let slack = certificate.slacks.get(place);
+                slack.ok_or(Flaw::NoSuch("variable", place))
+            };
+            let lower = &own.nominal - &slack(places[0])?.0;
+            let upper = &own.nominal + &slack(places[1])?.0;
+            Ok([Some(lower), Some(upper)])
+        });
+        let mut intervals = intervals.collect::<Result<Vec<_>, Flaw>>()?;
+        for own in endless {
+            let interval = intervals.get_mut(own.parameter);
+            let interval = interval.ok_or(Flaw::NoSuch("parameter", own.parameter))?;
+            let end = &mut interval[usize::from(own.end == End::Upper)];
+            end.take()
+                .ok_or(Flaw::Range("the interval of parameter", own.parameter))?;
+        }
+        Ok(Self(intervals))
+    }
+
+    /// The ends of a parameter's interval.
+    ///
+    /// # Errors
+    /// When there is no such parameter.
+    pub(crate) fn of(&self, parameter: usize) -> Result<&[Option<Rational>; 2], Flaw> {
+        self.0
+            .get(parameter)
+            .ok_or(Flaw::NoSuch("parameter", parameter))
+    }
+
+    /// The same with a parameter at one of its ends; `None` if that is infinite, or there is no such
+    /// parameter.
+    pub(crate) fn at_end(&self, parameter: usize, is_upper: bool) -> Option<Self> {
+        let value = self.0.get(parameter)?[usize::from(is_upper)].clone()?;
+        let mut narrowed = self.clone();
+        narrowed.0[parameter] = [Some(value.clone()), Some(value)];
+        Some(narrowed)
+    }
+
+    /// The greatest value of `constant + Σ factor · value`; `None` if there is none.
+    pub(crate) fn greatest<'a>(
+        &self,
+        constant: Rational,
+        factors: impl IntoIterator<Item = (usize, &'a Rational)>,
+    ) -> Option<Rational> {
+        let mut sum = constant;
+        for (parameter, factor) in factors {
+            if !factor.is_zero() {
+                let end = &self.0.get(parameter)?[usize::from(factor.is_positive())];
+                sum += end.as_ref()? * factor;
+            }
+        }
+        Some(sum)
+    }
+}
