@@ -1,5 +1,6 @@
 //! From lifted to ground: variables replaced by objects, quantifiers expanded.
 
+mod autonomous;
 mod constraints;
 
 use std::collections::BTreeMap;

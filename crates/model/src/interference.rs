@@ -78,6 +78,13 @@ impl Footprint {
         footprint
     }
 
+    /// The footprint of an event.
+    pub(crate) fn of_snap(task: &Task, snap: &SnapAction) -> Self {
+        let mut footprint = Self::default();
+        footprint.include_snap(task, snap);
+        footprint
+    }
+
     /// The footprint of a condition alone: what it reads.
     pub fn of_condition(task: &Task, condition: &Condition) -> Self {
         let mut footprint = Self::default();

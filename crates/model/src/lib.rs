@@ -17,7 +17,8 @@
 //!    it.
 //!
 //! Semantics: Fox & Long, "PDDL2.1: An Extension to PDDL for Expressing Temporal Planning
-//! Domains", JAIR 20 (2003), with the timed initial literals of PDDL 2.2.
+//! Domains", JAIR 20 (2003), with the timed initial literals of PDDL 2.2, and the processes and
+//! events of PDDL+ ([`autonomous`]).
 //!
 //! ```
 //! use elbowroom_model::problem::{Body, Condition, Schema};
@@ -51,6 +52,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod autonomous;
 pub mod constraint;
 pub mod derivation;
 mod describe;
@@ -74,6 +76,7 @@ mod task;
 mod terms;
 pub mod validate;
 
+pub use autonomous::Autonomous;
 pub use constraint::{Constraints, Modal};
 pub use derivation::GroundRule;
 pub use instantiate::InstantiateError;

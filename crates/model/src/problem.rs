@@ -5,6 +5,7 @@
 
 use elbowroom_num::Rational;
 
+pub use crate::autonomous::{Event, Process};
 pub use crate::constraint::{ActionPreference, Constraint, Modal};
 pub use crate::expression::{Comparison, Unknown};
 
@@ -79,6 +80,10 @@ pub struct Problem {
     pub functions: Vec<Function>,
     /// Instantaneous and durative actions.
     pub schemas: Vec<Schema>,
+    /// Change that goes on while a condition holds (PDDL+).
+    pub processes: Vec<Process>,
+    /// What happens as soon as a condition holds (PDDL+).
+    pub events: Vec<Event>,
     /// The rules of derived predicates; several may share a head.
     pub rules: Vec<Rule>,
     /// `:synth-parameters` of the domain: one unknown each, for the whole domain.

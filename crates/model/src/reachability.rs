@@ -122,7 +122,7 @@ pub fn ground(task: &Task, settings: &Settings) -> Answer {
 /// The same as [`ground`], as long as `goes_on` says so: it is asked every few thousand steps,
 /// which is about every millisecond, and not again once it has said no.
 pub fn ground_while(task: &Task, settings: &Settings, goes_on: &mut dyn FnMut() -> bool) -> Answer {
-    let (problem, domains) = (task.problem.clone(), task.domains.clone());
+    let (problem, domains) = (task.with_autonomous_changes(), task.domains.clone());
     let mut steps = 0;
     let mut count = || {
         steps += 1;

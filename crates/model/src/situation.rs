@@ -6,7 +6,7 @@ use elbowroom_num::{Interval, Rational};
 
 use crate::ground::{Action, Change, FluentId};
 use crate::plan::{Step, TimeTriggeredPlan};
-use crate::problem::{TimedChange, TimedInitial};
+use crate::problem::{Problem, TimedChange, TimedInitial};
 use crate::state::State;
 use crate::task::Task;
 
@@ -79,17 +79,8 @@ impl Task {
             .iter()
             .filter_map(|running| running.action.durative());
         for body in bodies {
-            let at_end = body.end.effects.iter().map(|effect| match &effect.change {
-                Change::Add(fact) => {
-                    let (predicate, arguments) = self.atom(*fact);
-                    TimedChange::Add(predicate, arguments)
-                }
-                Change::Delete(fact) => {
-                    let (predicate, arguments) = self.atom(*fact);
-                    TimedChange::Delete(predicate, arguments)
-                }
-                Change::Update { fluent, .. } => self.some_value_of(*fluent),
-            });
+            let effects = body.end.effects.iter();
+            let at_end = effects.map(|effect| self.possible_change(&effect.change));
             let meanwhile = body
                 .continuous
                 .iter()
@@ -106,6 +97,42 @@ impl Task {
         task.problem = Arc::new(problem);
         task.initial = situation.state.clone();
         task
+    }
+
+    /// The problem for questions of what can be reached: what processes and events may do is listed
+    /// among the timed initials.
+    pub(crate) fn with_autonomous_changes(&self) -> Arc<Problem> {
+        let autonomous = self.autonomous();
+        if autonomous.is_empty() {
+            return Arc::clone(&self.problem);
+        }
+        let mut problem = (*self.problem).clone();
+        let events = autonomous.events.iter();
+        let events = events.flat_map(|event| &event.snap.effects);
+        let processes = autonomous.processes.iter();
+        let processes = processes.flat_map(|process| &process.effects);
+        let changes = events
+            .map(|effect| self.possible_change(&effect.change))
+            .chain(processes.map(|effect| self.some_value_of(effect.fluent)));
+        problem.timed.extend(changes.map(|change| TimedInitial {
+            time: Rational::ZERO,
+            change,
+        }));
+        Arc::new(problem)
+    }
+
+    fn possible_change(&self, change: &Change) -> TimedChange {
+        match change {
+            Change::Add(fact) => {
+                let (predicate, arguments) = self.atom(*fact);
+                TimedChange::Add(predicate, arguments)
+            }
+            Change::Delete(fact) => {
+                let (predicate, arguments) = self.atom(*fact);
+                TimedChange::Delete(predicate, arguments)
+            }
+            Change::Update { fluent, .. } => self.some_value_of(*fluent),
+        }
     }
 
     /// Stands for any change of a fluent: whether it changes is all that reachability asks.

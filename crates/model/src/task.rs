@@ -5,6 +5,7 @@ use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 
 use elbowroom_num::Rational;
 
+use crate::autonomous::Autonomous;
 use crate::constraint::Constraints;
 use crate::derivation::{Derivation, Rules};
 use crate::domains::Domains;
@@ -32,6 +33,7 @@ pub struct Task {
     pub(crate) timed: Vec<TimedHappening>,
     pub(crate) goal: Condition,
     pub(crate) constraints: Arc<Constraints>,
+    autonomous: Arc<Autonomous>,
     /// For each predicate, the positions of its rules in the problem.
     rules_of_predicate: Arc<Vec<Vec<usize>>>,
 }
@@ -50,10 +52,11 @@ impl Task {
             timed: Vec::new(),
             goal: Condition::TRUE,
             constraints: Arc::default(),
+            autonomous: Arc::default(),
             rules_of_predicate: Arc::new(rules_of_predicate(&problem)),
         };
         let mut initial = State::default();
-        let (timed, goal, constraints) = task.grounding(|grounder| {
+        let (timed, goal, constraints, autonomous) = task.grounding(|grounder| {
             for (predicate, arguments) in &problem.initial_facts {
                 initial.facts.insert(grounder.fact(*predicate, arguments));
             }
@@ -63,8 +66,10 @@ impl Task {
             }
             let timed = grounder.ground_timed();
             let goal = grounder.ground_condition(&problem.goal, &mut Vec::new());
-            (timed, goal, grounder.constraints())
+            let constraints = grounder.constraints();
+            (timed, goal, constraints, grounder.autonomous())
         });
+        task.autonomous = Arc::new(autonomous);
         task.constraints = Arc::new(constraints);
         (task.initial, task.timed, task.goal) = (initial, timed, goal);
         task
@@ -115,10 +120,23 @@ impl Task {
         &self.constraints
     }
 
+    /// The processes and events, which happen without a plan.
+    pub fn autonomous(&self) -> &Autonomous {
+        &self.autonomous
+    }
+
+    /// The part of the problem, if there is one, that nobody but the judge heeds. All who find,
+    /// change or carry out plans must refuse it.
+    pub fn left_to_the_judge(&self) -> Option<&'static str> {
+        (!self.autonomous.is_empty()).then_some("processes and events (PDDL+)")
+    }
+
     /// The part of the problem, if there is one, that decides whether a plan is valid and that
-    /// only the judge heeds. All who find, change or carry out plans in other ways must heed it
-    /// themselves, or refuse.
+    /// only the judge heeds, or networks and planners too. Those who do not must refuse it.
     pub fn only_judged(&self) -> Option<&'static str> {
+        if let Some(feature) = self.left_to_the_judge() {
+            return Some(feature);
+        }
         (!self.constraints.hard.is_empty()).then_some("trajectory constraints (`:constraints`)")
     }
 

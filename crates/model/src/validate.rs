@@ -14,6 +14,9 @@
 //!   [`Task::epsilon`] apart. Timed initials take part, but not against each other.
 //! - Constraints on the course ([`Modal`](crate::Modal)) are judged when the plan is over, against
 //!   the state at each moment: the one after all that happens then, and the initial state before.
+//! - Processes and events (PDDL+) need no plan. An event happens as soon as its condition holds:
+//!   after the group, or the event, that makes it true, and before the group that happens at that
+//!   time; a process is at work whenever its condition holds. An event happens once at a moment.
 //! - Preferences never make a plan invalid; [`Report::preferences`] lists those it violates.
 //! - The goal holds in the end: after the last happening of the plan's actions, and after all timed
 //!   initials, unless [`Settings::counts_later_timed`] says otherwise.
@@ -33,9 +36,12 @@
 //! }
 //! ```
 
+mod autonomous;
+mod cells;
 mod display;
 mod effects;
 mod explain;
+mod instant;
 mod interference;
 mod judge;
 mod margin;
@@ -237,6 +243,7 @@ fn judge(
         margins: margin::Margins::default(),
         course: (!constraints.is_empty()).then(|| trajectory::Course::new(&constraints)),
         preferences,
+        nature: autonomous::Nature::of(task),
     };
     let from = situation.map(|situation| &situation.time);
     match judge.run(from, &groups) {

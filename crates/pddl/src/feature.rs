@@ -5,12 +5,6 @@ use elbowroom_text::{Diagnostic, Diagnostics};
 /// A feature that is refused, or ignored with a warning where it cannot affect validity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Feature {
-    /// PDDL+ `:process`
-    Processes,
-    /// PDDL+ `:event`
-    Events,
-    /// PDDL+ `:constraint`
-    GlobalConstraints,
     /// Functions whose values are objects (PDDL 3.1)
     ObjectFluents,
     /// `:control` parameters
@@ -32,9 +26,6 @@ pub enum Feature {
 impl Feature {
     /// All of them, in the order in which documents list them.
     pub const ALL: &[Self] = &[
-        Self::Processes,
-        Self::Events,
-        Self::GlobalConstraints,
         Self::ObjectFluents,
         Self::ControlParameters,
         Self::NonlinearTime,
@@ -48,9 +39,6 @@ impl Feature {
     /// The name of the feature.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Processes => "processes",
-            Self::Events => "events",
-            Self::GlobalConstraints => "global constraints",
             Self::ObjectFluents => "object fluents",
             Self::ControlParameters => "control parameters",
             Self::NonlinearTime => "change not linear in #t",
@@ -65,9 +53,6 @@ impl Feature {
     /// Its identifier: the [`code`](Diagnostic::code) of diagnostics about it.
     pub fn code(self) -> &'static str {
         match self {
-            Self::Processes => "processes",
-            Self::Events => "events",
-            Self::GlobalConstraints => "global-constraints",
             Self::ObjectFluents => "object-fluents",
             Self::ControlParameters => "control-parameters",
             Self::NonlinearTime => "nonlinear-time",
@@ -89,9 +74,6 @@ impl Feature {
     /// Its syntax, and how it is treated.
     pub fn summary(self) -> &'static str {
         match self {
-            Self::Processes => "PDDL+ `:process`: refused",
-            Self::Events => "PDDL+ `:event`: refused",
-            Self::GlobalConstraints => "PDDL+ `:constraint`: refused",
             Self::ObjectFluents => "functions whose values are objects (PDDL 3.1): refused",
             Self::ControlParameters => {
                 "`:control` parameters, numbers the planner chooses: refused; \

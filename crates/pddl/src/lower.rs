@@ -1,6 +1,7 @@
 //! From nested lists to the model.
 
 mod action;
+mod autonomous;
 mod condition;
 mod constraints;
 mod continuous;
@@ -131,6 +132,10 @@ struct Reader {
     resolved_types: Option<(TypeNames, Vec<TypeId>)>,
     /// Where each schema's name stands.
     schema_spans: Vec<Span>,
+    /// Where each process's name stands.
+    process_spans: Vec<Span>,
+    /// Where each event's name stands.
+    event_spans: Vec<Span>,
     /// Where each rule's head stands.
     rule_spans: Vec<Span>,
     /// Where the section of each constraint stands.
@@ -146,6 +151,8 @@ impl Reader {
             copied: 0,
             resolved_types: None,
             schema_spans: Vec::new(),
+            process_spans: Vec::new(),
+            event_spans: Vec::new(),
             rule_spans: Vec::new(),
             constraint_spans: Vec::new(),
         }

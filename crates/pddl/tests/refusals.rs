@@ -23,23 +23,6 @@ fn of_effect(text: &str) -> Vec<(Feature, usize)> {
 }
 
 #[test]
-fn pddl_plus_is_refused() {
-    let found = refused(read_actions(
-        "(:process p :precondition (lit) :effect (increase (level) (* #t 1)))
-(:event e :precondition (lit) :effect (not (lit)))
-(:constraint c :condition (lit))",
-    ));
-    assert_eq!(
-        found,
-        [
-            (Feature::Processes, 6),
-            (Feature::Events, 7),
-            (Feature::GlobalConstraints, 8)
-        ]
-    );
-}
-
-#[test]
 fn object_fluents_are_refused_once_where_they_are_declared() {
     let domain = elbowroom_pddl::Source::new(
         "domain.pddl",
@@ -101,6 +84,6 @@ fn strict_bounds_on_a_duration_are_refused() {
 
 #[test]
 fn a_mistake_beside_a_refused_feature_is_still_a_mistake() {
-    let read = read_actions("(:process p) (:action a :effect (opne hall))");
+    let read = read_actions("(:modules m) (:action a :effect (opne hall))");
     assert!(!is_unsupported(&read.unwrap_err()));
 }

@@ -13,17 +13,13 @@ use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, is_unsupported, read_plan, read_problem};
 use skipped::skipped;
 
-/// Where VAL's answer depends on how it rounds; see the document.
-const DISAGREEMENTS: [&str; 1] =
-    ["auv-missions/pandora-tactical/plans/mission201.popf.plan at 0.0001"];
-
-/// Plans whose domains have processes or events, which we do not read.
-const NOT_JUDGED: [&str; 5] = [
-    "val-samples/coffee/plans/coffeeproblem.src.plan",
-    "val-samples/sleeping-beauty-with-capacitor/plans/sleepingbeauty-problem.src.plan",
-    "val-samples/sleeping-beauty-with-capacitor/plans/sleepingbeauty-problem2.src.plan",
-    "val-samples/sleeping-beauty-with-magnetic-window-alarm/plans/sleepingbeauty-problem.src.plan",
-    "val-samples/vendingmachine/plans/vendingmachine-problem.src.plan",
+/// See the document.
+const DISAGREEMENTS: [&str; 5] = [
+    "auv-missions/pandora-tactical/plans/mission201.popf.plan at 0.0001",
+    "val-samples/sleeping-beauty-with-magnetic-window-alarm/plans/sleepingbeauty-problem.src.plan at 0.00001",
+    "val-samples/sleeping-beauty-with-magnetic-window-alarm/plans/sleepingbeauty-problem.src.plan at 0.0001",
+    "val-samples/sleeping-beauty-with-magnetic-window-alarm/plans/sleepingbeauty-problem.src.plan at 0.001",
+    "val-samples/sleeping-beauty-with-magnetic-window-alarm/plans/sleepingbeauty-problem.src.plan at 0.01",
 ];
 
 const DOCUMENT: &str = include_str!("../../../docs/val-agreement.md");
@@ -142,7 +138,7 @@ fn the_judge_agrees_with_val_up_to_what_the_document_explains() {
         }
     }
     assert_eq!(disagreements, DISAGREEMENTS);
-    assert_eq!(not_judged, NOT_JUDGED);
+    assert!(not_judged.is_empty(), "{not_judged:?}");
     assert!(
         DOCUMENT.contains(&format!("agree on {agreements} of")),
         "{agreements} agreements"
@@ -158,8 +154,5 @@ fn the_document_names_each_disagreement() {
             .find(|line| line.contains(plan))
             .expect("a line of the table");
         assert!(row.contains(tolerance), "{row}");
-    }
-    for plan in NOT_JUDGED {
-        assert!(DOCUMENT.contains(plan), "{plan}");
     }
 }

@@ -105,6 +105,9 @@ pub enum DeorderError {
 /// has constraints that orders and bounds do not respect: on numbers, on derived facts, on what
 /// conditional effects change.
 pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, DeorderError> {
+    if let Some(feature) = task.left_to_the_judge() {
+        return Err(DeorderError::Unsupported { feature });
+    }
     let Labelled {
         plan: mut stn_plan,
         instances,

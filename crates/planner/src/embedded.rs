@@ -69,6 +69,12 @@ pub fn plan(
     settings: &Settings,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Answer {
+    if let Some(feature) = task.left_to_the_judge() {
+        return Answer::Unsupported(Unsupported {
+            feature: feature.to_owned(),
+            place: format!("domain {}", task.problem().domain),
+        });
+    }
     if course::concerns(task, situation, settings) {
         return course::plan(task, situation, settings, observe);
     }

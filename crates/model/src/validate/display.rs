@@ -34,7 +34,10 @@ impl fmt::Display for Occurrence {
             (Some(action), Point::Start) => write!(f, "the start of {action}")?,
             (Some(action), Point::End) => write!(f, "the end of {action}")?,
             (Some(action), _) => write!(f, "{action}")?,
-            (None, _) => write!(f, "a timed initial")?,
+            (None, _) => match &self.event {
+                Some(event) => write!(f, "the event {event}")?,
+                None => write!(f, "a timed initial")?,
+            },
         }
         write!(f, " at {}", clock(&self.time))
     }
@@ -163,6 +166,14 @@ impl fmt::Display for Mistake {
                     None => write!(f, "not happen at the same time"),
                 }
             }
+            Self::EndlessEvent { event, is_alone } => {
+                write!(f, "the event {event} happens without end: ")?;
+                f.write_str(if *is_alone {
+                    "its effects do not make its precondition false"
+                } else {
+                    "other events make its precondition true again at once"
+                })
+            }
             Self::Conflict { fluent } => write!(f, "gives {fluent} several values at once"),
             Self::Undefined { fluent, within } => {
                 write!(f, "reads {fluent}, which has no value, in {within}")
@@ -261,6 +272,21 @@ impl fmt::Display for Difficulty {
             Self::CloseTimes { constraint } => write!(
                 f,
                 "whether {constraint} is kept depends on two times less than a millionth apart"
+            ),
+            Self::Irrational { fluent, within } => write!(
+                f,
+                "{within} reads {fluent}, whose value is irrational: its change stopped, or went \
+                 on differently, at an irrational moment"
+            ),
+            Self::Chattering { process } => write!(
+                f,
+                "the process {process} would start and stop without end: at work it makes its \
+                 condition false, and without it the condition is true"
+            ),
+            Self::ManyChanges { most } => write!(
+                f,
+                "events happen, or processes start and stop, more than {most} times before \
+                 anything of the plan does"
             ),
             Self::Unstratified => write!(f, "a derived fact depends on its own negation"),
         }

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use elbowroom_num::Rational;
 
 use super::judge::Judge;
+use super::reading::Fault;
 use super::state::Rate;
 use super::stop::{Place, Stop};
 use super::timeline::{Group, What};
 use super::violation::{Mistake, When};
-use crate::ground::{Change, Effect, FactId, FluentId};
+use crate::ground::{Change, Effect, Expression, FactId, FluentId};
 use crate::problem::UpdateOperator;
 
 /// All that a group changes, read off before anything changes.
@@ -38,7 +39,7 @@ pub(super) fn rates<'b>(judge: &Judge<'b>) -> Vec<Rate<'b>> {
             .filter(|(_, on)| **on)
         {
             rates.push(Rate {
-                step: position,
+                step: Some(position),
                 fluent: effect.fluent,
                 per_time: &effect.rate,
                 duration: step.duration.as_ref(),
@@ -169,6 +170,11 @@ impl<'a> Judge<'a> {
             let within = || format!("its effect {} {}", update.operator.name(), name());
             value = match (update.operator, value) {
                 (UpdateOperator::Assign, _) => Some(update.value.clone()),
+                (_, None) if matches!(self.now.value(fluent), Err(Fault::Irrational(_))) => {
+                    let value = Expression::Fluent(fluent);
+                    let place = Place::effect(time, update.what.step(), &value);
+                    return Err(self.stop(Fault::Irrational(fluent), &place));
+                }
                 (_, None) => {
                     let mistake = Mistake::Undefined {
                         fluent: name(),
@@ -192,7 +198,9 @@ impl<'a> Judge<'a> {
                 }
             };
         }
-        self.now.values[fluent.index()] = value;
+        if value.is_some() {
+            self.now.set(fluent, value);
+        }
         Ok(())
     }
 }

@@ -66,7 +66,7 @@ fn compare<'a>(
 }
 
 /// The first fact or fluent over which two footprints interfere.
-fn over(task: &Task, a: &Footprint, b: &Footprint) -> String {
+pub(super) fn over(task: &Task, a: &Footprint, b: &Footprint) -> String {
     for (writer, other) in [(a, b), (b, a)] {
         let facts = writer
             .adds

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
+use super::autonomous::Nature;
 use super::explain::Witness;
 use super::margin::{Demand, Margins};
-use super::piece::{Break, Piece};
+use super::piece::{Break, Piece, Stretch};
 use super::preferences::{OfActions, Part};
 use super::reading::Fault;
 use super::state::{Motion, Now, Reading};
@@ -40,6 +41,8 @@ pub(super) struct Judge<'a> {
     pub(super) course: Option<Course<'a>>,
     /// The preferences among the conditions of actions.
     pub(super) preferences: OfActions,
+    /// Processes and events; `None` if there are none.
+    pub(super) nature: Option<Nature>,
 }
 
 /// A durative action under way.
@@ -78,15 +81,27 @@ impl<'a> Judge<'a> {
         groups: &[Group<'a>],
     ) -> Result<(), Stop> {
         let mut before = from;
-        self.note_state(from.unwrap_or(&Rational::ZERO))?;
+        let begin = from.cloned().unwrap_or_default();
+        self.note_state(&begin)?;
+        if self.nature.is_some() {
+            before = Some(&begin);
+            self.fire_now(&begin)?;
+            self.note_state(&begin)?;
+        }
         for (position, group) in groups.iter().enumerate() {
             if let Some(before) = before.filter(|before| **before < group.time) {
-                self.pass(before, &group.time)?;
+                if self.nature.is_some() {
+                    self.pass_with_nature(before, &group.time)?;
+                } else {
+                    self.pass(before, &group.time)?;
+                }
             }
             before = Some(&group.time);
             self.arrive(group)?;
             interference::check(self, &groups[..=position])?;
+            self.keep_from_events(group)?;
             self.apply(group)?;
+            self.fire_now(&group.time)?;
             self.note_state(&group.time)?;
         }
         let end = before.cloned().unwrap_or_default();
@@ -112,8 +127,8 @@ impl<'a> Judge<'a> {
         let motion = Motion::from(&self.now, &rates)
             .map_err(|(step, fault)| self.stop(fault, &Place::rate(from, step)))?;
         let length = to - from;
-        self.watch_over_all(from, &motion, &length)?;
-        self.watch_course(from, &motion, &length)?;
+        self.watch_over_all(from, &motion, &length, None)?;
+        self.watch_course(from, &motion, &length, None)?;
         motion.carry(&mut self.now, &length);
         self.derived.take();
         for running in self.running.values_mut() {
@@ -122,14 +137,16 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// Notes for the constraints on the course what changes until `length` later.
-    fn watch_course(
+    /// Notes for the constraints on the course what changes until `length` later, in the part that
+    /// is given.
+    pub(super) fn watch_course(
         &mut self,
         from: &Rational,
         motion: &Motion,
         length: &Rational,
+        part: Option<&Stretch>,
     ) -> Result<(), Stop> {
-        if motion.is_still() {
+        if motion.is_still() && part.is_none() {
             return Ok(());
         }
         let Some(mut course) = self.course.take() else {
@@ -141,6 +158,7 @@ impl<'a> Judge<'a> {
             length,
             derivation: &self.derivation,
             slack: &self.settings.slack,
+            part,
         };
         course.note_motion(self, &piece, from)?;
         self.course = Some(course);
@@ -148,12 +166,14 @@ impl<'a> Judge<'a> {
     }
 
     /// Checks the over-all conditions of running actions, and the over-all guards of their
-    /// effects, at every moment from the group at `from` until `length` later.
-    fn watch_over_all(
+    /// effects, at every moment from the group at `from` until `length` later, in the part that is
+    /// given.
+    pub(super) fn watch_over_all(
         &mut self,
         from: &Rational,
         motion: &Motion,
         length: &Rational,
+        part: Option<&Stretch>,
     ) -> Result<(), Stop> {
         let mut running = std::mem::take(&mut self.running);
         let mut margins = std::mem::take(&mut self.margins);
@@ -164,6 +184,7 @@ impl<'a> Judge<'a> {
             length,
             derivation: &self.derivation,
             slack: &self.settings.slack,
+            part,
         };
         let mut first: Option<(Break, Place<'_>)> = None;
         for (&position, state) in &mut running {
@@ -215,7 +236,7 @@ impl<'a> Judge<'a> {
         for happening in &group.happenings {
             let time = &group.time;
             match happening.what {
-                What::Timed(_) => {}
+                What::Timed(_) | What::Event(_) => {}
                 What::Instant(position) => {
                     if let Body::Instantaneous(snap) = &self.plan.steps[position].action.body {
                         self.require(&snap.condition, When::Now, Some(position), time)?;
@@ -404,7 +425,7 @@ impl<'a> Judge<'a> {
         )
     }
 
-    /// The effects of a happening of the plan; `None` for timed initials.
+    /// The effects of a happening of the plan; `None` for all others.
     pub(super) fn snap(&self, what: What<'a>) -> Option<&'a SnapAction> {
         let action = &self.plan.steps[what.step()?].action;
         match (&action.body, what) {

@@ -117,7 +117,7 @@ impl Margins {
             } else {
                 gap
             };
-            for offset in extremes(&gap, piece.length) {
+            for offset in extremes(&gap, piece) {
                 self.note(key, gap.at(&offset), time + offset);
             }
         }
@@ -139,19 +139,23 @@ impl Margins {
     }
 }
 
-/// Where a polynomial on `[0, length]` may have its minimum; beyond the second degree, within a
-/// millionth of there.
-fn extremes(polynomial: &Polynomial, length: &Rational) -> Vec<Rational> {
-    let mut offsets = vec![Rational::ZERO];
+/// Where a polynomial may have its minimum on a piece; beyond the second degree, or where the piece
+/// has irrational ends, within a millionth of there.
+fn extremes(polynomial: &Polynomial, piece: &Piece<'_>) -> Vec<Rational> {
+    let (from, to) = piece.ends();
+    let mut offsets = vec![from.clone()];
     if polynomial.degree() > 0 {
         let derivative = polynomial.derivative();
-        for root in derivative.roots_within(length) {
+        for root in derivative.roots_within(piece.length) {
             let narrow = derivative
                 .square_free()
                 .narrowed(&root, &Rational::new(1, 1_000_000));
-            offsets.push(narrow.lower().clone());
+            let offset = narrow.lower();
+            if *offset > from && *offset < to {
+                offsets.push(offset.clone());
+            }
         }
-        offsets.push(length.clone());
+        offsets.push(to);
     }
     offsets
 }

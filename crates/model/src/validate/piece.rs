@@ -6,6 +6,8 @@
 
 use elbowroom_num::Rational;
 
+use super::cells::{Cuts, Place, cells, product};
+use super::instant::Instant;
 use super::polynomial::{Polynomial, Root};
 use super::reading::{Fault, compare_signs, evaluate};
 use super::state::{Motion, Now};
@@ -21,6 +23,19 @@ pub(super) struct Piece<'a> {
     pub(super) length: &'a Rational,
     pub(super) derivation: &'a Derivation,
     pub(super) slack: &'a Rational,
+    /// The part of the piece that is looked at; all of it if `None`.
+    pub(super) part: Option<&'a Stretch>,
+}
+
+/// A part of a piece, throughout which the same processes are at work and no event happens.
+#[derive(Clone, Debug)]
+pub(super) struct Stretch {
+    /// Its beginning, by the clock of the piece.
+    pub(super) from: Instant,
+    /// Its end, which does not belong to it; `None` if there is nothing but the beginning.
+    pub(super) to: Option<Instant>,
+    /// Whether the beginning does not belong to it: something happens right after that moment.
+    pub(super) is_after: bool,
 }
 
 /// The moment at which a condition stops being true; times count from the beginning of the piece.
@@ -66,36 +81,35 @@ impl Piece<'_> {
         includes_start: bool,
     ) -> Result<Option<Break>, Fault> {
         let reads_derived = self.derivation.is_read_by(condition);
+        let includes_start = includes_start && !self.part.is_some_and(|part| part.is_after);
+        if !includes_start && self.part.is_some_and(|part| part.to.is_none()) {
+            return Ok(None);
+        }
         if !self.concerns(condition, reads_derived) {
             let view = self.view(duration, Place::Point(Rational::ZERO));
             let is_broken = !self.look(condition, &view, reads_derived)?;
+            let (from, to) = self.ends();
             return Ok(is_broken.then(|| Break {
-                at: Rational::ZERO,
+                at: from,
                 is_after: !includes_start,
-                is_exact: true,
-                witness: self.length.clone(),
+                is_exact: self.is_start_exact(),
+                witness: to,
             }));
         }
         let cuts = self.cuts(condition, duration, reads_derived);
-        for cell in cells(&cuts, self.length, includes_start) {
+        for cell in cells(&cuts, self.length, self.part, includes_start) {
             let view = self.view(duration, cell.place);
             if self.look(condition, &view, reads_derived)? {
                 continue;
             }
             let narrow =
                 product(&cuts.polynomials).narrowed(&cell.from, &Rational::new(1, 1_000_000));
-            let sample = match view.place {
-                Place::Point(sample) | Place::Root(sample, _) => sample,
-            };
+            let sample = view.place.near();
             return Ok(Some(Break {
                 at: narrow.lower().clone(),
                 is_after: cell.is_open,
                 is_exact: matches!(narrow, Root::Exact(_)),
-                witness: if cell.is_last {
-                    self.length.clone()
-                } else {
-                    sample
-                },
+                witness: if cell.is_last { self.ends().1 } else { sample },
             }));
         }
         Ok(None)
@@ -107,12 +121,27 @@ impl Piece<'_> {
         let all = Condition::And(conditions.iter().copied().cloned().collect());
         let reads_derived = self.derivation.is_read_by(&all);
         if !self.concerns(&all, reads_derived) {
-            return Ok(Vec::new());
+            // The state at the beginning of a piece is known; at that of a part, facts may have
+            // changed.
+            let Some(part) = self.part else {
+                return Ok(Vec::new());
+            };
+            let view = self.view(None, Place::Point(Rational::ZERO));
+            let looks = conditions
+                .iter()
+                .map(|condition| self.look(condition, &view, reads_derived));
+            return Ok(vec![Known {
+                at: part.from.near(),
+                is_exact: self.is_start_exact(),
+                is_open: part.is_after,
+                holds: looks.collect::<Result<_, _>>()?,
+            }]);
         }
         let cuts = self.cuts(&all, None, reads_derived);
         let polynomial = product(&cuts.polynomials);
         let mut known = Vec::new();
-        for cell in cells(&cuts, self.length, true) {
+        let includes_start = !self.part.is_some_and(|part| part.is_after);
+        for cell in cells(&cuts, self.length, self.part, includes_start) {
             let view = self.view(None, cell.place);
             let looks = conditions
                 .iter()
@@ -126,6 +155,57 @@ impl Piece<'_> {
             });
         }
         Ok(known)
+    }
+
+    /// Whether the condition holds at a moment of the piece.
+    pub(super) fn holds_at(&self, condition: &Condition, at: &Instant) -> Result<bool, Fault> {
+        let reads_derived = self.derivation.is_read_by(condition);
+        let view = self.view(None, Place::Instant(at.clone()));
+        self.look(condition, &view, reads_derived)
+    }
+
+    /// Whether the condition holds right after the beginning of the part, and the first moment
+    /// after that at which, or right after which, it is otherwise.
+    pub(super) fn turn(&self, condition: &Condition) -> Result<(bool, Option<Instant>), Fault> {
+        let reads_derived = self.derivation.is_read_by(condition);
+        if !self.concerns(condition, reads_derived) {
+            let view = self.view(None, Place::Point(Rational::ZERO));
+            return Ok((self.look(condition, &view, reads_derived)?, None));
+        }
+        let cuts = self.cuts(condition, None, reads_derived);
+        let polynomial = product(&cuts.polynomials);
+        let mut first = None;
+        for cell in cells(&cuts, self.length, self.part, false) {
+            let holds = self.look(condition, &self.view(None, cell.place), reads_derived)?;
+            let first = *first.get_or_insert(holds);
+            if holds != first {
+                let at = Instant::of(cell.from, &polynomial);
+                let exact = cuts.roots.iter().filter_map(|root| match root {
+                    Root::Exact(value) => Some(value.clone()),
+                    Root::Between(..) => None,
+                });
+                let ends = [Rational::ZERO, self.length.clone()];
+                let others: Vec<_> = exact.chain(ends).collect();
+                return Ok((first, Some(at.zero_of_one(&cuts.polynomials, &others))));
+            }
+        }
+        Ok((first.unwrap_or(false), None))
+    }
+
+    /// Beginning and end of the part; where they are irrational, within a millionth below them.
+    pub(super) fn ends(&self) -> (Rational, Rational) {
+        match self.part {
+            None => (Rational::ZERO, self.length.clone()),
+            Some(part) => {
+                let from = part.from.near();
+                let to = part.to.as_ref().map(Instant::near);
+                (from.clone(), to.unwrap_or(from))
+            }
+        }
+    }
+
+    fn is_start_exact(&self) -> bool {
+        self.part.is_none_or(|part| part.from.as_exact().is_some())
     }
 
     /// `left - right` as a function of the time since the piece began.
@@ -204,85 +284,24 @@ impl Piece<'_> {
                 body.visit_comparisons(&mut |left, right| add(left, right, None));
             });
         }
+        // So that the cells begin and end with the part.
+        if let Some(part) = self.part {
+            for end in [Some(&part.from), part.to.as_ref()].into_iter().flatten() {
+                polynomials.push(end.zero().clone());
+            }
+        }
+        // Most zeros are those of lines, or of parabolas through the beginning.
+        let plain = polynomials.iter();
+        let mut exact: Vec<_> = plain
+            .filter_map(|one| one.plain_root_within(self.length))
+            .collect();
+        exact.sort();
+        exact.dedup();
         Cuts {
-            roots: product(&polynomials).roots_within(self.length),
+            roots: product(&polynomials).roots_with(self.length, exact),
             polynomials,
         }
     }
-}
-
-struct Cuts {
-    polynomials: Vec<Polynomial>,
-    roots: Vec<Root>,
-}
-
-fn product(polynomials: &[Polynomial]) -> Polynomial {
-    let one = Polynomial::constant(Rational::ONE);
-    polynomials
-        .iter()
-        .fold(one, |product, polynomial| product.times(polynomial))
-        .square_free()
-}
-
-/// One cut, or the moments strictly between two neighbouring cuts.
-struct Cell {
-    /// Where to look.
-    place: Place,
-    /// The cut itself, or the one on the left.
-    from: Root,
-    /// Whether these are moments between cuts.
-    is_open: bool,
-    /// Whether the cell reaches the end of the piece.
-    is_last: bool,
-}
-
-/// A position within a piece.
-#[derive(Clone)]
-enum Place {
-    Point(Rational),
-    /// At the only zero, of any difference, between these two numbers.
-    Root(Rational, Rational),
-}
-
-/// The cells of `[0, length)`, or of `(0, length)`, in order.
-fn cells(cuts: &Cuts, length: &Rational, includes_start: bool) -> Vec<Cell> {
-    let mut cells = Vec::new();
-    let mut left = Root::Exact(Rational::ZERO);
-    if includes_start {
-        cells.push(Cell {
-            place: Place::Point(Rational::ZERO),
-            from: left.clone(),
-            is_open: false,
-            is_last: false,
-        });
-    }
-    let end = Root::Exact(length.clone());
-    for right in cuts.roots.iter().chain([&end]) {
-        let is_last = *right == end;
-        // Brackets share no point with other cuts, so the middle lies strictly between the two,
-        // or at the common end of two brackets, which is no zero.
-        let middle = (left.upper() + right.lower()) / Rational::from(2);
-        cells.push(Cell {
-            place: Place::Point(middle),
-            from: left,
-            is_open: true,
-            is_last,
-        });
-        if !is_last {
-            let place = match right {
-                Root::Exact(value) => Place::Point(value.clone()),
-                Root::Between(low, high) => Place::Root(low.clone(), high.clone()),
-            };
-            cells.push(Cell {
-                place,
-                from: right.clone(),
-                is_open: false,
-                is_last: false,
-            });
-        }
-        left = right.clone();
-    }
-    cells
 }
 
 /// The piece seen at one place.
@@ -296,6 +315,7 @@ impl View<'_> {
     fn sign(&self, polynomial: &Polynomial) -> i32 {
         match &self.place {
             Place::Point(at) => polynomial.at(at).signum(),
+            Place::Instant(at) => at.sign(polynomial),
             Place::Root(low, high) => {
                 if polynomial.degree() > 0 && polynomial.count_roots_between(low, high) > 0 {
                     0

@@ -134,16 +134,19 @@ impl Polynomial {
     ///
     /// Brackets share no point with each other, with exact roots, or with the two ends.
     pub(super) fn roots_within(&self, length: &Rational) -> Vec<Root> {
-        let mut exact = Vec::new();
+        self.roots_with(length, Vec::new())
+    }
+
+    /// The same, given zeros between the two ends that are known already.
+    pub(super) fn roots_with(&self, length: &Rational, mut exact: Vec<Rational>) -> Vec<Root> {
         let mut rest = self.square_free();
         // The ends, so that no bracket can begin or stop at a zero.
-        for end in [Rational::ZERO, length.clone()] {
-            rest.divide_out(&end);
+        for known in [&Rational::ZERO, length].into_iter().chain(&exact) {
+            rest.divide_out(known);
         }
         // Zeros met on the way are divided out, and the search starts again without them.
         let brackets = loop {
-            if let [c0, c1] = rest.0.as_slice() {
-                let root = -(c0 / c1);
+            if let Some(root) = rest.only_root() {
                 rest = Self::constant(Rational::ONE);
                 if root.is_positive() && root < *length {
                     exact.push(root);
@@ -263,7 +266,8 @@ impl Polynomial {
         self.divided(&self.common_divisor(&derivative)).0
     }
 
-    fn common_divisor(&self, other: &Self) -> Self {
+    /// The greatest common divisor, up to a factor.
+    pub(super) fn common_divisor(&self, other: &Self) -> Self {
         let (mut a, mut b) = (self.clone(), other.clone());
         while !b.is_zero() {
             let remainder = a.divided(&b).1.monic();
@@ -281,7 +285,7 @@ impl Polynomial {
     }
 
     /// Quotient and remainder; `divisor` is not zero.
-    fn divided(&self, divisor: &Self) -> (Self, Self) {
+    pub(super) fn divided(&self, divisor: &Self) -> (Self, Self) {
         let leading = divisor.0.last().expect("the divisor is not zero");
         let mut remainder = self.0.clone();
         let mut quotient = Vec::new();
@@ -298,8 +302,26 @@ impl Polynomial {
         (Self::new(quotient), Self::new(remainder))
     }
 
+    /// The zero of a polynomial of the first degree.
+    pub(super) fn only_root(&self) -> Option<Rational> {
+        match self.0.as_slice() {
+            [c0, c1] => Some(-(c0 / c1)),
+            _ => None,
+        }
+    }
+
+    /// The only zero strictly between 0 and `length` of a polynomial that has at most one beside
+    /// those two: told without a search.
+    pub(super) fn plain_root_within(&self, length: &Rational) -> Option<Rational> {
+        let mut rest = self.clone();
+        rest.divide_out(&Rational::ZERO);
+        rest.divide_out(length);
+        let root = rest.only_root()?;
+        (root.is_positive() && root < *length).then_some(root)
+    }
+
     /// Removes the zero `root`, if it is one, from a square-free polynomial.
-    fn divide_out(&mut self, root: &Rational) {
+    pub(super) fn divide_out(&mut self, root: &Rational) {
         if !self.is_zero() && self.at(root).is_zero() {
             *self = self.divided(&Self::new(vec![-root, Rational::ONE])).0;
         }

@@ -19,6 +19,8 @@ pub(super) enum Fault {
     Misplaced(Expression),
     /// It divides by something that changes continuously.
     Quotient(Expression),
+    /// It reads a fluent whose value is irrational.
+    Irrational(FluentId),
     /// It reads a fluent whose rate of change depends, in the end, on the fluent itself.
     Circular(FluentId),
 }

@@ -1,9 +1,10 @@
 //! The state at one moment, and how it moves until the next happening.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_num::Rational;
 
+use super::instant::Instant;
 use super::polynomial::Polynomial;
 use super::reading::{Fault, compare_signs, evaluate};
 use crate::derivation::Moment;
@@ -17,6 +18,9 @@ use crate::task::Task;
 pub(super) struct Now {
     pub(super) facts: Vec<bool>,
     pub(super) values: Vec<Option<Rational>>,
+    /// Fluents that have a value, but an irrational one, which is not kept: they stopped at an
+    /// irrational moment.
+    irrational: BTreeSet<FluentId>,
 }
 
 impl Now {
@@ -29,13 +33,29 @@ impl Now {
         for (fluent, value) in &state.values {
             values[fluent.index()] = Some(value.clone());
         }
-        Self { facts, values }
+        Self {
+            facts,
+            values,
+            irrational: BTreeSet::new(),
+        }
     }
 
     pub(super) fn value(&self, fluent: FluentId) -> Result<&Rational, Fault> {
-        self.values[fluent.index()]
-            .as_ref()
-            .ok_or(Fault::Undefined(fluent))
+        self.values[fluent.index()].as_ref().ok_or_else(|| {
+            if self.irrational.contains(&fluent) {
+                Fault::Irrational(fluent)
+            } else {
+                Fault::Undefined(fluent)
+            }
+        })
+    }
+
+    /// Gives a fluent a value; `None`: an irrational one.
+    pub(super) fn set(&mut self, fluent: FluentId, value: Option<Rational>) {
+        if value.is_none() {
+            self.irrational.insert(fluent);
+        }
+        self.values[fluent.index()] = value;
     }
 
     /// As the rest of the crate writes states.
@@ -91,49 +111,91 @@ impl Moment<Fault> for Reading<'_> {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Motion(BTreeMap<FluentId, Polynomial>);
 
-/// `d fluent / dt` has the term `per_time`, of a step with this duration.
+/// `d fluent / dt` has the term `per_time`, of a step with this duration, or of a process.
 pub(super) struct Rate<'a> {
-    pub(super) step: usize,
+    pub(super) step: Option<usize>,
     pub(super) fluent: FluentId,
     pub(super) per_time: &'a Expression,
     pub(super) duration: Option<&'a Rational>,
 }
+
+/// What goes wrong with a motion, and the step to blame if it is one.
+type Blamed = (Option<usize>, Fault);
 
 impl Motion {
     /// The motion from `now` on.
     ///
     /// A rate may itself read fluents that move (the values are then polynomials of a higher
     /// degree), as long as no fluent's rate depends on the fluent itself.
-    /// If it cannot be read, the step to blame.
-    pub(super) fn from(now: &Now, rates: &[Rate<'_>]) -> Result<Self, (usize, Fault)> {
-        let mut terms: BTreeMap<FluentId, Vec<&Rate<'_>>> = BTreeMap::new();
-        for rate in rates {
-            terms.entry(rate.fluent).or_default().push(rate);
-        }
+    pub(super) fn from(now: &Now, rates: &[Rate<'_>]) -> Result<Self, Blamed> {
         let mut motion = Self::default();
-        while let Some((&stuck, unread)) = terms.first_key_value() {
-            let is_ready = |rate: &&Rate<'_>| {
-                let mut is_ready = true;
-                rate.per_time
-                    .visit_fluents(&mut |fluent| is_ready &= !terms.contains_key(&fluent));
-                is_ready
-            };
-            let Some((&fluent, _)) = terms.iter().find(|(_, rates)| rates.iter().all(is_ready))
-            else {
-                return Err((unread[0].step, Fault::Circular(stuck)));
-            };
-            let mut speed = Polynomial::constant(Rational::ZERO);
-            let mut step = 0;
-            for rate in terms.remove(&fluent).into_iter().flatten() {
-                let read = |fluent| motion.value(now, fluent);
-                let term = evaluate(rate.per_time, rate.duration, &read);
-                speed = speed.plus(&term.map_err(|fault| (rate.step, fault))?);
-                step = rate.step;
-            }
+        for (fluent, rates) in in_order(rates)? {
+            let (speed, step) = motion.speed(now, &rates)?;
             let initial = now.value(fluent).map_err(|fault| (step, fault))?;
-            motion.0.insert(fluent, speed.integral(initial.clone()));
+            let moved = speed.integral(initial.clone());
+            motion.0.insert(fluent, moved);
         }
         Ok(motion)
+    }
+
+    /// The motion from the moment `at` on, at which that of `before` ends, by the same clock. What
+    /// stands still from then on gets its value in `now`. Where a coefficient would be irrational,
+    /// the fluent's value is lost.
+    pub(super) fn resumed(
+        now: &mut Now,
+        before: &Self,
+        rates: &[Rate<'_>],
+        at: &Instant,
+    ) -> Result<Self, Blamed> {
+        let ordered = in_order(rates)?;
+        let mut motion = Self::default();
+        for (&fluent, polynomial) in &before.0 {
+            if !ordered.iter().any(|(moving, _)| *moving == fluent) {
+                now.set(fluent, at.value(polynomial));
+            }
+        }
+        for (fluent, rates) in ordered {
+            let step = rates[0].step;
+            let parts = motion.speed(now, &rates).and_then(|(speed, _)| {
+                let before = before.value(now, fluent).map_err(|fault| (step, fault))?;
+                Ok((speed.integral(Rational::ZERO), before))
+            });
+            let constant = match &parts {
+                Ok((change, before)) => at.value(&before.minus(change)),
+                Err((_, Fault::Irrational(_))) => None,
+                Err(blamed) => return Err(blamed.clone()),
+            };
+            if let (Ok((change, _)), Some(constant)) = (parts, constant) {
+                let moved = change.plus(&Polynomial::constant(constant));
+                motion.0.insert(fluent, moved);
+            } else {
+                now.set(fluent, None);
+            }
+        }
+        Ok(motion)
+    }
+
+    /// The sum of some rates of one fluent, and the last of their steps.
+    fn speed(&self, now: &Now, rates: &[&Rate<'_>]) -> Result<(Polynomial, Option<usize>), Blamed> {
+        let mut speed = Polynomial::constant(Rational::ZERO);
+        let mut step = None;
+        for rate in rates {
+            let read = |fluent| self.value(now, fluent);
+            let term = evaluate(rate.per_time, rate.duration, &read);
+            speed = speed.plus(&term.map_err(|fault| (rate.step, fault))?);
+            step = rate.step;
+        }
+        Ok((speed, step))
+    }
+
+    /// Lets a fluent have the value of a polynomial, by the clock of the motion.
+    pub(super) fn put(&mut self, now: &mut Now, fluent: FluentId, polynomial: Polynomial) {
+        if let Some(value) = polynomial.as_constant() {
+            self.0.remove(&fluent);
+            now.set(fluent, Some(value));
+        } else {
+            self.0.insert(fluent, polynomial);
+        }
     }
 
     pub(super) fn is_still(&self) -> bool {
@@ -158,4 +220,28 @@ impl Motion {
             now.values[fluent.index()] = Some(polynomial.at(elapsed));
         }
     }
+}
+
+/// The rates by fluent, those that others read first.
+fn in_order<'r, 'a>(rates: &'r [Rate<'a>]) -> Result<Vec<(FluentId, Vec<&'r Rate<'a>>)>, Blamed> {
+    let mut terms: BTreeMap<FluentId, Vec<&Rate<'_>>> = BTreeMap::new();
+    for rate in rates {
+        terms.entry(rate.fluent).or_default().push(rate);
+    }
+    let mut ordered = Vec::with_capacity(terms.len());
+    while let Some((&stuck, unread)) = terms.first_key_value() {
+        let is_ready = |rate: &&Rate<'_>| {
+            let mut is_ready = true;
+            rate.per_time
+                .visit_fluents(&mut |fluent| is_ready &= !terms.contains_key(&fluent));
+            is_ready
+        };
+        let ready = terms.iter().find(|(_, rates)| rates.iter().all(is_ready));
+        let Some((&fluent, _)) = ready else {
+            return Err((unread[0].step, Fault::Circular(stuck)));
+        };
+        let rates = terms.remove(&fluent).unwrap_or_default();
+        ordered.push((fluent, rates));
+    }
+    Ok(ordered)
 }

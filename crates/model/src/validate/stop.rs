@@ -75,10 +75,10 @@ impl<'a> Place<'a> {
         }
     }
 
-    pub(super) fn rate(time: &'a Rational, step: usize) -> Self {
+    pub(super) fn rate(time: &'a Rational, step: Option<usize>) -> Self {
         Self {
             time,
-            step: Some(step),
+            step,
             subject: Subject::Rate,
         }
     }
@@ -107,6 +107,11 @@ impl<'a> Judge<'a> {
                 What::End(_) => Point::End,
                 What::Instant(_) => Point::Instant,
                 What::Timed(_) => Point::Timed,
+                What::Event(_) => Point::Event,
+            },
+            event: match what {
+                What::Event(event) => Some(self.task.autonomous().events[event].name.clone()),
+                _ => None,
             },
             action: what.step().map(|position| self.instance(position)),
         }
@@ -167,6 +172,10 @@ impl<'a> Judge<'a> {
             },
             Fault::Quotient(divisor) => Difficulty::Quotient {
                 divisor: self.task.describe_expression(&divisor),
+                within,
+            },
+            Fault::Irrational(fluent) => Difficulty::Irrational {
+                fluent: self.task.fluent_name(fluent),
                 within,
             },
             Fault::Circular(fluent) => Difficulty::Nonlinear {

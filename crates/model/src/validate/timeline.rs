@@ -21,6 +21,8 @@ pub(super) enum What<'a> {
     Instant(usize),
     /// Timed initial literals and fluents.
     Timed(&'a TimedHappening),
+    /// The event of this position among the task's.
+    Event(usize),
 }
 
 impl What<'_> {
@@ -28,7 +30,7 @@ impl What<'_> {
     pub(super) fn step(&self) -> Option<usize> {
         match self {
             Self::Start(step) | Self::End(step) | Self::Instant(step) => Some(*step),
-            Self::Timed(_) => None,
+            Self::Timed(_) | Self::Event(_) => None,
         }
     }
 }

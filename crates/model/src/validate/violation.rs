@@ -108,6 +108,14 @@ pub enum Mistake {
         /// How far apart they would have to be; `None`: not at the same time.
         separation: Option<Rational>,
     },
+    /// An event happens again at the moment at which it happened: its effects, or those of other
+    /// events, leave its precondition true, or make it so again. There is no end to that.
+    EndlessEvent {
+        /// `(name arg …)`.
+        event: String,
+        /// Whether no other event happened in between.
+        is_alone: bool,
+    },
     /// One happening gives a fluent several values at once.
     Conflict {
         /// The fluent.
@@ -183,8 +191,10 @@ pub struct Occurrence {
     pub time: Rational,
     /// The point of the action at which it happens.
     pub point: Point,
-    /// The action; `None` for timed initials.
+    /// The action; `None` for timed initials and events.
     pub action: Option<ActionInstance>,
+    /// `(name arg …)` of an event.
+    pub event: Option<String>,
 }
 
 /// The part of an action that a happening is: its start, its end, or all of it.
@@ -198,6 +208,8 @@ pub enum Point {
     Instant,
     /// No action: timed initial literals and fluents.
     Timed,
+    /// No action: an event of PDDL+.
+    Event,
 }
 
 /// Why it cannot be decided whether a plan is valid.
@@ -254,4 +266,24 @@ pub enum Difficulty {
     },
     /// A derived fact depends on its own negation.
     Unstratified,
+    /// A fluent that is read stopped moving, or changed its course, at an irrational moment, where
+    /// its value is irrational, too.
+    Irrational {
+        /// The fluent.
+        fluent: String,
+        /// Where it is read.
+        within: String,
+    },
+    /// A process would start and stop without end at one moment: at work, it makes its condition
+    /// false, and else it is true.
+    Chattering {
+        /// `(name arg …)`.
+        process: String,
+    },
+    /// Events happen, or processes start and stop, more often between two happenings than is looked
+    /// at.
+    ManyChanges {
+        /// How often.
+        most: usize,
+    },
 }

@@ -49,6 +49,11 @@ const SUPPORTED: &[(&str, &str)] = &[
     ),
     ("Derived predicates", "stratified rules"),
     (
+        "Processes and events",
+        "PDDL+ `:process` and `:event`, grounded and judged ([how](#processes-and-events)); \
+         `:constraint`, which must hold in each state",
+    ),
+    (
         "Constraints on the course",
         "`:constraints` of domain and problem (PDDL 3): `at end`, `always`, `sometime`, `within`, \
          `at-most-once`, `sometime-after`, `sometime-before`, `always-within`, `hold-during`, \
@@ -97,13 +102,41 @@ states that a plan goes through.
 
 ";
 
+/// What processes and events mean, and who heeds them.
+const AUTONOMOUS: &str = "\n## Processes and events\n
+The meaning is that of Fox & Long (*Modelling mixed discrete-continuous domains for planning*, JAIR \
+27, 2006).
+
+- A process is at work whenever its condition holds, from the initial state on. Its effects are \
+  `(increase (f) (* #t rate))` and `(decrease …)`, without `when`. Rates of processes and of actions \
+  add up.
+- An event happens as soon as its condition holds: after the happening, or the other event, that \
+  makes it true, and before what the plan does at that moment. Where a condition holds only right \
+  after a moment, as `(> (x) 3)` does when `x` rises through 3, it happens right after it.
+- An event happens once at a moment. One whose effects leave its precondition true, or two that make \
+  each other's true again, would happen without end: the plan is invalid, and the judge names the \
+  event. So it is where two events that interfere happen at one moment.
+- What the plan does keeps ε away from an event before it that it interferes with.
+- The moments of events, and of processes that start and stop, are zeros of polynomials, and are \
+  compared exactly, irrational ones too. A number that changes its course, or stops, at an \
+  irrational moment with an irrational value is not kept: if something reads it, the plan is \
+  undecided.
+- Undecided, with the reason, are also: rates that depend on their own fluent (air resistance); a \
+  process that would start and stop without end; more than 1000 events and turns of processes \
+  between two happenings of the plan.
+- A `:constraint` (of the dialect of ENHSP) is `(always condition)` for all its parameters.
+- They are read and judged, no more: the embedded planner, networks, envelopes, repairs, odds and \
+  runs refuse such domains by name. External planners can be used, and their plans are judged.
+
+";
+
 /// The document. Without a survey it has no tables.
 pub(crate) fn document(survey: Option<&Survey>) -> String {
     let mut text = String::from(
         "# PDDL support\n\n\
          <!-- Written by `cargo run --release -p elbowroom-pddl --example pddl_support`. -->\n\n\
          PDDL 2.1 levels 1 to 4, with the timed initial literals and derived predicates of PDDL \
-         2.2. Requirement flags switch nothing on or off.\n\n## Executed\n\n",
+         2.2, and processes and events (PDDL+). Requirement flags switch nothing on or off.\n\n## Executed\n\n",
     );
     for (name, what) in SUPPORTED {
         line(&mut text, format_args!("- **{name}**: {what}"));
@@ -115,6 +148,7 @@ pub(crate) fn document(survey: Option<&Survey>) -> String {
             format_args!("- **{}**: {}", feature.name(), feature.summary()),
         );
     }
+    text.push_str(AUTONOMOUS);
     text.push_str(CONSTRAINTS);
     if let Some(survey) = survey {
         benchmarks(survey, &mut text);

@@ -33,7 +33,7 @@ const DURATIVE: &[&str] = &[
 ];
 
 /// The keywords of an action, each with its own place and what stands after it.
-type Fields<'t, 's> = BTreeMap<&'static str, (Span, Option<&'t Node<'s>>)>;
+pub(super) type Fields<'t, 's> = BTreeMap<&'static str, (Span, Option<&'t Node<'s>>)>;
 
 impl Reader {
     /// Reads an action.
@@ -50,7 +50,7 @@ impl Reader {
             return;
         };
         let allowed = if is_durative { DURATIVE } else { INSTANTANEOUS };
-        let fields = self.fields(&name, rest, allowed);
+        let fields = self.fields(&format!("action `{name}`"), rest, allowed);
         let mut scope = self.action_scope(&fields);
         scope.has_duration = is_durative;
         scope.parameters = scope.variables.len();
@@ -77,9 +77,9 @@ impl Reader {
     }
 
     /// Pairs keywords with what stands after them.
-    fn fields<'t, 's>(
+    pub(super) fn fields<'t, 's>(
         &mut self,
-        action: &str,
+        whose: &str,
         nodes: &'t [Node<'s>],
         allowed: &[&'static str],
     ) -> Fields<'t, 's> {
@@ -90,7 +90,7 @@ impl Reader {
                 self.report
                     .error(
                         node.span,
-                        format!("unexpected `{}` in action `{action}`", node.quote()),
+                        format!("unexpected `{}` in {whose}", node.quote()),
                     )
                     .advise(format!("expected one of {}", allowed.join(", ")));
                 continue;
@@ -105,10 +105,7 @@ impl Reader {
                     _ => nearest(&word, allowed.iter().copied()),
                 };
                 self.report
-                    .error(
-                        node.span,
-                        format!("unknown keyword `{word}` in action `{action}`"),
-                    )
+                    .error(node.span, format!("unknown keyword `{word}` in {whose}"))
                     .advise(format!("expected one of {}", allowed.join(", ")))
                     .suggest(near);
                 continue;
@@ -119,10 +116,7 @@ impl Reader {
             }
             if fields.insert(keyword, (node.span, value)).is_some() {
                 self.report
-                    .error(
-                        node.span,
-                        format!("a second `{keyword}` in action `{action}`"),
-                    )
+                    .error(node.span, format!("a second `{keyword}` in {whose}"))
                     .advise("join them by `and`");
             }
         }
@@ -191,7 +185,12 @@ impl Reader {
         }
     }
 
-    fn effects(&mut self, fields: &Fields, moment: Moment, scope: &mut Scope) -> Effects {
+    pub(super) fn effects(
+        &mut self,
+        fields: &Fields,
+        moment: Moment,
+        scope: &mut Scope,
+    ) -> Effects {
         let mut effects = Effects::default();
         if let Some((_, Some(node))) = fields.get(":effect") {
             self.effect(node, moment, scope, &mut Around::default(), &mut effects);

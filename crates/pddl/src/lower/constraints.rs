@@ -49,7 +49,11 @@ impl Reader {
         }
     }
 
-    fn add_constraint(&mut self, constraint: Option<Constraint>, span: crate::source::Span) {
+    pub(super) fn add_constraint(
+        &mut self,
+        constraint: Option<Constraint>,
+        span: crate::source::Span,
+    ) {
         match constraint {
             None => {}
             Some(Constraint::And(parts)) => {

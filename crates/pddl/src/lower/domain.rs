@@ -51,6 +51,8 @@ const REQUIREMENTS: &[&str] = &[
     ":action-costs",
     ":goal-utilities",
     ":time",
+    ":processes",
+    ":events",
     ":modules",
     ":control-parameters",
     ":synth-parameters",
@@ -86,7 +88,9 @@ impl Reader {
             match section.keyword.as_ref() {
                 ":action" | ":durative-action" => self.action(section),
                 ":constraints" => self.constraints(section),
-                ":process" | ":event" | ":constraint" | ":modules" => self.refuse(section),
+                ":process" | ":event" => self.autonomous(section),
+                ":constraint" => self.global_constraint(section),
+                ":modules" => self.refuse(section),
                 keyword if !SECTIONS.contains(&keyword) => self.skip(section, SECTIONS),
                 _ => {}
             }
@@ -115,14 +119,9 @@ impl Reader {
         }
     }
 
-    /// Refuses a section of PDDL+ or another dialect, by the name of what it declares.
+    /// Refuses a section of another dialect, by the name of what it declares.
     fn refuse(&mut self, section: &Section) {
-        let feature = match section.keyword.as_ref() {
-            ":process" => Feature::Processes,
-            ":event" => Feature::Events,
-            ":constraint" => Feature::GlobalConstraints,
-            _ => Feature::Modules,
-        };
+        let feature = Feature::Modules;
         let name = section.content.first().and_then(Node::word);
         let named = name.map_or(String::new(), |name| format!(" `{name}`"));
         self.report.unsupported(

@@ -4,6 +4,7 @@ use elbowroom_model::problem::{Change, ContinuousEffect, Effect, Guard, UpdateOp
 
 use crate::lower::Reader;
 use crate::lower::condition::without_preferences;
+use crate::lower::continuous::mentions_time;
 use crate::lower::scope::Scope;
 use crate::lower::shift::shift;
 use crate::lower::timed::{Time, Timed, both, near_specifier, time_specifier};
@@ -22,6 +23,8 @@ pub(super) enum Moment {
     End,
     /// In a durative action, outside of `at start` and `at end`.
     Unspecified,
+    /// In a process.
+    Process,
 }
 
 /// The effects of an action.
@@ -78,12 +81,17 @@ impl Reader {
                     self.effect(inner, Moment::End, scope, around, effects);
                 }
                 _ => {
+                    let advice = match moment {
+                        Moment::Process => "a process has no start and no end of its own",
+                        Moment::Instant => "only effects of durative actions have times",
+                        _ => "effects of durative actions happen `at start` or `at end`",
+                    };
                     self.report
                         .error(
                             node.span,
                             format!("`{}` does not belong here", node.quote()),
                         )
-                        .advise("effects of durative actions happen `at start` or `at end`");
+                        .advise(advice);
                 }
             }
             return;
@@ -103,6 +111,11 @@ impl Reader {
                 around.variables.truncate(outer);
                 scope.variables.truncate(outside);
             }
+            ("when", _) if moment == Moment::Process => {
+                self.report
+                    .error(node.span, "a conditional effect of a process")
+                    .advise("write a process of its own, with the condition as its precondition");
+            }
             ("when", [condition, part]) => {
                 let when = self.when(condition, moment, scope);
                 around.whens.push(when);
@@ -116,7 +129,7 @@ impl Reader {
 
     fn when(&mut self, node: &Node, moment: Moment, scope: &mut Scope) -> When {
         let condition = without_preferences(scope, |scope| match moment {
-            Moment::Unspecified => self.timed_condition(node, scope),
+            Moment::Unspecified | Moment::Process => self.timed_condition(node, scope),
             Moment::Instant | Moment::Start => Timed {
                 start: self.condition(node, scope),
                 ..Timed::default()
@@ -152,6 +165,22 @@ impl Reader {
             return;
         }
         let operator = operator(head);
+        if moment == Moment::Process {
+            match operator {
+                Some(operator) if operator.is_additive() && parts.iter().any(mentions_time) => {
+                    self.continuous_effect(operator, node, parts, scope, around, effects);
+                }
+                _ => {
+                    self.report
+                        .error(
+                            node.span,
+                            format!("`{}` is no change that goes on", node.quote()),
+                        )
+                        .advise("effects of a process are `(increase (f) (* #t rate))`");
+                }
+            }
+            return;
+        }
         if moment == Moment::Unspecified {
             match operator {
                 Some(operator) if operator.is_additive() => {
@@ -170,7 +199,7 @@ impl Reader {
             let list = match moment {
                 Moment::Start => &mut effects.start,
                 Moment::End => &mut effects.end,
-                Moment::Instant | Moment::Unspecified => &mut effects.instant,
+                Moment::Instant | Moment::Unspecified | Moment::Process => &mut effects.instant,
             };
             list.push(Effect {
                 variables: around.variables.clone(),
@@ -289,7 +318,7 @@ impl Reader {
             } = condition;
             let looks_ahead = match moment {
                 Moment::Instant | Moment::Start => !over_all.is_trivial() || !end.is_trivial(),
-                Moment::Unspecified => !end.is_trivial(),
+                Moment::Unspecified | Moment::Process => !end.is_trivial(),
                 Moment::End => false,
             };
             if looks_ahead {
@@ -305,7 +334,7 @@ impl Reader {
             }
             match moment {
                 Moment::Instant | Moment::Start => guard.now = both(guard.now, start),
-                Moment::End | Moment::Unspecified => {
+                Moment::End | Moment::Unspecified | Moment::Process => {
                     guard.at_start = both(guard.at_start, start);
                     guard.over_all = both(guard.over_all, over_all);
                     guard.now = both(guard.now, end);

@@ -51,6 +51,24 @@ impl Reader {
             let size = sizes.of_body(&schema.body);
             check(size, *span, format!("action `{}`", schema.name));
         }
+        for (process, span) in problem.processes.iter().zip(&self.process_spans) {
+            let size = process.effects.iter().fold(1, |size, effect| {
+                sizes
+                    .of_guarded(&effect.variables, &effect.guard)
+                    .saturating_add(size)
+            });
+            let size = size
+                .saturating_add(sizes.of_condition(&process.condition))
+                .saturating_mul(sizes.combinations(&process.parameters));
+            check(size, *span, format!("process `{}`", process.name));
+        }
+        for (event, span) in problem.events.iter().zip(&self.event_spans) {
+            let size = sizes
+                .of_effects(&event.effects)
+                .saturating_add(sizes.of_condition(&event.condition))
+                .saturating_mul(sizes.combinations(&event.parameters));
+            check(size, *span, format!("event `{}`", event.name));
+        }
         for (constraint, span) in problem.constraints.iter().zip(&self.constraint_spans) {
             check(
                 sizes.of_constraint(constraint),

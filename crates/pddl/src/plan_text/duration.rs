@@ -57,6 +57,15 @@ pub(super) fn changing_functions(problem: &Problem) -> BTreeSet<FunctionId> {
             changing.insert(effect.fluent.function);
         }
     }
+    for effect in problem.events.iter().flat_map(|event| &event.effects) {
+        if let Change::Update { fluent, .. } = &effect.change {
+            changing.insert(fluent.function);
+        }
+    }
+    let processes = problem.processes.iter();
+    for effect in processes.flat_map(|process| &process.effects) {
+        changing.insert(effect.fluent.function);
+    }
     for timed in &problem.timed {
         if let TimedChange::Assign(function, ..) = &timed.change {
             changing.insert(*function);

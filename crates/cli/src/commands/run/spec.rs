@@ -113,6 +113,7 @@ pub(in crate::commands) fn contradiction(error: SpecError) -> Failure {
             "`elbowroom plan --help` says more; `embedded` is always there, and `none` plans \
              nothing"
         }
+        SpecError::Unheeded(_) => "`elbowroom check` judges plans of such a domain",
         SpecError::NeedsWorld(_) => "give it a world file with --world, or leave out the number",
         SpecError::NeedsEmbedded(_) => "leave out --planner, or the number",
         SpecError::FirstPlan(why) => match why {

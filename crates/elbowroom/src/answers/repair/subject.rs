@@ -5,7 +5,7 @@ use elbowroom_model::ground::{Change as Effect, DurationConstraint, Expression};
 use elbowroom_model::problem::Comparison;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::deorder::unordered;
+use elbowroom_plan::deorder::{DeorderError, unordered};
 use elbowroom_plan::parametrize::{ParametrizeError, Selection, Target, VarySpec, vary};
 use elbowroom_plan::{
     Bound, Constraint, InstanceId, Node, NodeId, Parameter, ParameterId, ParameterKind,
@@ -39,6 +39,9 @@ pub(super) struct Subject {
 
 impl Subject {
     pub(super) fn new(request: &RepairRequest) -> Result<Self, FlowError> {
+        if let Some(feature) = request.task.left_to_the_judge() {
+            return Err(DeorderError::Unsupported { feature }.into());
+        }
         let task = request.task.with_timed_apart();
         let (closed, times) = match &request.plan {
             AnyPlan::TimeTriggered(plan) => {

@@ -37,6 +37,11 @@ pub enum SpecError {
     /// The likelihood file cannot be read.
     #[error("{0}")]
     Likelihoods(Diagnostics),
+    /// The problem has a part that executors do not heed.
+    #[error(
+        "plans cannot be carried out here: executors do not heed {0} yet, which the domain has"
+    )]
+    Unheeded(&'static str),
     /// The executor compares plans in the world that a world file describes, and there is none.
     #[error("`{0}` must know how the world behaves")]
     NeedsWorld(ExecutorSpec),
@@ -309,6 +314,9 @@ impl RunSpec {
     /// When its files cannot be read, or the members do not go together.
     pub fn execution(&self, task: &Arc<Task>) -> Result<Execution<'static>, SpecError> {
         self.check()?;
+        if let Some(feature) = task.left_to_the_judge() {
+            return Err(SpecError::Unheeded(feature));
+        }
         let model = self.model(task.problem()).map_err(SpecError::World)?;
         let mut envelopes = self.envelopes();
         if self.world.is_some() {

@@ -1,0 +1,526 @@
+//! Processes and events: what goes on between two happening groups without being asked.
+//!
+//! The time between two groups is cut where an event happens, or a process starts or stops. These
+//! moments are zeros of polynomials, and may be irrational. Up to a rational moment the state is
+//! carried on as up to a group. From an irrational one on, polynomials go on by the same clock, with
+//! a new constant, if that is rational: so it is where the course of a number does not change, where
+//! it gets a rational value, and where it reaches the bound of a condition. A number whose
+//! constant is irrational loses its value until it is assigned a new one, and the plan is undecided
+//! if something reads it before.
+//!
+//! At one moment, first comes what is true then, and after that what is true right after it: an
+//! event on `(> x 1)` happens right after `x` has reached 1. What is true right after a moment
+//! depends on which processes are at work then, and the other way round; the answer is found by
+//! trying those whose condition is true at the moment, then those that are true under these, until
+//! nothing changes.
+
+use std::cmp::Ordering;
+use std::collections::BTreeSet;
+
+use elbowroom_num::Rational;
+
+use super::effects;
+use super::instant::Instant;
+use super::interference::over;
+use super::judge::Judge;
+use super::piece::{Piece, Stretch};
+use super::polynomial::Polynomial;
+use super::reading::{Fault, evaluate};
+use super::state::{Motion, Now, Rate};
+use super::stop::{Place, Stop};
+use super::timeline::{Group, What};
+use super::violation::{Difficulty, Mistake, Undecided, When};
+use crate::autonomous::{Autonomous, GroundEvent};
+use crate::ground::{Change, Condition, Expression, FactId, FluentId};
+use crate::interference::Footprint;
+use crate::problem::UpdateOperator;
+use crate::task::Task;
+
+/// How many events and turns of processes there may be between two happening groups.
+const MOST_CHANGES: usize = 1000;
+
+/// When an event happens is no number of the plan, so nothing is forgiven.
+static NO_SLACK: Rational = Rational::ZERO;
+
+/// Events that have happened, as far as that matters.
+#[derive(Debug)]
+pub(super) struct Nature {
+    /// What each event reads and writes.
+    footprints: Vec<Footprint>,
+    /// The events that have happened at the present moment.
+    fired: BTreeSet<usize>,
+    /// How many of them came before the last ones.
+    rounds: usize,
+    /// The events since the last two groups: the time of the group before, the time since, and
+    /// which it was.
+    recent: Vec<(Rational, Instant, usize)>,
+}
+
+impl Nature {
+    /// `None` if nothing happens without a plan.
+    pub(super) fn of(task: &Task) -> Option<Self> {
+        let autonomous = task.autonomous();
+        let footprint = |event: &GroundEvent| Footprint::of_snap(task, &event.snap);
+        (!autonomous.is_empty()).then(|| Self {
+            footprints: autonomous.events.iter().map(footprint).collect(),
+            fired: BTreeSet::new(),
+            rounds: 0,
+            recent: Vec::new(),
+        })
+    }
+}
+
+/// A moment between two groups.
+struct Flow {
+    /// When the clock began.
+    base: Rational,
+    /// The moment, by that clock; before it, numbers moved like this.
+    at: Instant,
+    motion: Motion,
+}
+
+impl Flow {
+    fn beginning(time: &Rational) -> Self {
+        Self {
+            base: time.clone(),
+            at: Instant::exact(Rational::ZERO),
+            motion: Motion::default(),
+        }
+    }
+
+    /// The time, or a number close to it.
+    fn time(&self) -> Rational {
+        &self.base + self.at.near()
+    }
+}
+
+/// When a condition is read: at a moment, or right after it, under a motion.
+enum Read<'m> {
+    At,
+    After(&'m Now, &'m Motion, &'m Rational),
+}
+
+impl<'a> Judge<'a> {
+    fn autonomous(&self) -> &'a Autonomous {
+        self.task.autonomous()
+    }
+
+    /// Lets the events happen whose conditions hold now, and those that hold because of them.
+    pub(super) fn fire_now(&mut self, time: &Rational) -> Result<(), Stop> {
+        if self.nature.is_none() {
+            return Ok(());
+        }
+        self.fire_at(&mut Flow::beginning(time))
+    }
+
+    /// Processes and events from just after the group at `from` to the arrival at the next one.
+    pub(super) fn pass_with_nature(&mut self, from: &Rational, to: &Rational) -> Result<(), Stop> {
+        let mut flow = Flow::beginning(from);
+        self.forget_events_before(from);
+        for _ in 0..MOST_CHANGES {
+            let length = to - &flow.base;
+            let is_after = self.settle_after(&mut flow, &length)?;
+            let next = self.next_turn(&flow, &length)?;
+            let end = next.clone();
+            let part = Stretch {
+                from: flow.at.clone(),
+                to: Some(end.unwrap_or_else(|| Instant::exact(length.clone()))),
+                is_after,
+            };
+            self.watch(&flow, &length, &part)?;
+            for running in self.running.values_mut() {
+                running.is_new = false;
+            }
+            let is_over = next.is_none();
+            self.advance(&mut flow, next.unwrap_or_else(|| Instant::exact(length)));
+            self.fire_at(&mut flow)?;
+            if is_over {
+                return Ok(());
+            }
+        }
+        let most = MOST_CHANGES;
+        Err(undecided(&flow.time(), Difficulty::ManyChanges { most }))
+    }
+
+    /// Checks all that must hold throughout a part.
+    fn watch(&mut self, flow: &Flow, length: &Rational, part: &Stretch) -> Result<(), Stop> {
+        self.watch_over_all(&flow.base, &flow.motion, length, Some(part))?;
+        self.watch_course(&flow.base, &flow.motion, length, Some(part))
+    }
+
+    /// Goes on to a later moment.
+    fn advance(&mut self, flow: &mut Flow, at: Instant) {
+        if let Some(elapsed) = at.as_exact() {
+            flow.motion.carry(&mut self.now, elapsed);
+            *flow = Flow::beginning(&(&flow.base + elapsed));
+        } else {
+            flow.at = at;
+        }
+        self.derived.take();
+        if let Some(nature) = &mut self.nature {
+            nature.fired.clear();
+            nature.rounds = 0;
+        }
+    }
+
+    /// Lets the events happen whose conditions hold at the moment.
+    fn fire_at(&mut self, flow: &mut Flow) -> Result<(), Stop> {
+        loop {
+            let ready = self.ready(flow, &Read::At)?;
+            if ready.is_empty() {
+                return Ok(());
+            }
+            self.fire(flow, &ready, &Read::At)?;
+        }
+    }
+
+    /// Finds out which processes are at work right after the moment, and lets the events happen
+    /// whose conditions hold right after it. Whether there were any.
+    fn settle_after(&mut self, flow: &mut Flow, length: &Rational) -> Result<bool, Stop> {
+        let mut is_after = false;
+        loop {
+            let (now, motion) = self.at_work(flow, length)?;
+            let read = Read::After(&now, &motion, length);
+            let ready = self.ready(flow, &read)?;
+            if ready.is_empty() {
+                (self.now, flow.motion) = (now, motion);
+                return Ok(is_after);
+            }
+            if !is_after {
+                let part = Stretch {
+                    from: flow.at.clone(),
+                    to: None,
+                    is_after: false,
+                };
+                self.watch(flow, length, &part)?;
+                is_after = true;
+            }
+            self.fire(flow, &ready, &read)?;
+        }
+    }
+
+    /// How numbers move right after the moment, and the state in which some stand still.
+    fn at_work(&self, flow: &Flow, length: &Rational) -> Result<(Now, Motion), Stop> {
+        let processes = &self.autonomous().processes;
+        let time = flow.time();
+        let mut on = Vec::with_capacity(processes.len());
+        for process in processes {
+            on.push(self.holds(flow, &process.condition, &Read::At)?);
+        }
+        let mut tried = BTreeSet::new();
+        loop {
+            let mut rates = effects::rates(self);
+            for (process, _) in processes.iter().zip(&on).filter(|(_, on)| **on) {
+                rates.extend(process.effects.iter().map(|effect| Rate {
+                    step: None,
+                    fluent: effect.fluent,
+                    per_time: &effect.rate,
+                    duration: None,
+                }));
+            }
+            let mut now = self.now.clone();
+            let motion = Motion::resumed(&mut now, &flow.motion, &rates, &flow.at)
+                .map_err(|(step, fault)| self.stop(fault, &Place::rate(&time, step)))?;
+            let mut then = Vec::with_capacity(processes.len());
+            let read = Read::After(&now, &motion, length);
+            for process in processes {
+                then.push(self.holds(flow, &process.condition, &read)?);
+            }
+            if then == on {
+                return Ok((now, motion));
+            }
+            let turned = on.iter().zip(&then).position(|(on, then)| on != then);
+            if !tried.insert(std::mem::replace(&mut on, then)) {
+                let process = turned.map(|index| processes[index].name.clone());
+                let process = process.unwrap_or_default();
+                return Err(undecided(&time, Difficulty::Chattering { process }));
+            }
+        }
+    }
+
+    /// The next moment at which, or right after which, an event's condition comes to hold or a
+    /// process starts or stops.
+    fn next_turn(&self, flow: &Flow, length: &Rational) -> Result<Option<Instant>, Stop> {
+        if flow.motion.is_still() {
+            return Ok(None);
+        }
+        let part = Stretch {
+            from: flow.at.clone(),
+            to: Some(Instant::exact(length.clone())),
+            is_after: true,
+        };
+        let piece = self.piece(&self.now, &flow.motion, length, Some(&part));
+        let mut next: Option<Instant> = None;
+        for condition in self.conditions() {
+            let place = Place::condition(&flow.base, None, When::Course, condition);
+            let (_, turn) = piece
+                .turn(condition)
+                .map_err(|fault| self.stop(fault, &place))?;
+            if let Some(turn) = turn
+                && next
+                    .as_ref()
+                    .is_none_or(|next| turn.order(next) == Ordering::Less)
+            {
+                next = Some(turn);
+            }
+        }
+        Ok(next)
+    }
+
+    /// The conditions of all events and processes.
+    fn conditions(&self) -> impl Iterator<Item = &'a Condition> {
+        let autonomous = self.autonomous();
+        let events = autonomous.events.iter().map(|event| &event.snap.condition);
+        let processes = autonomous.processes.iter();
+        events.chain(processes.map(|process| &process.condition))
+    }
+
+    /// The events whose conditions hold.
+    fn ready(&self, flow: &Flow, read: &Read<'_>) -> Result<Vec<usize>, Stop> {
+        let mut ready = Vec::new();
+        for (index, event) in self.autonomous().events.iter().enumerate() {
+            if self.holds(flow, &event.snap.condition, read)? {
+                ready.push(index);
+            }
+        }
+        Ok(ready)
+    }
+
+    fn holds(&self, flow: &Flow, condition: &Condition, read: &Read<'_>) -> Result<bool, Stop> {
+        let holds = match read {
+            Read::At => {
+                let length = Rational::ZERO;
+                let piece = self.piece(&self.now, &flow.motion, &length, None);
+                piece.holds_at(condition, &flow.at)
+            }
+            Read::After(now, motion, length) => {
+                let part = Stretch {
+                    from: flow.at.clone(),
+                    to: Some(Instant::exact((*length).clone())),
+                    is_after: true,
+                };
+                let piece = self.piece(now, motion, length, Some(&part));
+                piece.turn(condition).map(|(holds, _)| holds)
+            }
+        };
+        holds.map_err(|fault| {
+            let time = flow.time();
+            self.stop(
+                fault,
+                &Place::condition(&time, None, When::Course, condition),
+            )
+        })
+    }
+
+    fn piece<'p>(
+        &'p self,
+        now: &'p Now,
+        motion: &'p Motion,
+        length: &'p Rational,
+        part: Option<&'p Stretch>,
+    ) -> Piece<'p> {
+        Piece {
+            now,
+            motion,
+            length,
+            derivation: &self.derivation,
+            slack: &NO_SLACK,
+            part,
+        }
+    }
+
+    /// Some events happen at once.
+    fn fire(&mut self, flow: &mut Flow, ready: &[usize], read: &Read<'_>) -> Result<(), Stop> {
+        self.refuse_endless(flow, ready)?;
+        self.refuse_interference(flow, ready)?;
+        let changes = self.changes(flow, ready, read)?;
+        let time = flow.time();
+        for (fluent, value) in changes.values {
+            flow.motion.put(&mut self.now, fluent, value);
+        }
+        for (truth, facts) in [(false, changes.deletes), (true, changes.adds)] {
+            for (fact, event) in facts {
+                let old = std::mem::replace(&mut self.now.facts[fact.index()], truth);
+                if old != truth {
+                    self.since.insert(fact, (time.clone(), What::Event(event)));
+                }
+            }
+        }
+        self.derived.take();
+        if let Some(nature) = &mut self.nature {
+            nature.rounds += 1;
+            for &event in ready {
+                nature.fired.insert(event);
+                let moment = (flow.base.clone(), flow.at.clone(), event);
+                nature.recent.push(moment);
+            }
+        }
+        Ok(())
+    }
+
+    /// An event happens once at a moment.
+    fn refuse_endless(&self, flow: &Flow, ready: &[usize]) -> Result<(), Stop> {
+        let Some(nature) = &self.nature else {
+            return Ok(());
+        };
+        let Some(&again) = ready.iter().find(|event| nature.fired.contains(event)) else {
+            return Ok(());
+        };
+        let mistake = Mistake::EndlessEvent {
+            event: self.autonomous().events[again].name.clone(),
+            is_alone: nature.rounds == 1 && nature.fired.len() == 1,
+        };
+        Err(self.violation(&flow.time(), None, mistake))
+    }
+
+    /// Of events that happen at once, the order must not matter.
+    fn refuse_interference(&self, flow: &Flow, ready: &[usize]) -> Result<(), Stop> {
+        let Some(nature) = &self.nature else {
+            return Ok(());
+        };
+        for (position, &second) in ready.iter().enumerate() {
+            for &first in &ready[..position] {
+                let footprints = [first, second].map(|event| &nature.footprints[event]);
+                if !footprints[0].interferes_with(footprints[1]) {
+                    continue;
+                }
+                let time = flow.time();
+                let mistake = Mistake::Interference {
+                    first: self.occurrence(What::Event(first), &time),
+                    second: self.occurrence(What::Event(second), &time),
+                    over: over(self.task, footprints[0], footprints[1]),
+                    separation: None,
+                };
+                return Err(self.violation(&time, None, mistake));
+            }
+        }
+        Ok(())
+    }
+
+    /// What some events change, all read in the same state.
+    fn changes(&self, flow: &Flow, ready: &[usize], read: &Read<'_>) -> Result<Changes, Stop> {
+        let mut changes = Changes::default();
+        let time = flow.time();
+        for &event in ready {
+            for effect in &self.autonomous().events[event].snap.effects {
+                let guard = &effect.guard.now;
+                if !guard.is_trivial() && !self.holds(flow, guard, read)? {
+                    continue;
+                }
+                match &effect.change {
+                    Change::Add(fact) => changes.adds.push((*fact, event)),
+                    Change::Delete(fact) => changes.deletes.push((*fact, event)),
+                    Change::Update {
+                        operator,
+                        fluent,
+                        value,
+                    } => {
+                        let place = Place::effect(&time, None, value);
+                        let value_of = |fluent| flow.motion.value(&self.now, fluent);
+                        let old = changes.values.iter().find(|(known, _)| known == fluent);
+                        if old.is_some() && !operator.is_additive() {
+                            let mistake = Mistake::Conflict {
+                                fluent: self.task.fluent_name(*fluent),
+                            };
+                            return Err(self.violation(&time, None, mistake));
+                        }
+                        let old = match old {
+                            Some((_, value)) => Ok(value.clone()),
+                            None => value_of(*fluent),
+                        };
+                        let new = evaluate(value, None, &value_of)
+                            .and_then(|value| updated(*operator, old, value, &flow.at, *fluent))
+                            .map_err(|fault| self.stop(fault, &place))?;
+                        changes.values.retain(|(known, _)| known != fluent);
+                        changes.values.push((*fluent, new));
+                    }
+                }
+            }
+        }
+        Ok(changes)
+    }
+
+    /// Happenings of the plan keep ε away from events before them. Where no separation is asked for,
+    /// the event on arrival comes first, and that is all.
+    pub(super) fn keep_from_events(&self, group: &Group<'a>) -> Result<(), Stop> {
+        let Some(nature) = self
+            .nature
+            .as_ref()
+            .filter(|_| self.settings.needs_separation)
+        else {
+            return Ok(());
+        };
+        let separation = self.task.epsilon();
+        for (base, at, event) in &nature.recent {
+            for happening in &group.happenings {
+                let Some(step) = happening.what.step() else {
+                    continue;
+                };
+                let since = &happening.time - base;
+                let is_close = at.order(&Instant::exact(since - separation)) == Ordering::Greater;
+                let footprint = &nature.footprints[*event];
+                if !is_close || !footprint.interferes_with(&happening.footprint) {
+                    continue;
+                }
+                let time = base + at.near();
+                let mistake = Mistake::Interference {
+                    first: self.occurrence(What::Event(*event), &time),
+                    second: self.occurrence(happening.what, &happening.time),
+                    over: over(self.task, footprint, &happening.footprint),
+                    separation: Some(separation.clone()),
+                };
+                return Err(self.violation(&happening.time, Some(step), mistake));
+            }
+        }
+        Ok(())
+    }
+
+    /// Forgets the events that no later happening can be too close to.
+    fn forget_events_before(&mut self, time: &Rational) {
+        let separation = self.task.epsilon();
+        if let Some(nature) = &mut self.nature {
+            let is_close = |(base, at, _): &(Rational, Instant, usize)| {
+                at.order(&Instant::exact(time - base - separation)) == Ordering::Greater
+            };
+            nature.recent.retain(is_close);
+        }
+    }
+}
+
+/// What some events change.
+#[derive(Default)]
+struct Changes {
+    deletes: Vec<(FactId, usize)>,
+    adds: Vec<(FactId, usize)>,
+    /// The new value, by the clock of the motion: right at the moment, and meaningless at others.
+    values: Vec<(FluentId, Polynomial)>,
+}
+
+/// The value of a fluent after an update.
+fn updated(
+    operator: UpdateOperator,
+    old: Result<Polynomial, Fault>,
+    value: Polynomial,
+    at: &Instant,
+    fluent: FluentId,
+) -> Result<Polynomial, Fault> {
+    Ok(match operator {
+        UpdateOperator::Assign => value,
+        UpdateOperator::Increase => old?.plus(&value),
+        UpdateOperator::Decrease => old?.minus(&value),
+        UpdateOperator::ScaleUp => old?.times(&value),
+        UpdateOperator::ScaleDown => {
+            let divisor = at.value(&value).ok_or(Fault::Irrational(fluent))?;
+            let zero = Expression::Constant(Rational::ZERO);
+            let factor = divisor.reciprocal().ok_or(Fault::DivisionByZero(zero))?;
+            old?.scaled(&factor)
+        }
+    })
+}
+
+fn undecided(time: &Rational, difficulty: Difficulty) -> Stop {
+    Stop::Undecided(Box::new(Undecided {
+        time: Some(time.clone()),
+        difficulty,
+    }))
+}
