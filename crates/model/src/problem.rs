@@ -3,6 +3,8 @@
 //! Variables are numbered by position: an action's parameters come first, then the variables of
 //! each enclosing quantifier, outermost first. A [`Term::Variable`] is an index into that list.
 
+use std::collections::BTreeMap;
+
 use elbowroom_num::Rational;
 
 pub use crate::autonomous::{Event, Process};
@@ -76,10 +78,16 @@ pub struct Problem {
     pub constants: usize,
     /// Basic and derived predicates. `=` is not among them, see [`Condition::Equal`].
     pub predicates: Vec<Predicate>,
+    /// Those of the predicates that stand for functions whose values are objects (PDDL 3.1): the
+    /// last argument is the value.
+    pub object_functions: Vec<PredicateId>,
     /// Numeric functions.
     pub functions: Vec<Function>,
     /// Instantaneous and durative actions.
     pub schemas: Vec<Schema>,
+    /// For actions with `:control` parameters, which of their unknowns these are: numbers that a
+    /// plan chooses, one for each instance.
+    pub controls: BTreeMap<SchemaId, Vec<u32>>,
     /// Change that goes on while a condition holds (PDDL+).
     pub processes: Vec<Process>,
     /// What happens as soon as a condition holds (PDDL+).
@@ -464,6 +472,18 @@ impl Problem {
             .iter()
             .position(|f| f.name.eq_ignore_ascii_case(name))
             .map(FunctionId::from)
+    }
+
+    /// A fact as PDDL writes it: `(name arg …)`, or `(= (name arg …) value)` of an object function.
+    pub fn apply_predicate(&self, predicate: PredicateId, arguments: &[ObjectId]) -> String {
+        let name = &self.predicates[predicate.index()].name;
+        match arguments.split_last() {
+            Some((value, arguments)) if self.object_functions.contains(&predicate) => {
+                let value = &self.objects[value.index()].name;
+                format!("(= {} {value})", self.apply_name(name, arguments))
+            }
+            _ => self.apply_name(name, arguments),
+        }
     }
 
     /// `(name arg …)` as PDDL writes it.

@@ -128,7 +128,10 @@ impl Task {
     /// The part of the problem, if there is one, that nobody but the judge heeds. All who find,
     /// change or carry out plans must refuse it.
     pub fn left_to_the_judge(&self) -> Option<&'static str> {
-        (!self.autonomous.is_empty()).then_some("processes and events (PDDL+)")
+        if !self.autonomous.is_empty() {
+            return Some("processes and events (PDDL+)");
+        }
+        (!self.problem.controls.is_empty()).then_some("control parameters (`:control`)")
     }
 
     /// The part of the problem, if there is one, that decides whether a plan is valid and that
@@ -256,8 +259,7 @@ impl Task {
     pub fn fact_name(&self, fact: FactId) -> String {
         let table = self.table();
         let (predicate, arguments) = table.atom(fact);
-        self.problem
-            .apply_name(&self.problem.predicates[predicate.index()].name, arguments)
+        self.problem.apply_predicate(*predicate, arguments)
     }
 
     /// `(function object …)`.

@@ -5,10 +5,8 @@ use elbowroom_text::{Diagnostic, Diagnostics};
 /// A feature that is refused, or ignored with a warning where it cannot affect validity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Feature {
-    /// Functions whose values are objects (PDDL 3.1)
+    /// Values of object functions (PDDL 3.1) as arguments outside of conditions
     ObjectFluents,
-    /// `:control` parameters
-    ControlParameters,
     /// Continuous change that is not linear in `#t`
     NonlinearTime,
     /// `<` and `>` on `?duration`
@@ -27,7 +25,6 @@ impl Feature {
     /// All of them, in the order in which documents list them.
     pub const ALL: &[Self] = &[
         Self::ObjectFluents,
-        Self::ControlParameters,
         Self::NonlinearTime,
         Self::StrictDurations,
         Self::MixedTimes,
@@ -40,7 +37,6 @@ impl Feature {
     pub fn name(self) -> &'static str {
         match self {
             Self::ObjectFluents => "object fluents",
-            Self::ControlParameters => "control parameters",
             Self::NonlinearTime => "change not linear in #t",
             Self::StrictDurations => "strict duration bounds",
             Self::MixedTimes => "disjunction over several times",
@@ -54,7 +50,6 @@ impl Feature {
     pub fn code(self) -> &'static str {
         match self {
             Self::ObjectFluents => "object-fluents",
-            Self::ControlParameters => "control-parameters",
             Self::NonlinearTime => "nonlinear-time",
             Self::StrictDurations => "strict-durations",
             Self::MixedTimes => "mixed-times",
@@ -74,10 +69,9 @@ impl Feature {
     /// Its syntax, and how it is treated.
     pub fn summary(self) -> &'static str {
         match self {
-            Self::ObjectFluents => "functions whose values are objects (PDDL 3.1): refused",
-            Self::ControlParameters => {
-                "`:control` parameters, numbers the planner chooses: refused; \
-                 see `:synth-parameters` for numbers that stay open"
+            Self::ObjectFluents => {
+                "the value of an object fluent as an argument in effects, durations and initial \
+                 values, and as the new value of another: refused; in conditions it is executed"
             }
             Self::NonlinearTime => "a product of two `#t`, a division by `#t`: refused",
             Self::StrictDurations => "`(< ?duration …)`, `(> ?duration …)`: refused",

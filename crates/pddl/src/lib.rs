@@ -13,7 +13,7 @@
 //! 3. `plan_text`: what planners print, to a plan and back.
 //! 4. `problem_text`: a problem, also one in mid-execution, back to text.
 //!
-//! PDDL 2.1 levels 1 to 4 and PDDL 2.2 are read. What we do not execute ([`Feature`]) is refused
+//! PDDL 2.1 levels 1 to 4, PDDL 2.2 and PDDL+ are read. What we do not execute ([`Feature`]) is refused
 //! by name and place, or ignored with a warning where it cannot affect validity. No bytes make
 //! the readers panic. They open no files: the caller gives each text its name.
 //!

@@ -15,6 +15,7 @@ mod expression;
 mod hierarchy;
 mod init;
 mod names;
+mod object_fluents;
 mod objective;
 mod scope;
 mod sections;

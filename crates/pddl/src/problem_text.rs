@@ -10,7 +10,7 @@ mod term;
 
 use std::fmt::Write;
 
-use elbowroom_model::ground::{Change, Expression};
+use elbowroom_model::ground::{Change, Expression, FactId};
 use elbowroom_model::problem::{self, Constraint, Modal, Object, TypeId};
 use elbowroom_model::{Situation, State, Task, TimedHappening};
 use elbowroom_num::Rational;
@@ -181,6 +181,16 @@ fn is_soft(constraint: &Constraint) -> bool {
     }
 }
 
+/// How a deletion is written.
+enum Deleted {
+    /// As what it is.
+    Fact,
+    /// As a value that an object function loses.
+    Value(String),
+    /// Not at all.
+    Nothing,
+}
+
 /// Writes the parts of a problem file.
 struct Writer<'a> {
     task: &'a Task,
@@ -248,7 +258,11 @@ impl Writer<'_> {
         for change in &happening.changes {
             let what = match change {
                 Change::Add(fact) => self.task.fact_name(*fact),
-                Change::Delete(fact) => format!("(not {})", self.task.fact_name(*fact)),
+                Change::Delete(fact) => match self.undefined(*fact, happening) {
+                    Deleted::Fact => format!("(not {})", self.task.fact_name(*fact)),
+                    Deleted::Value(undefined) => undefined,
+                    Deleted::Nothing => continue,
+                },
                 Change::Update { fluent, value, .. } => {
                     let Expression::Constant(value) = value else {
                         // Timed initials assign numbers, and so do the ends made from running
@@ -264,6 +278,34 @@ impl Writer<'_> {
             };
             let _ = writeln!(text, "  (at {time} {what})");
         }
+    }
+
+    /// What is to be said of a deletion: of an object function's value, that there is none any
+    /// more, unless the happening gives it another.
+    fn undefined(&self, fact: FactId, happening: &TimedHappening) -> Deleted {
+        let problem = self.task.problem();
+        let (predicate, arguments) = self.task.atom(fact);
+        let Some((_, arguments)) = arguments
+            .split_last()
+            .filter(|_| problem.object_functions.contains(&predicate))
+        else {
+            return Deleted::Fact;
+        };
+        let has_another = happening.changes.iter().any(|change| match change {
+            Change::Add(fact) => {
+                let (other, others) = self.task.atom(*fact);
+                other == predicate && others.split_last().is_some_and(|(_, own)| own == arguments)
+            }
+            _ => false,
+        });
+        if has_another {
+            return Deleted::Nothing;
+        }
+        let name = &problem.predicates[predicate.index()].name;
+        Deleted::Value(format!(
+            "(= {} undefined)",
+            problem.apply_name(name, arguments)
+        ))
     }
 
     /// The number as a decimal where that is exact, else as [`ProblemText::digits`] says.

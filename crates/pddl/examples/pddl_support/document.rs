@@ -73,6 +73,19 @@ const SUPPORTED: &[(&str, &str)] = &[
         "Open numbers",
         "`:synth-parameters`, of a domain or of an action",
     ),
+    (
+        "Control parameters",
+        "`:control (?cash - number)` of an action: numbers that the plan chooses. In a plan they \
+         stand behind the objects: `0.0: (withdraw ann 12.5) [2]`. Read and judged; planner, \
+         networks, envelopes, repairs, odds and runs refuse such domains by name",
+    ),
+    (
+        "Object fluents",
+        "functions whose values are objects (PDDL 3.1), as predicates with the value as last \
+         argument: `(= (f a) v)`, `(assign (f a) v)`, `undefined`, and `(change (f a) v)` of TFD, \
+         which leaves no value while a durative action runs; in conditions, `(f a)` may stand as an \
+         argument. All that treats predicates treats them",
+    ),
 ];
 
 /// What constraints mean where papers and programs leave it open.

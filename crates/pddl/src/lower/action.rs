@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use elbowroom_model::problem::{Body, Condition, Schema, SchemaId};
 
-use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::effect::{Around, Effects, Moment};
 use crate::lower::scope::Scope;
@@ -67,6 +66,11 @@ impl Reader {
                 .advise("give each action its own name");
         }
         self.schema_spans.push(span);
+        if !scope.controls.is_empty() {
+            self.problem
+                .controls
+                .insert(id, std::mem::take(&mut scope.controls));
+        }
         self.action_preferences(std::mem::take(&mut scope.soft), id);
         self.problem.schemas.push(Schema {
             name: name.into_owned(),
@@ -131,17 +135,17 @@ impl Reader {
         if let Some((_, Some(node))) = fields.get(":synth-parameters") {
             scope.unknowns = self.unknowns(node.list().unwrap_or(std::slice::from_ref(node)));
         }
-        if let Some((span, value)) = fields.get(":control") {
-            self.report
-                .unsupported(
-                    Feature::ControlParameters,
-                    *span,
-                    "`:control` parameters are not supported",
-                )
-                .advise("a number that stays open can be a `:synth-parameters` entry");
-            for name in value.and_then(Node::list).unwrap_or_default() {
-                scope.controls.extend(name.lower().map(String::from));
+        if let Some((_, Some(node))) = fields.get(":control") {
+            let first = scope.unknowns.len();
+            for name in self.unknowns(node.list().unwrap_or(std::slice::from_ref(node))) {
+                if scope.unknowns.contains(&name) {
+                    self.report
+                        .error(node.span, format!("`{name}` is declared twice"));
+                }
+                scope.unknowns.push(name);
             }
+            let all = (0_u32..).take(scope.unknowns.len());
+            scope.controls = all.skip(first).collect();
         }
         scope
     }

@@ -21,12 +21,23 @@ impl Reader {
             return Condition::TRUE;
         };
         if let Some(comparison) = comparison(&head) {
-            return self.comparison(comparison, node, parts, scope);
+            if let (Comparison::Equal, [left, right]) = (comparison, parts) {
+                for (fluent, value) in [(left, right), (right, left)] {
+                    if self.is_application(fluent) {
+                        return self.has_value(fluent, value, scope);
+                    }
+                }
+            }
+            return self.with_values(parts, scope, |reader, scope| {
+                reader.comparison(comparison, node, parts, scope)
+            });
         }
         if self.names.predicates.contains_key(head.as_ref()) && !is_connective(&head) {
-            return self
-                .atom(node, scope)
-                .map_or(Condition::TRUE, Condition::Atom);
+            return self.with_values(parts, scope, |reader, scope| {
+                reader
+                    .atom(node, scope)
+                    .map_or(Condition::TRUE, Condition::Atom)
+            });
         }
         match (head.as_ref(), parts) {
             ("and", _) => {
@@ -159,9 +170,7 @@ impl Reader {
                     || self.names.functions.contains_key(word.as_ref())
                     || self.problem.unknowns.contains(&word.into_owned())
             }
-            None => node
-                .form()
-                .is_some_and(|(head, _)| !self.names.object_functions.contains(head.as_ref())),
+            None => node.form().is_some() && !self.is_application(node),
         }
     }
 

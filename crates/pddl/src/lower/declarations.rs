@@ -1,13 +1,12 @@
 //! Constants, objects, predicates, functions, unknowns.
 
 use elbowroom_model::problem::{
-    Function, FunctionId, Object, ObjectId, Predicate, PredicateId, TypeId,
+    Function, FunctionId, Object, ObjectId, Predicate, PredicateId, TypeId, Variable,
 };
 
-use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::sections::Section;
-use crate::lower::typed_list::MOST_VARIABLES;
+use crate::lower::typed_list::{MOST_VARIABLES, Typed};
 use crate::source::Span;
 use crate::syntax::Node;
 
@@ -91,20 +90,12 @@ impl Reader {
             let Some((name, parameters)) = self.declared_head(entry.node) else {
                 continue;
             };
-            if let Some((ty, span)) = entry.types.iter().find(|(ty, _)| ty != "number") {
-                self.report
-                    .unsupported(
-                        Feature::ObjectFluents,
-                        *span,
-                        format!(
-                            "`{name}` has values of type `{ty}`: object fluents are not supported"
-                        ),
-                    )
-                    .advise("use a predicate with one more argument");
-                self.names.object_functions.insert(name);
+            let is_object = entry.types.iter().any(|(ty, _)| ty != "number");
+            let parameters = self.variables(parameters);
+            if is_object {
+                self.object_function(name, parameters, &entry);
                 continue;
             }
-            let parameters = self.variables(parameters);
             let same = self.names.functions.entry(name.clone()).or_default();
             let again = same
                 .iter()
@@ -117,6 +108,39 @@ impl Reader {
                 self.problem.functions.push(Function { name, parameters });
             }
         }
+    }
+
+    /// A function whose values are objects: a predicate with the value as its last argument.
+    fn object_function(&mut self, name: String, mut parameters: Vec<Variable>, entry: &Typed) {
+        if let Some((_, span)) = entry.types.iter().find(|(ty, _)| ty == "number") {
+            self.report
+                .error(
+                    *span,
+                    format!("the values of `{name}` are numbers or objects"),
+                )
+                .advise("declare two functions");
+        }
+        let types = self.resolve_types(&entry.types);
+        let same = self.names.object_functions.entry(name.clone()).or_default();
+        let count = parameters.len() + 1;
+        let known = |id: &PredicateId| self.problem.predicates[id.index()].parameters.len();
+        if same.iter().any(|id| known(id) == count) {
+            self.report
+                .warning(entry.node.span, format!("`{name}` is declared already"));
+            return;
+        }
+        parameters.push(Variable {
+            name: format!("?{name}"),
+            types,
+        });
+        let id = PredicateId::from(self.problem.predicates.len());
+        same.push(id);
+        self.problem.object_functions.push(id);
+        self.problem.predicates.push(Predicate {
+            name,
+            parameters,
+            is_derived: false,
+        });
     }
 
     /// `(name parameter …)` of a predicate or function.

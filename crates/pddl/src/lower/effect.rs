@@ -40,12 +40,12 @@ pub(super) struct Effects {
 /// The quantifiers and conditions that stand around an effect.
 #[derive(Debug, Default)]
 pub(super) struct Around {
-    variables: Vec<Variable>,
-    whens: Vec<When>,
+    pub(super) variables: Vec<Variable>,
+    pub(super) whens: Vec<When>,
 }
 
 #[derive(Debug)]
-struct When {
+pub(super) struct When {
     /// Parts without time specifier are filed under the time of the `at` around them.
     condition: Timed,
     /// The number of variables that were in scope.
@@ -160,8 +160,10 @@ impl Reader {
         around: &Around,
         effects: &mut Effects,
     ) {
-        if head == "change" {
-            self.object_change(node, parts);
+        if matches!(head, "change" | "assign")
+            && parts.first().is_some_and(|part| self.is_application(part))
+        {
+            self.object_assignment(head, node, parts, moment, (scope, around), effects);
             return;
         }
         let operator = operator(head);
@@ -285,7 +287,7 @@ impl Reader {
 
     /// What the `when`s around an effect mean at its moment. `None`, with a report, if the
     /// effect would have to look into the future.
-    fn guard(
+    pub(super) fn guard(
         &mut self,
         around: &Around,
         moment: Moment,
@@ -344,20 +346,7 @@ impl Reader {
         Some(guard)
     }
 
-    /// `(change (f …) object)`, an assignment to an object fluent.
-    fn object_change(&mut self, node: &Node, parts: &[Node]) {
-        let is_refused = parts
-            .first()
-            .and_then(Node::form)
-            .is_some_and(|(head, _)| self.names.object_functions.contains(head.as_ref()));
-        if !is_refused {
-            self.report
-                .error(node.head_span(), "`change` is not an effect")
-                .suggest(Some("assign"));
-        }
-    }
-
-    fn wrong_update(&mut self, operator: UpdateOperator, node: &Node) {
+    pub(super) fn wrong_update(&mut self, operator: UpdateOperator, node: &Node) {
         let name = operator.name();
         self.report
             .error(node.span, format!("`{name}` takes a fluent and a value"))

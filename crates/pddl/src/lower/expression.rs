@@ -133,11 +133,9 @@ impl Reader {
         if let Some(position) = position(&self.problem.unknowns, word) {
             return Expression::Unknown(Unknown::Domain(position));
         }
-        if !scope.controls.contains(word) {
-            self.report
-                .error(node.span, format!("unknown number `{word}`"))
-                .advise("numbers that stay open are declared under `:synth-parameters`");
-        }
+        self.report
+            .error(node.span, format!("unknown number `{word}`"))
+            .advise("numbers that stay open are declared under `:synth-parameters`");
         WRONG
     }
 

@@ -84,6 +84,11 @@ impl Reader {
                     .error(node.span, "this timed initial cannot be understood")
                     .advise(format!("write {text}"));
             }
+            Some((head, [fluent, _]))
+                if matches!(head.as_ref(), "=" | "assign") && self.is_application(fluent) =>
+            {
+                self.initial_object(node);
+            }
             _ => match self.initial_change(node) {
                 // What is not said to be true is false anyway.
                 None | Some(TimedChange::Delete(..)) => {}
@@ -117,6 +122,13 @@ impl Reader {
                 .error(time_node.span, "a time before 0")
                 .advise("the plan begins at time 0");
         }
+        if let Some((head, [fluent, _])) = content.form()
+            && matches!(head.as_ref(), "=" | "assign")
+            && self.is_application(fluent)
+        {
+            self.timed_object(&time, time_node.span, content);
+            return;
+        }
         let Some(change) = self.initial_change(content) else {
             return;
         };
@@ -134,7 +146,12 @@ impl Reader {
 
     /// Two changes of one time have no order (PDDL 2.1's rule of no moving targets), so one fact
     /// cannot become both true and false, nor one fluent get two values.
-    fn refuse_contradiction(&mut self, time: &Rational, change: &TimedChange, content: &Node) {
+    pub(super) fn refuse_contradiction(
+        &mut self,
+        time: &Rational,
+        change: &TimedChange,
+        content: &Node,
+    ) {
         let contradicts = |other: &TimedInitial| {
             other.time == *time
                 && other.change != *change

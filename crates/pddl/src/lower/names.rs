@@ -1,6 +1,6 @@
 //! Which names are declared, and what they stand for.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use elbowroom_model::Problem;
 use elbowroom_model::problem::{FunctionId, ObjectId, PredicateId, SchemaId, TypeId};
@@ -14,9 +14,9 @@ pub(super) struct Names {
     pub(super) predicates: BTreeMap<String, Vec<PredicateId>>,
     /// As for predicates.
     pub(super) functions: BTreeMap<String, Vec<FunctionId>>,
-    /// Functions whose values are objects. They are refused where they are declared, so their
-    /// uses need no further diagnostic.
-    pub(super) object_functions: BTreeSet<String>,
+    /// Functions whose values are objects: the predicates that stand for them, which may share a
+    /// name as functions may.
+    pub(super) object_functions: BTreeMap<String, Vec<PredicateId>>,
     pub(super) schemas: BTreeMap<String, SchemaId>,
 }
 
@@ -31,8 +31,15 @@ impl Names {
             names.objects.insert(named.name.clone(), ObjectId(id));
         }
         for (id, named) in (0..).zip(&problem.predicates) {
-            let same = names.predicates.entry(named.name.clone()).or_default();
-            same.push(PredicateId(id));
+            let is_function = problem.object_functions.contains(&PredicateId(id));
+            let list = if is_function {
+                &mut names.object_functions
+            } else {
+                &mut names.predicates
+            };
+            list.entry(named.name.clone())
+                .or_default()
+                .push(PredicateId(id));
         }
         for (id, named) in (0..).zip(&problem.functions) {
             let same = names.functions.entry(named.name.clone()).or_default();

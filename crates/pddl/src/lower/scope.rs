@@ -1,6 +1,6 @@
 //! What can be named at one place of a text.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use elbowroom_model::problem::{Term, Unknown, Variable};
 
@@ -12,10 +12,13 @@ pub(super) struct Scope {
     /// Parameters, then the variables of enclosing quantifiers; the order that
     /// [`Term::Variable`] counts in.
     pub(super) variables: Vec<Variable>,
-    /// `:synth-parameters` of the action.
+    /// `:synth-parameters` and `:control` parameters of the action.
     pub(super) unknowns: Vec<String>,
-    /// `:control` parameters. They are refused where they are declared.
-    pub(super) controls: BTreeSet<String>,
+    /// Which of the unknowns are `:control` parameters.
+    pub(super) controls: Vec<u32>,
+    /// The values of object functions that stand as arguments, by the place of the application:
+    /// which variable has the value.
+    pub(super) values: BTreeMap<(usize, usize), usize>,
     /// Whether `?duration` means something.
     pub(super) has_duration: bool,
     /// Whether `total-time` means something.

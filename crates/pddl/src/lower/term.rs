@@ -43,9 +43,6 @@ impl Reader {
                 .advise("expected `(function argument …)`");
             return None;
         };
-        if self.names.object_functions.contains(name.as_ref()) {
-            return None;
-        }
         let Some(overloads) = self.names.functions.get(name.as_ref()) else {
             self.unknown_function(&name, node);
             return None;
@@ -65,10 +62,12 @@ impl Reader {
     /// A variable or an object. `None`, with a report, if it is neither.
     pub(super) fn term(&mut self, node: &Node, scope: &Scope) -> Option<Term> {
         let Some(word) = node.lower() else {
-            let is_object_fluent = node
-                .form()
-                .is_some_and(|(head, _)| self.names.object_functions.contains(head.as_ref()));
-            if !is_object_fluent {
+            if let Some(value) = scope.values.get(&(node.span.start, node.span.end)) {
+                return Some(Term::Variable(*value));
+            }
+            if self.is_application(node) {
+                self.refuse_value(node);
+            } else {
                 self.report
                     .error(node.span, format!("unexpected `{}`", node.quote()))
                     .advise("expected the name of an object, or a `?variable`");
@@ -112,7 +111,7 @@ impl Reader {
     }
 
     /// The arguments, as many and of the types that the parameters ask for.
-    fn arguments(
+    pub(super) fn arguments(
         &mut self,
         name: &str,
         node: &Node,
@@ -201,13 +200,18 @@ impl Reader {
     }
 
     fn unknown_predicate(&mut self, name: &str, node: &Node) {
-        // Object fluents are refused where they are declared.
-        if self.names.object_functions.contains(name) {
-            return;
-        }
         let near = self
             .report
             .nearest(name, self.names.predicates.keys().map(String::as_str));
+        if self.names.object_functions.contains_key(name) {
+            self.report
+                .error(
+                    node.head_span(),
+                    format!("`{name}` is a function, and no predicate"),
+                )
+                .advise("compare its value with an object, as in `(= (f) object)`");
+            return;
+        }
         let is_function = self.names.functions.contains_key(name);
         let diagnostic = self
             .report
@@ -226,6 +230,15 @@ impl Reader {
             .report
             .nearest(name, self.names.functions.keys().map(String::as_str));
         let is_predicate = self.names.predicates.contains_key(name);
+        if self.names.object_functions.contains_key(name) {
+            self.report
+                .error(
+                    node.head_span(),
+                    format!("the values of `{name}` are objects, not numbers"),
+                )
+                .advise("compare it with an object, as in `(= (f) object)`");
+            return;
+        }
         let diagnostic = self
             .report
             .error(node.head_span(), format!("unknown function `{name}`"));

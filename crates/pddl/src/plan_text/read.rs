@@ -5,12 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::ops::Range;
 
-use elbowroom_model::problem::{FunctionId, ObjectId, SchemaId};
+use elbowroom_model::ground::{Action, Expression};
+use elbowroom_model::problem::{FunctionId, ObjectId, SchemaId, Unknown};
 use elbowroom_model::{Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use crate::plan_text::duration::{changing_functions, only_duration};
 use crate::plan_text::line::{Line, RawStep, Word, line};
+use crate::plan_text::write::decimal;
 use crate::report::Report;
 use crate::source::{FileId, Span};
 use elbowroom_text::Source;
@@ -150,12 +152,14 @@ impl<'a> PlanReader<'a> {
         };
         let (name, arguments) = raw.words.split_first()?;
         let schema = self.schema(name);
+        let (arguments, chosen) = self.apart(schema, arguments);
         let arguments: Vec<_> = arguments.iter().map(|word| self.object(word)).collect();
         let duration = raw.duration.as_ref().map(|word| self.time(word));
         let schema = schema?;
+        let controls = self.controls(schema, name, chosen)?;
         let arguments = arguments.into_iter().collect::<Option<Vec<_>>>()?;
         let action = match self.task.instantiate(schema, &arguments) {
-            Ok(action) => action,
+            Ok(action) => chosen_by_plan(action, &controls),
             Err(error) => {
                 let end = raw.words.last().map_or(name.range.end, |w| w.range.end);
                 let expected = self.signature(schema);
@@ -261,6 +265,62 @@ impl<'a> PlanReader<'a> {
         found
     }
 
+    /// The words for objects, and those for `:control` parameters behind them.
+    fn apart<'w>(
+        &self,
+        schema: Option<SchemaId>,
+        words: &'w [Word<'a>],
+    ) -> (&'w [Word<'a>], &'w [Word<'a>]) {
+        let problem = self.task.problem();
+        match schema {
+            Some(schema) if problem.controls.contains_key(&schema) => {
+                let objects = problem.schemas[schema.index()].parameters.len();
+                words.split_at(objects.min(words.len()))
+            }
+            _ => (words, &[]),
+        }
+    }
+
+    /// The numbers that the plan chooses for the `:control` parameters of an action, by unknown.
+    fn controls(
+        &mut self,
+        schema: SchemaId,
+        name: &Word,
+        words: &[Word],
+    ) -> Option<Vec<(u32, Rational)>> {
+        let task = self.task;
+        let Some(controls) = task.problem().controls.get(&schema) else {
+            return Some(Vec::new());
+        };
+        if controls.len() != words.len() {
+            let expected = self.signature(schema);
+            let end = words.last().map_or(name.range.end, |word| word.range.end);
+            let message = format!(
+                "`{}` chooses {} of its {} numbers here",
+                name.text,
+                words.len(),
+                controls.len()
+            );
+            self.report
+                .error(span(&(name.range.start..end)), message)
+                .advise(format!(
+                    "expected `{expected}`, with the numbers behind the objects"
+                ));
+            return None;
+        }
+        let mut chosen = Vec::with_capacity(controls.len());
+        for (control, word) in controls.iter().zip(words) {
+            match word.text.parse::<Rational>() {
+                Ok(value) => chosen.push((*control, value)),
+                Err(error) => {
+                    self.report.error(span(&word.range), error.to_string());
+                    return None;
+                }
+            }
+        }
+        Some(chosen)
+    }
+
     fn object(&mut self, word: &Word) -> Option<ObjectId> {
         let name = word.text.to_ascii_lowercase();
         let found = self.objects.get(&name).copied();
@@ -277,9 +337,9 @@ impl<'a> PlanReader<'a> {
     }
 
     /// `(name ?x - type …)`
-    fn signature(&self, schema: SchemaId) -> String {
+    fn signature(&self, id: SchemaId) -> String {
         let problem = self.task.problem();
-        let schema = &problem.schemas[schema.index()];
+        let schema = &problem.schemas[id.index()];
         let mut text = format!("({}", schema.name);
         for parameter in &schema.parameters {
             let types: Vec<_> = parameter
@@ -290,9 +350,33 @@ impl<'a> PlanReader<'a> {
             // Writing to a string cannot fail.
             let _ = write!(text, " {} - {}", parameter.name, types.join(" or "));
         }
+        for control in problem.controls.get(&id).into_iter().flatten() {
+            let _ = write!(text, " {} - number", schema.unknowns[*control as usize]);
+        }
         text.push(')');
         text
     }
+}
+
+/// The action with these numbers in the place of its `:control` parameters, and in its name.
+fn chosen_by_plan(action: Action, controls: &[(u32, Rational)]) -> Action {
+    if controls.is_empty() {
+        return action;
+    }
+    let mut chosen = action.map_leaves(&mut |leaf| match leaf {
+        Expression::Unknown(Unknown::Action(index)) => {
+            let (_, value) = controls.iter().find(|(control, _)| control == index)?;
+            Some(Expression::Constant(value.clone()))
+        }
+        _ => None,
+    });
+    chosen.name.pop();
+    for (_, value) in controls {
+        chosen.name.push(' ');
+        chosen.name.push_str(&decimal(value));
+    }
+    chosen.name.push(')');
+    chosen
 }
 
 fn is_timed(line: &Line) -> bool {

@@ -23,7 +23,12 @@ pub fn write_plan(task: &Task, plan: &TimeTriggeredPlan) -> String {
         let action = &step.action;
         text.push_str(&decimal(&step.start));
         text.push_str(": ");
-        text.push_str(&task.action_name(action.schema, &action.arguments));
+        if task.problem().controls.contains_key(&action.schema) {
+            // The numbers that the plan chooses stand in the name only.
+            text.push_str(&action.name);
+        } else {
+            text.push_str(&task.action_name(action.schema, &action.arguments));
+        }
         if let Some(duration) = &step.duration {
             // Writing to a string cannot fail.
             let _ = write!(text, " [{}]", decimal(duration));
@@ -34,7 +39,7 @@ pub fn write_plan(task: &Task, plan: &TimeTriggeredPlan) -> String {
 }
 
 /// The number, exactly: in decimals with at least three digits behind the point, or as `p/q`.
-fn decimal(value: &Rational) -> String {
+pub(super) fn decimal(value: &Rational) -> String {
     let is_exact = |text: &String| text.parse().is_ok_and(|read: Rational| read == *value);
     let Some(mut text) = [18, MOST_DIGITS]
         .map(|digits| value.to_decimal(digits))

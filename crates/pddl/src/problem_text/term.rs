@@ -29,6 +29,12 @@ impl Writer<'_> {
     pub(super) fn condition<'a>(&self, condition: &'a Condition, names: &mut Names<'a>) -> String {
         let problem = self.task.problem();
         match condition {
+            Condition::Atom(atom) if problem.object_functions.contains(&atom.predicate) => {
+                let name = &problem.predicates[atom.predicate.index()].name;
+                let whole = self.applied(name, &atom.arguments, names);
+                let (application, value) = whole.rsplit_once(' ').unwrap_or((&whole, ")"));
+                format!("(= {application}) {value}")
+            }
             Condition::Atom(atom) => {
                 let name = &problem.predicates[atom.predicate.index()].name;
                 self.applied(name, &atom.arguments, names)

@@ -1,0 +1,315 @@
+//! Functions whose values are objects (PDDL 3.1), as predicates with the value as last argument.
+//!
+//! `(= (f a) v)` is a fact, and an assignment deletes all values and adds one. In conditions, the
+//! value of such a function may stand as an argument: `(p (f a))` says that some value of `(f a)`
+//! has `p`.
+
+use elbowroom_model::problem::{
+    Atom, Change, Condition, Effect, ObjectId, PredicateId, Term, TimedChange, TimedInitial,
+    Variable,
+};
+use elbowroom_num::Rational;
+
+use crate::feature::Feature;
+use crate::lower::Reader;
+use crate::lower::effect::{Around, Effects, Moment};
+use crate::lower::scope::Scope;
+use crate::source::Span;
+use crate::syntax::Node;
+
+/// What a function has for a value that has none (PDDL 3.1).
+pub(super) const UNDEFINED: &str = "undefined";
+
+impl Reader {
+    /// Whether an object function is applied here.
+    pub(super) fn is_application(&self, node: &Node) -> bool {
+        !self.names.object_functions.is_empty()
+            && node.form().is_some_and(|(head, _)| {
+                self.names.object_functions.contains_key(head.as_ref())
+                    // A predicate of that name has one argument more or less, or stands elsewhere.
+                    && !self.names.functions.contains_key(head.as_ref())
+            })
+    }
+
+    /// The predicate of an application, and its arguments without the value.
+    fn application(&mut self, node: &Node, scope: &Scope) -> Option<(PredicateId, Vec<Term>)> {
+        let (name, arguments) = node.form()?;
+        let overloads = self.names.object_functions.get(name.as_ref())?;
+        let count = |id: PredicateId| self.problem.predicates[id.index()].parameters.len();
+        let fits = |id: &&PredicateId| count(**id) == arguments.len() + 1;
+        let predicate = *overloads.iter().find(fits).unwrap_or(&overloads[0]);
+        let parameters = &self.problem.predicates[predicate.index()].parameters;
+        let parameters = parameters[..parameters.len() - 1].to_vec();
+        let arguments = self.arguments(&name, node, arguments, &parameters, scope)?;
+        Some((predicate, arguments))
+    }
+
+    /// The variable that stands for the value of a function.
+    fn value_variable(&self, predicate: PredicateId) -> Variable {
+        let parameters = &self.problem.predicates[predicate.index()].parameters;
+        parameters
+            .last()
+            .expect("an object function has a value")
+            .clone()
+    }
+
+    /// Reads a condition in which object functions may be applied where arguments stand.
+    pub(super) fn with_values<'n, 's: 'n>(
+        &mut self,
+        parts: impl IntoIterator<Item = &'n Node<'s>>,
+        scope: &mut Scope,
+        read: impl FnOnce(&mut Self, &mut Scope) -> Condition,
+    ) -> Condition {
+        if self.names.object_functions.is_empty() {
+            return read(self, scope);
+        }
+        let outside = scope.variables.len();
+        let mut all = Vec::new();
+        for part in parts {
+            self.name_values(part, scope, &mut all);
+        }
+        let condition = read(self, scope);
+        let variables = scope.variables.split_off(outside);
+        scope.values.retain(|_, variable| *variable < outside);
+        if variables.is_empty() {
+            return condition;
+        }
+        all.push(condition);
+        Condition::Exists(variables, Box::new(Condition::And(all)))
+    }
+
+    /// Gives each value in a node a variable, inner ones first, and says whose value it is.
+    fn name_values(&mut self, node: &Node, scope: &mut Scope, all: &mut Vec<Condition>) {
+        for part in node.list().unwrap_or_default() {
+            self.name_values(part, scope, all);
+        }
+        if !self.is_application(node) {
+            return;
+        }
+        let Some((predicate, mut arguments)) = self.application(node, scope) else {
+            return;
+        };
+        let position = scope.variables.len();
+        scope.variables.push(self.value_variable(predicate));
+        scope
+            .values
+            .insert((node.span.start, node.span.end), position);
+        arguments.push(Term::Variable(position));
+        all.push(Condition::Atom(Atom {
+            predicate,
+            arguments,
+        }));
+    }
+
+    /// `(= (f a) v)`, or `(= (f a) undefined)`
+    pub(super) fn has_value(
+        &mut self,
+        fluent: &Node,
+        value: &Node,
+        scope: &mut Scope,
+    ) -> Condition {
+        let arguments = fluent.form().map_or(&[][..], |(_, arguments)| arguments);
+        let parts = arguments.iter().chain([value]);
+        self.with_values(parts, scope, |reader, scope| {
+            let Some((predicate, mut arguments)) = reader.application(fluent, scope) else {
+                return Condition::TRUE;
+            };
+            let is_undefined = value.is(UNDEFINED);
+            arguments.push(if is_undefined {
+                Term::Variable(scope.variables.len())
+            } else {
+                match reader.term(value, scope) {
+                    Some(value) => value,
+                    None => return Condition::TRUE,
+                }
+            });
+            let atom = Condition::Atom(Atom {
+                predicate,
+                arguments,
+            });
+            if is_undefined {
+                let value = reader.value_variable(predicate);
+                Condition::Not(Box::new(Condition::Exists(vec![value], Box::new(atom))))
+            } else {
+                atom
+            }
+        })
+    }
+
+    /// Refuses the value of a function where only names can stand.
+    pub(super) fn refuse_value(&mut self, node: &Node) {
+        self.report
+            .unsupported(
+                Feature::ObjectFluents,
+                node.span,
+                format!("the value of `{}` cannot stand here", node.quote()),
+            )
+            .advise("add a parameter `?x` and the condition `(= (f …) ?x)`, and write `?x` here");
+    }
+
+    /// `(assign (f a) v)`, or `(change (f a) v)` of TFD: without a time specifier, from the start of
+    /// a durative action until its end there is no value.
+    pub(super) fn object_assignment(
+        &mut self,
+        head: &str,
+        node: &Node,
+        parts: &[Node],
+        moment: Moment,
+        (scope, around): (&Scope, &Around),
+        effects: &mut Effects,
+    ) {
+        let [fluent, value] = parts else {
+            self.report
+                .error(node.span, format!("`{head}` takes a fluent and a value"))
+                .advise(format!("expected `({head} (function argument …) object)`"));
+            return;
+        };
+        let application = self.application(fluent, scope);
+        let value = if value.is(UNDEFINED) {
+            Some(None)
+        } else {
+            self.term(value, scope).map(Some)
+        };
+        let (Some((predicate, arguments)), Some(value)) = (application, value) else {
+            return;
+        };
+        let [lost, gained] = match moment {
+            Moment::Instant | Moment::Start | Moment::End => [moment, moment],
+            Moment::Unspecified if head == "change" => [Moment::Start, Moment::End],
+            Moment::Unspecified | Moment::Process => {
+                self.missing_moment(node);
+                return;
+            }
+        };
+        self.lose(predicate, &arguments, node, lost, (scope, around), effects);
+        let Some(value) = value else {
+            return;
+        };
+        if let Some(guard) = self.guard(around, gained, scope, node) {
+            let mut arguments = arguments;
+            arguments.push(value);
+            let atom = Atom {
+                predicate,
+                arguments,
+            };
+            effects.at(gained).push(Effect {
+                variables: around.variables.clone(),
+                guard,
+                change: Change::Add(atom),
+            });
+        }
+    }
+
+    /// Deletes all values of a function.
+    fn lose(
+        &mut self,
+        predicate: PredicateId,
+        arguments: &[Term],
+        node: &Node,
+        moment: Moment,
+        (scope, around): (&Scope, &Around),
+        effects: &mut Effects,
+    ) {
+        let value = self.value_variable(predicate);
+        let mut inner = Scope {
+            variables: scope.variables.clone(),
+            ..Scope::default()
+        };
+        let mut arguments = arguments.to_vec();
+        arguments.push(Term::Variable(inner.variables.len()));
+        inner.variables.push(value.clone());
+        let Some(guard) = self.guard(around, moment, &inner, node) else {
+            return;
+        };
+        let mut variables = around.variables.clone();
+        variables.push(value);
+        let atom = Atom {
+            predicate,
+            arguments,
+        };
+        effects.at(moment).push(Effect {
+            variables,
+            guard,
+            change: Change::Delete(atom),
+        });
+    }
+
+    /// The function, its arguments, and the value that it gets; no value for `undefined`.
+    fn object_value(
+        &mut self,
+        node: &Node,
+    ) -> Option<(PredicateId, Vec<ObjectId>, Option<ObjectId>)> {
+        let [fluent, value] = node.form()?.1 else {
+            return None;
+        };
+        let scope = Scope::default();
+        let (predicate, arguments) = self.application(fluent, &scope)?;
+        let arguments = Self::objects_only(&arguments)?;
+        if value.is(UNDEFINED) {
+            return Some((predicate, arguments, None));
+        }
+        match self.term(value, &scope)? {
+            Term::Object(value) => Some((predicate, arguments, Some(value))),
+            Term::Variable(_) => None,
+        }
+    }
+
+    /// `(= (f a) v)` in the initial state.
+    pub(super) fn initial_object(&mut self, node: &Node) {
+        let Some((predicate, mut arguments, value)) = self.object_value(node) else {
+            return;
+        };
+        let facts = &mut self.problem.initial_facts;
+        let before = facts.len();
+        facts.retain(|(other, own)| *other != predicate || !own.starts_with(&arguments));
+        if facts.len() < before {
+            self.report
+                .warning(node.span, "a second initial value of this fluent")
+                .advise("the last one counts");
+        }
+        if let Some(value) = value {
+            arguments.push(value);
+            self.problem.initial_facts.push((predicate, arguments));
+        }
+    }
+
+    /// `(at 10 (= (f a) v))`: all other values are lost then.
+    pub(super) fn timed_object(&mut self, time: &Rational, span: Span, node: &Node) {
+        if time.is_zero() {
+            self.report
+                .warning(span, "at time 0: read as part of the initial state");
+            self.initial_object(node);
+            return;
+        }
+        let Some((predicate, arguments, value)) = self.object_value(node) else {
+            return;
+        };
+        let types = self.value_variable(predicate).types;
+        let objects: Vec<_> = self.problem.objects_of(&types).collect();
+        for object in objects {
+            let mut arguments = arguments.clone();
+            arguments.push(object);
+            let change = if value == Some(object) {
+                TimedChange::Add(predicate, arguments)
+            } else {
+                TimedChange::Delete(predicate, arguments)
+            };
+            self.refuse_contradiction(time, &change, node);
+            self.problem.timed.push(TimedInitial {
+                time: time.clone(),
+                change,
+            });
+        }
+    }
+}
+
+impl Effects {
+    /// The effects of a moment that has some at once.
+    fn at(&mut self, moment: Moment) -> &mut Vec<Effect> {
+        match moment {
+            Moment::Start => &mut self.start,
+            Moment::End => &mut self.end,
+            Moment::Instant | Moment::Unspecified | Moment::Process => &mut self.instant,
+        }
+    }
+}
