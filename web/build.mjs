@@ -8,7 +8,7 @@ import { execFileSync } from "node:child_process";
 import { existsSync, mkdirSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
-import { gzipSync } from "node:zlib";
+import { gzipAsync } from "@gfx/zopfli";
 import { build } from "esbuild";
 import { chapters } from "./tutorial.mjs";
 
@@ -22,7 +22,8 @@ if (!file) {
   file = join(process.env.CARGO_TARGET_DIR ?? join(root, "target"), "wasm32-unknown-unknown/web/elbowroom_web.wasm");
 }
 const plain = readFileSync(file);
-const module = gzipSync(plain, { level: 9 });
+// Browsers unpack gzip by themselves; Zopfli finds a shorter text of it.
+const module = await gzipAsync(plain, { numiterations: 5 });
 
 // The examples are the cases that the library is tested with.
 const examples = readdirSync(join(root, "cases")).sort().map((name) => {
@@ -57,11 +58,12 @@ const script = await bundle("main.ts", [
 const parts = {
   "{style}": readFileSync(join(source, "page.css"), "utf8"),
   "{script}": script,
-  "{module}": module.toString("base64"),
+  "{module}": Buffer.from(module).toString("base64"),
 };
 // What is put in is not searched: it may have anything in it.
 const page = readFileSync(join(source, "index.html"), "utf8").split(/(\{style\}|\{script\}|\{module\})/).map((part) => parts[part] ?? part).join("");
 mkdirSync(join(here, "dist"), { recursive: true });
 writeFileSync(join(here, "dist", "index.html"), page);
+writeFileSync(join(here, "dist", "elbowroom_web.wasm.gz"), module);
 const size = (bytes) => `${(bytes / 1e6).toFixed(2)} MB`;
 console.log(`dist/index.html: ${size(page.length)}, of which the module ${size(plain.length)} (${size(module.length)} compressed)`);
