@@ -54,6 +54,12 @@ pub trait Executor: Send {
     fn window(&self, _step: StepId, _is_end: bool) -> Option<Planned> {
         None
     }
+
+    /// One more of it, as it stands, which decides as this one would: to try out what comes of
+    /// going on. `None` if it cannot be had.
+    fn fork(&self) -> Option<Box<dyn Executor>> {
+        None
+    }
 }
 
 /// The time window of a happening.

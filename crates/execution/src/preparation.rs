@@ -106,4 +106,9 @@ pub trait Region: Send {
         plan: &ParametrizedPlan,
         values: &Valuation,
     ) -> Option<String>;
+
+    /// One more of it; `None` if it cannot be had.
+    fn fork(&self) -> Option<Box<dyn Region>> {
+        None
+    }
 }

@@ -111,6 +111,16 @@ impl Progression {
         &self.task
     }
 
+    /// The same state, of a task whose table of facts grows by itself: for what is only thought of.
+    #[must_use]
+    pub fn with_own_table(&self) -> Self {
+        let task = Arc::new(self.task.with_own_table());
+        Self {
+            task,
+            ..self.clone()
+        }
+    }
+
     /// The same state, of a task that differs in its goal alone.
     pub(crate) fn pursue(&mut self, task: &Arc<Task>) {
         self.task = Arc::clone(task);

@@ -35,10 +35,12 @@
 
 mod account;
 mod agenda;
+mod amid;
 mod dead_end;
 mod drive;
 mod farewell;
 mod handover;
+pub mod here;
 mod intake;
 mod lasting;
 mod progress;
@@ -51,6 +53,7 @@ use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 pub use account::{Account, ExecutedStep};
+pub use amid::{Amid, Beginning};
 pub use drive::{Next, NotAsked};
 pub use farewell::FAREWELL;
 pub use lasting::{FIRST_GOAL, GoalReader};
@@ -59,7 +62,7 @@ pub use settings::{
 };
 
 use crate::event::{Command, Ticket};
-use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
+use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned};
 use crate::planning::Planner;
 use crate::preparation::{PrepareError, Preparer};
 use crate::progression::{Outlook, Progression};
@@ -407,26 +410,8 @@ impl<'a> Run<'a> {
         situation: &Situation,
         running: &[Ticket],
     ) -> Result<Mission, PrepareError> {
-        let task = Arc::new(situation.rest_of_task(&self.task));
-        // What is running comes first in it.
-        let plan = situation.rest_of_plan(plan);
-        let prepared = self
-            .ports
-            .preparer
-            .prepare(&task, &plan, self.ports.executor.need())?;
-        let steps = prepared.instances.iter().copied().map(StepId::from);
-        Ok(Mission {
-            running: steps.zip(running.iter().copied()).collect(),
-            task,
-            origin: situation.time.clone(),
-            now: self.now.clone(),
-            time_triggered: plan,
-            plan: prepared.plan,
-            instances: prepared.instances,
-            nominal: prepared.nominal,
-            envelope: prepared.envelope,
-            forms: prepared.forms,
-            order: prepared.order,
-        })
+        let (preparer, need) = (&mut self.ports.preparer, self.ports.executor.need());
+        let here = (&*self.task, situation, running);
+        here::mission(here, plan, &self.now, &mut **preparer, need)
     }
 }

@@ -218,4 +218,8 @@ impl Region for WholeRegion {
         let envelope = DecoupledEnvelope::point(values);
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }
+
+    fn fork(&self) -> Option<Box<dyn Region>> {
+        Some(Box::new(*self))
+    }
 }

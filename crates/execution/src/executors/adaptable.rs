@@ -45,6 +45,7 @@ pub(super) const REGISTERED: Registered = Registered {
 const SHORT: usize = 20;
 
 /// See [`REGISTERED`]. With foresight it is `lookahead`.
+#[derive(Clone)]
 pub(super) struct Adaptable {
     likelihoods: Arc<Likelihoods>,
     /// What is not certain of the beginning; a new plan does not change that.
@@ -85,6 +86,10 @@ impl Executor for Adaptable {
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
         self.state.as_ref()?.window(step, is_end)
+    }
+
+    fn fork(&self) -> Option<Box<dyn Executor>> {
+        Some(Box::new(self.clone()))
     }
 }
 

@@ -12,6 +12,7 @@ use elbowroom_probability::{
 use crate::reason::About;
 
 /// The policy that chooses the next happening.
+#[derive(Clone)]
 pub(super) enum Chooser {
     /// Orders of the plan's happenings, and their layers.
     Orders(Box<LayerDispatch>),

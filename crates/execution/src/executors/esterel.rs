@@ -25,7 +25,7 @@ pub(super) const REGISTERED: Registered = Registered {
 };
 
 /// See [`REGISTERED`]. Without time it is [`untimed::Esterel`](crate::untimed::Esterel).
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Esterel {
     dispatch: Option<Dispatch>,
 }
@@ -65,6 +65,10 @@ impl Executor for Esterel {
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
         self.dispatch.as_ref()?.planned(step, is_end)
+    }
+
+    fn fork(&self) -> Option<Box<dyn Executor>> {
+        Some(Box::new(self.clone()))
     }
 }
 

@@ -23,12 +23,12 @@ pub(super) const REGISTERED: Registered = Registered {
 };
 
 /// See [`REGISTERED`].
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Guarded {
     state: Option<Guard>,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Guard {
     dispatch: Dispatch,
     mission: Mission,
@@ -105,6 +105,10 @@ impl Executor for Guarded {
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
         self.state.as_ref()?.dispatch.planned(step, is_end)
+    }
+
+    fn fork(&self) -> Option<Box<dyn Executor>> {
+        Some(Box::new(self.clone()))
     }
 }
 

@@ -48,6 +48,7 @@ struct Live {
 }
 
 /// A plan, and what is known of its open quantities.
+#[derive(Clone)]
 struct Rest {
     dispatch: Dispatch,
     /// The guarantee of the rest of the plan.
@@ -126,6 +127,15 @@ impl Executor for Live {
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
         self.state.as_ref()?.dispatch.planned(step, is_end)
+    }
+
+    /// Without anybody to compare plans.
+    fn fork(&self) -> Option<Box<dyn Executor>> {
+        Some(Box::new(Self {
+            region: self.region.fork()?,
+            odds: None,
+            state: self.state.clone(),
+        }))
     }
 }
 

@@ -12,6 +12,7 @@ use elbowroom_num::Rational;
 use super::Patience;
 use crate::event::{Ending, Measured, Ticket};
 use crate::executor::{Order, StepId};
+use crate::progression::Progression;
 
 /// Everything that was started.
 #[derive(Clone, Debug, Default)]
@@ -58,6 +59,35 @@ pub struct ExecutedStep {
 }
 
 impl Account {
+    /// That of a run that begins in the middle of things: what is under way, and nothing else.
+    pub(super) fn amid(belief: &Progression, running: &BTreeMap<StepId, Ticket>) -> Self {
+        let mut account = Self::default();
+        for (ticket, underway) in belief.running() {
+            let opened = Opened {
+                action: Arc::clone(&underway.action),
+                planned: Some(underway.planned.clone()),
+                step: None,
+                ordered: underway.start.clone(),
+                started: None,
+                heard: None,
+                ended: Some((underway.start.clone(), Ending::Cancelled)),
+                cancelled: None,
+                warned: None,
+                measured: [Vec::new(), Vec::new()],
+            };
+            // Numbers in between were of what has ended.
+            account.entries.resize(index(*ticket), opened.clone());
+            account.entries.push(Opened {
+                started: Some(underway.start.clone()),
+                ended: None,
+                ..opened
+            });
+            account.open.insert(*ticket);
+        }
+        account.begin_plan(running);
+        account
+    }
+
     /// The number of actions started.
     pub fn started(&self) -> usize {
         self.entries.len()

@@ -5,7 +5,7 @@ use elbowroom_num::Rational;
 
 use super::{Next, Run, Stop};
 use crate::event::{Command, Ticket};
-use crate::executor::{News, Order};
+use crate::executor::{Mission, News, Order};
 use crate::reason::{Cause, Reason};
 
 /// Something to do. Each takes no time in the world, but for [`Todo::Pass`] and [`Todo::Close`].
@@ -34,6 +34,8 @@ pub(super) enum Todo {
     Plan(Reason),
     /// Begin with a plan as soon as the time is over that it took to make it.
     Adopt(Box<Made>),
+    /// Begin with a plan that is ready.
+    TakeUp(Box<Mission>),
     /// Events that happened while the plan was made, of which it does not know.
     Tell(Vec<News>),
     /// Wait until then for what was told to stop, and end the run.
@@ -78,6 +80,7 @@ impl Run<'_> {
             Todo::Replan(reason) => self.replan(&reason)?,
             Todo::Plan(reason) => self.plan_from_here(&reason)?,
             Todo::Adopt(made) => self.adopt(made)?,
+            Todo::TakeUp(mission) => self.begin_mission(&mission)?,
             Todo::Tell(news) => {
                 self.news.splice(0..0, news);
             }

@@ -2,25 +2,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use elbowroom_model::{RunningAction, Situation};
-use elbowroom_num::{Interval, Rational};
+use elbowroom_model::Situation;
+use elbowroom_num::Rational;
 
 use super::agenda::{Made, Todo};
+use super::here::{Guess, situation_at};
 use super::{PlanningTime, Run, RunningRule, Stop, Verdict};
 use crate::event::Ticket;
 use crate::planning::PlanAnswer;
 use crate::reason::Reason;
 use crate::record::Entry;
-
-/// When something will end that should have ended.
-#[derive(Clone, Copy)]
-pub(super) enum Guess {
-    /// After a quarter of the time that it has taken. Who guesses "any moment now" again and again
-    /// plans again and again.
-    AQuarterLonger,
-    /// As soon as it can: if there is no plan even then, there is none with it.
-    AnyMoment,
-}
 
 /// An answer of the planner, and to what.
 struct Attempt {
@@ -201,41 +192,7 @@ impl Run<'_> {
     }
 
     /// The same at this time, or ε after the timed initials that come just before it.
-    pub(super) fn situation_at(
-        &self,
-        mut time: Rational,
-        guess: Guess,
-    ) -> (Situation, Vec<Ticket>) {
-        let epsilon = self.task.epsilon();
-        let mut state = self.belief.clone();
-        loop {
-            let _ = state.advance(&time);
-            let past = state.timed_past().checked_sub(1);
-            let last = past.map(|index| &self.task.timed()[index].time + epsilon);
-            match last {
-                Some(last) if last > time => time = last,
-                _ => break,
-            }
-        }
-        let running = state
-            .running()
-            .values()
-            .map(|underway| {
-                let elapsed = &time - &underway.start;
-                let expected = match guess {
-                    _ if underway.planned > elapsed => underway.planned.clone(),
-                    Guess::AQuarterLonger => elapsed * Rational::new(5, 4),
-                    Guess::AnyMoment => elapsed + epsilon,
-                };
-                state.running_action(underway, Interval::point(expected))
-            })
-            .collect::<Vec<RunningAction>>();
-        let tickets = state.running().keys().copied().collect();
-        let situation = Situation {
-            state: state.state(),
-            time,
-            running,
-        };
-        (situation, tickets)
+    pub(super) fn situation_at(&self, time: Rational, guess: Guess) -> (Situation, Vec<Ticket>) {
+        situation_at(&self.belief, time, guess)
     }
 }

@@ -22,12 +22,11 @@
 
 use std::sync::Arc;
 
-use elbowroom_model::validate::{Settings, validate_from};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan, problem};
 use elbowroom_num::Rational;
 
 use super::agenda::Todo;
-use super::handover::Guess;
+use super::here::{Guess, rest_of};
 use super::intake::Remark;
 use super::{Run, Stop, Verdict};
 use crate::event::{Request, Ticket};
@@ -340,20 +339,8 @@ impl<'a> Run<'a> {
             left.remove(index);
         }
         let (situation, running) = self.situation(&Rational::ZERO, Guess::AQuarterLonger);
-        let delay = left.iter().map(|step| &situation.time - &step.start).max();
-        let delay = delay.unwrap_or_default().max(Rational::ZERO);
-        for step in &mut left {
-            step.start = &step.start + &delay;
-        }
-        let expected = |it: &elbowroom_model::RunningAction| {
-            let duration = it.duration.lower.value().cloned();
-            duration.map(|duration| it.step(duration))
-        };
-        let under_way: Option<Vec<Step>> = situation.running.iter().map(expected).collect();
-        let steps = under_way?.into_iter().chain(left).collect();
-        let rest = TimeTriggeredPlan { steps };
-        let verdict = validate_from(&self.task, &situation, &rest, &Settings::default());
-        verdict.is_valid().then_some((rest, situation, running))
+        let rest = rest_of(&self.task, &situation, left)?;
+        Some((rest, situation, running))
     }
 
     /// Lets time pass without asking the executor.

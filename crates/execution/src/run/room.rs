@@ -4,7 +4,7 @@ use elbowroom_model::Situation;
 use elbowroom_num::Rational;
 
 use super::Run;
-use super::handover::Guess;
+use super::here::Guess;
 use crate::event::Ticket;
 use crate::record::Entry;
 

@@ -37,6 +37,7 @@ const MOST_EXPLAINED: i32 = 3;
 const MOST_LET_GO: u32 = 3;
 
 /// A plan, and how it stands.
+#[derive(Clone)]
 pub(super) struct Rest {
     mission: Mission,
     /// The plan's steps in the order of the model's instances.
