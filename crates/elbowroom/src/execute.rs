@@ -14,6 +14,7 @@ mod likeliest;
 mod memory;
 mod planners;
 mod race;
+mod rehearse;
 pub mod rewrite;
 mod rollouts;
 mod spec;
@@ -31,6 +32,7 @@ pub use likeliest::{Likeliest, SharedLikeliest};
 pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use planners::{Clockless, Embedded};
 pub(crate) use race::is_behind;
+pub use rehearse::{Rehearse, SharedRehearse};
 pub use rollouts::{Replanning, Rollouts, Tryout};
 pub(crate) use spec::listed;
 pub use spec::{

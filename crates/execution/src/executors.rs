@@ -29,6 +29,7 @@ use crate::odds::Odds;
 use crate::outlook::Outlook;
 use crate::preparation::{Need, Region};
 use crate::reason::{About, Cause, Reason};
+use crate::rehearsal::Rehearsal;
 
 /// Every executor, in the order in which help and reports list them.
 pub const EXECUTORS: &[Registered] = &[
@@ -75,6 +76,9 @@ pub struct Means {
     /// For those that weigh each move ([`ExecutorSpec::asks_outlook`]); without, they go by their
     /// plan.
     pub outlook: Option<Arc<dyn Outlook>>,
+    /// For those that weigh each move, where nobody can tell what it is worth: who tries out what
+    /// can be done.
+    pub rehearsal: Option<Box<dyn Rehearsal>>,
 }
 
 impl Means {
@@ -94,6 +98,7 @@ impl<R: Region + 'static> From<Box<R>> for Means {
             odds: None,
             foresight: Foresight::default(),
             outlook: None,
+            rehearsal: None,
         }
     }
 }

@@ -40,6 +40,7 @@ mod progression;
 mod quantities;
 mod reason;
 mod record;
+mod rehearsal;
 pub mod run;
 mod world;
 
@@ -53,4 +54,5 @@ pub use preparation::{Need, PrepareError, Prepared, Preparer, Region};
 pub use progression::{Progression, Underway, Unreadable};
 pub use reason::{About, Behind, Cause, Changed, Promise, Reason};
 pub use record::{Entry, NoRecord, Recorder};
+pub use rehearsal::{Rehearsal, Rehearsed, Rehearsing, Scene, SeenChange};
 pub use world::{Passage, World, WorldError};

@@ -6,11 +6,13 @@
 //! no accident of the dice. Trials run in parallel; the results do not depend on how many at once,
 //! and the results of parts (shards) add up to those of the whole.
 
+mod beginnings;
 mod clairvoyant;
 mod experiment;
 mod failures;
 mod optimum;
 pub(crate) mod parts;
+mod place;
 mod plots;
 mod results;
 mod trials;
@@ -19,6 +21,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
+pub use beginnings::Beginning;
 pub use experiment::{Column, Experiment, ExperimentError, Planning, Published, Together};
 pub use failures::{Failure, Failures, TrialId};
 pub use optimum::ColumnOptimum;

@@ -49,5 +49,5 @@ pub use model::{
 };
 pub use paced::{Begun, Durations, Pace, Paced};
 pub use pattern::ActionPattern;
-pub use sim::SimWorld;
+pub use sim::{Seen, SimWorld};
 pub use unreliable::Unreliable;

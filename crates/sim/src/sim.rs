@@ -1,5 +1,6 @@
 //! One trajectory of a world.
 
+mod amid;
 mod failures;
 mod hazards;
 mod held;
@@ -16,6 +17,7 @@ use rand::Rng;
 
 use crate::draw::{Purpose, keyed};
 use crate::model::{ExogenousChange, Failure, Outcome, WorldModel};
+pub use amid::Seen;
 use hazards::Chance;
 
 /// A simulated world: true state, and what is going to happen.
@@ -73,18 +75,7 @@ enum Coming {
 impl<'a> SimWorld<'a> {
     /// The world of that seed, at time 0.
     pub fn new(task: Arc<Task>, model: &'a WorldModel, seed: u64) -> Self {
-        let mut world = Self {
-            truth: Progression::new(task),
-            model,
-            seed,
-            now: Rational::ZERO,
-            agenda: BTreeMap::new(),
-            decided: 0,
-            untold: Vec::new(),
-            occurrences: BTreeMap::new(),
-            actions: BTreeMap::new(),
-            chances: Vec::new(),
-        };
+        let mut world = Self::empty(Progression::new(task), model, seed);
         for (index, exogenous) in model.exogenous.iter().enumerate() {
             let name = match &exogenous.change {
                 ExogenousChange::Fact(name, _) | ExogenousChange::Value(name, _) => name,
@@ -100,6 +91,22 @@ impl<'a> SimWorld<'a> {
         }
         world.expose();
         world
+    }
+
+    /// In which nothing is to happen.
+    fn empty(truth: Progression, model: &'a WorldModel, seed: u64) -> Self {
+        Self {
+            truth,
+            model,
+            seed,
+            now: Rational::ZERO,
+            agenda: BTreeMap::new(),
+            decided: 0,
+            untold: Vec::new(),
+            occurrences: BTreeMap::new(),
+            actions: BTreeMap::new(),
+            chances: Vec::new(),
+        }
     }
 
     /// The true state.

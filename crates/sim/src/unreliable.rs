@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_execution::{
-    Command, Ending, Event, Observation, Passage, Ticket, World, WorldError,
+    Command, Ending, Event, Observation, Passage, Progression, Ticket, World, WorldError,
 };
 use elbowroom_model::Task;
 use elbowroom_model::ground::{FactId, FluentId};
@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::draw::{Purpose, keyed};
 use crate::model::{Reports, WorldModel};
-use crate::sim::SimWorld;
+use crate::sim::{Seen, SimWorld};
 
 /// Loses, repeats, delays and contradicts the reports of another world. What is looked at on
 /// purpose ([`World::look`]) is seen as it is.
@@ -34,6 +34,19 @@ impl WorldModel {
     /// One trajectory of the world, which reports as well or badly as the model says.
     pub fn world(&self, task: &Arc<Task>, seed: u64) -> Box<dyn World + '_> {
         let sim = SimWorld::new(Arc::clone(task), self, seed);
+        if self.reports.is_perfect() {
+            return Box::new(sim);
+        }
+        let (reports, resolution) = (self.reports.clone(), self.resolution.clone());
+        Box::new(Unreliable::new(sim, reports, seed, resolution))
+    }
+}
+
+impl WorldModel {
+    /// One way in which the world may go on from what is believed: [`SimWorld::amid`], which
+    /// reports as well or badly as the model says.
+    pub fn world_amid(&self, belief: &Progression, seed: u64, past: &Seen) -> Box<dyn World + '_> {
+        let sim = SimWorld::amid(belief, self, seed, past);
         if self.reports.is_perfect() {
             return Box::new(sim);
         }

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, UnknownExecutor};
 use elbowroom_execution::run::{Ports, Report, Run, RunSettings};
 use elbowroom_execution::{
-    Executor, NoRecord, Odds, Outlook, Planner, Preparer, Progression, Recorder, World,
+    Executor, NoRecord, Odds, Outlook, Planner, Preparer, Progression, Recorder, Rehearsal, World,
 };
 use elbowroom_model::problem::Condition;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_pddl::{Diagnostics, Source};
 use elbowroom_probability::Likelihoods;
 
-use super::{Analyst, Embedded, WholeRegion};
+use super::{Analyst, Embedded, SharedRehearse, WholeRegion};
 use crate::flow;
 
 /// A goal in PDDL that is given while a run of this task goes on: the condition alone, as it stands
@@ -114,6 +114,7 @@ pub struct Execution<'a> {
     foresight: Foresight,
     odds: Option<Box<dyn Odds>>,
     outlook: Option<Arc<dyn Outlook>>,
+    rehearsal: Option<SharedRehearse>,
     planner: Option<Box<dyn Planner + 'a>>,
     preparer: Option<Box<dyn Preparer + 'a>>,
     recorder: Box<dyn Recorder + 'a>,
@@ -146,6 +147,7 @@ impl<'a> Execution<'a> {
             foresight: Foresight::default(),
             odds: None,
             outlook: None,
+            rehearsal: None,
             planner: None,
             preparer: None,
             recorder: Box::new(NoRecord),
@@ -209,6 +211,12 @@ impl<'a> Execution<'a> {
         Self { outlook, ..self }
     }
 
+    /// Tries out what can be done like that, in executors that weigh each move where there is no
+    /// outlook.
+    pub fn with_rehearsal(self, rehearsal: Option<SharedRehearse>) -> Self {
+        Self { rehearsal, ..self }
+    }
+
     /// Has this planner make plans, not the embedded one with its usual limits
     /// ([`Embedded::default`]).
     pub fn planned_by(self, planner: impl Planner + 'a) -> Self {
@@ -265,6 +273,7 @@ impl<'a> Execution<'a> {
     /// The run, to be driven step by step: by an event loop.
     #[must_use = "a run does nothing until it is asked what is next"]
     pub fn run(self) -> Run<'a> {
+        let rehearsal = self.rehearsal.clone();
         let executor = match self.executor {
             Decider::Another(executor) => executor,
             Decider::Registered(executor) => executor.build(Means {
@@ -273,11 +282,16 @@ impl<'a> Execution<'a> {
                 odds: self.odds,
                 foresight: self.foresight,
                 outlook: self.outlook,
+                rehearsal: rehearsal.map(|it| Box::new(it) as Box<dyn Rehearsal>),
             }),
         };
         let planner = self
             .planner
             .unwrap_or_else(|| Box::new(Embedded::default()));
+        let planner = match &self.rehearsal {
+            Some(rehearse) => rehearse.before(planner),
+            None => planner,
+        };
         let preparer = self
             .preparer
             .unwrap_or_else(|| Box::new(Analyst::new(self.flow)));

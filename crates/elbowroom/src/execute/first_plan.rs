@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::as_timed;
 use super::candidates::{Candidate, Candidates, Limits};
-use super::race::race;
+use super::race::{ROUNDS, race};
 use super::rollouts::{Rollouts, Tryout};
 
 /// How many plans are compared at most.
@@ -28,6 +28,10 @@ const MOST_SEARCHES: usize = 20;
 
 /// How many samples the first plan is tried out in before others are made.
 const FIRST_LOOK: u64 = 100;
+
+/// How many actions the plans have at most that are tried out, over all samples: what bounds the
+/// time that a choice takes among plans of hundreds of actions.
+const MOST_ACTIONS: u64 = 50_000;
 
 /// How many partial orders are looked at for the likeliest order of a plan.
 const MOST_SEQUENCES: usize = 5_000;
@@ -250,8 +254,13 @@ impl Chooser<'_> {
     ) -> (Vec<Value>, usize) {
         let mut tryout = Tryout::new(task, rollouts.clone(), self.goes_on);
         let mut first = Vec::new();
+        let mut left = MOST_ACTIONS;
+        let mut afford = |plan: &Candidate, floor: u64| {
+            left = left.saturating_sub(plan.plan.steps.len() as u64);
+            left > floor && (self.goes_on)()
+        };
         for sample in 0..FIRST_LOOK {
-            if !(self.goes_on)() {
+            if !afford(&plans[0], MOST_ACTIONS / 2) {
                 break;
             }
             first.push(tryout.succeeds(&plans[0].plan, sample));
@@ -265,12 +274,12 @@ impl Chooser<'_> {
             let samples = first.len() as u64;
             return (vec![Value::Sampled { successes, samples }], 0);
         }
-        let (tallies, best) = race(plans.len(), &mut |place, sample| {
+        let (tallies, best) = race(plans.len(), &ROUNDS, &mut |place, sample| {
             let looked = usize::try_from(sample).ok().and_then(|it| first.get(it));
             if let (0, Some(known)) = (place, looked) {
                 return Some(*known);
             }
-            (self.goes_on)().then(|| tryout.succeeds(&plans[place].plan, sample))
+            afford(&plans[place], 0).then(|| tryout.succeeds(&plans[place].plan, sample))
         });
         let values = tallies.iter().map(|tally| Value::Sampled {
             successes: tally.successes(),

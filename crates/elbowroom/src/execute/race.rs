@@ -1,7 +1,7 @@
 //! Which of several plans succeeds most often, found out with few trials.
 
 /// How many samples there are at the end of each round.
-const ROUNDS: [u64; 4] = [50, 100, 200, 400];
+pub(super) const ROUNDS: [u64; 4] = [50, 100, 200, 400];
 
 /// How many standard deviations of the difference a plan may be behind.
 const BEHIND: u64 = 2;
@@ -21,7 +21,7 @@ impl Tally {
         self.results.iter().filter(|success| **success).count() as u64
     }
 
-    fn is_behind(&self, other: &Self) -> bool {
+    pub(super) fn is_behind(&self, other: &Self) -> bool {
         is_behind(&self.results, &other.results)
     }
 }
@@ -43,12 +43,13 @@ pub(crate) fn is_behind(results: &[bool], others: &[bool]) -> bool {
 /// than chance is tried no further (racing; Maron & Moore, NIPS 1993). `None` of `try_out` ends it.
 pub(super) fn race(
     count: usize,
+    rounds: &[u64],
     try_out: &mut dyn FnMut(usize, u64) -> Option<bool>,
 ) -> (Vec<Tally>, usize) {
     let mut tallies = vec![Tally::default(); count];
     let mut racing: Vec<usize> = (0..count).collect();
     let mut leader = 0;
-    for most in ROUNDS {
+    for &most in rounds {
         for &place in &racing {
             for sample in tallies[place].samples()..most {
                 let Some(success) = try_out(place, sample) else {
@@ -91,7 +92,7 @@ mod tests {
 
     #[test]
     fn the_likeliest_wins_and_who_is_far_behind_is_tried_in_one_round_only() {
-        let (tallies, leader) = race(3, &mut trials(&[60, 90, 20]));
+        let (tallies, leader) = race(3, &ROUNDS, &mut trials(&[60, 90, 20]));
         assert_eq!(leader, 1);
         assert_eq!(tallies[2].samples(), ROUNDS[0]);
         assert!(tallies[1].successes() * 100 >= 85 * tallies[1].samples());
@@ -99,7 +100,7 @@ mod tests {
 
     #[test]
     fn of_plans_alike_the_first_is_taken_after_all_rounds() {
-        let (tallies, leader) = race(3, &mut trials(&[70, 70, 70]));
+        let (tallies, leader) = race(3, &ROUNDS, &mut trials(&[70, 70, 70]));
         assert_eq!(leader, 0);
         assert_eq!(tallies[0], tallies[2]);
         assert_eq!(tallies[0].samples(), ROUNDS[3]);
@@ -107,7 +108,7 @@ mod tests {
 
     #[test]
     fn one_that_always_succeeds_ends_the_race() {
-        let (tallies, leader) = race(2, &mut trials(&[90, 100]));
+        let (tallies, leader) = race(2, &ROUNDS, &mut trials(&[90, 100]));
         assert_eq!(leader, 1);
         assert!(tallies[1].samples() < ROUNDS[3]);
     }
@@ -115,7 +116,7 @@ mod tests {
     #[test]
     fn an_interrupted_race_has_the_leader_of_its_last_round() {
         let mut left = 60;
-        let (_, leader) = race(2, &mut |place, _| {
+        let (_, leader) = race(2, &ROUNDS, &mut |place, _| {
             left -= 1;
             (left > 0).then_some(place == 1)
         });

@@ -168,9 +168,29 @@ impl Planner for Scripted<'_> {
 }
 
 /// The embedded planner, with a limit on what all its plans take together.
-struct Metered<'a> {
+pub(super) struct Metered<'a> {
     embedded: Embedded<'a>,
     left: u64,
+}
+
+impl Metered<'_> {
+    /// One that remembers what it was asked, or nobody if there is none.
+    pub(super) fn boxed(replanning: Option<&Replanning>) -> Box<dyn Planner> {
+        let Some(replanning) = replanning else {
+            return Box::new(NoPlanner);
+        };
+        let metered = Metered {
+            embedded: Embedded {
+                settings: replanning.settings.clone(),
+                most_states: replanning.most_states,
+                improve_states: replanning.improve_states,
+                clock: None,
+                goes_on: None,
+            },
+            left: replanning.all_states,
+        };
+        Box::new(RememberingPlanner::new(metered, MEMORY))
+    }
 }
 
 impl Planner for Metered<'_> {

@@ -28,6 +28,9 @@ pub struct Policy {
     optimum: TimedOptimum,
 }
 
+/// How far apart the bounds may be for the policy to be as good as the best within what counts.
+const CLOSE: f64 = 0.02;
+
 /// How much of a probability is given at most for being earlier.
 const HASTE: f64 = 1e-4;
 
@@ -72,6 +75,12 @@ impl Policy {
         };
         policy.values = values;
         Ok(Some(policy))
+    }
+
+    /// Whether its bounds are close enough to go by it: on a coarse grid, whoever decides only at
+    /// the boundaries of cells loses much that others do not.
+    pub fn is_close(&self) -> bool {
+        self.optimum.upper - self.optimum.lower <= CLOSE
     }
 
     /// The bounds between which the best of all executors lies, and the grids that were tried for

@@ -2,6 +2,7 @@
 //! clock.
 
 mod moves;
+mod rehearsed;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -18,6 +19,7 @@ use crate::progression::Outlook as Prospect;
 use crate::reason::{About, Cause, Reason};
 
 use moves::{begins, wait};
+use rehearsed::Rehearsed;
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "policy",
@@ -27,10 +29,19 @@ pub(super) const REGISTERED: Registered = Registered {
               goal in time, and from then on makes the move of which the goal is most likely: an action, \
               letting one go, or waiting, whether or not it is in the plan. What moves are worth comes from \
               what is known of the world's distributions of durations, failures and events, not from what \
-              will happen. Where the world is too large for that, it acts like `live:5`.",
-    paper: "the policy of a semi-Markov decision process (Howard, 1971); goes beyond both papers",
+              will happen. Where the world is too large for that, it tries out in samples of the world, whenever \
+              something happens, what comes of going on, of handing what is left of the plan to `adaptable` \
+              or `esterel`, of another plan, and of waiting.",
+    paper: "the policy of a semi-Markov decision process (Howard, 1971); without it, the rollout algorithm \
+            (Bertsekas, Tsitsiklis & Wu, 1997); goes beyond both papers",
     need: Need::OpenNetwork,
-    make: |_, means| {
+    make: |_, mut means| {
+        if means.outlook.is_none()
+            && let Some(rehearsal) = means.rehearsal.take()
+        {
+            let keeper = (live::REGISTERED.make)(None, means);
+            return Box::new(Rehearsed::new(rehearsal, keeper));
+        }
         let outlook = means.outlook.clone();
         // Whoever weighs moves needs nobody to compare plans.
         let compares = means.odds.is_some() && outlook.is_none();

@@ -4,6 +4,7 @@ mod file;
 
 use elbowroom::envelope::Objective;
 use elbowroom::execute::FirstPlan;
+use elbowroom::timed::Settings;
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{Patience, RunSettings};
 use elbowroom_num::Rational;
@@ -55,6 +56,9 @@ pub struct Experiment {
     pub planner_states: u64,
     /// How many of them for a better plan than the first.
     pub improve_states: u64,
+    /// How many states the table of `policy` may have, which no file says: with 0, there is none,
+    /// and moves are tried out.
+    pub table_states: usize,
     /// Figures to stand beside ours.
     pub published: Vec<Published>,
 }
@@ -153,6 +157,7 @@ impl Experiment {
             planner,
             planner_states,
             improve_states,
+            table_states,
         } = self;
         let RunSettings {
             running,
@@ -209,6 +214,11 @@ impl Experiment {
             identity
         } else {
             json!([identity, "first plan", first_plan.name()])
+        };
+        let identity = if *table_states == Settings::default().most_states {
+            identity
+        } else {
+            json!([identity, "table", table_states])
         };
         if *optimum {
             json!([identity, "optimum"])
@@ -317,6 +327,7 @@ impl Experiment {
             planner,
             planner_states: read.planner_states.unwrap_or(20_000),
             improve_states: read.improve_states.unwrap_or(20_000),
+            table_states: Settings::default().most_states,
             published: read
                 .published
                 .into_iter()

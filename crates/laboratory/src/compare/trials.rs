@@ -3,33 +3,31 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom_execution::executors::{ExecutorSpec, Foresight};
-use elbowroom_execution::run::{PlanningTime, Report, Verdict};
-use elbowroom_execution::{Outlook, PlanAnswer, Planner, Preparer};
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::run::{Report, Verdict};
+use elbowroom_execution::{PlanAnswer, Planner};
 use elbowroom_external as external;
-use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
 use elbowroom_planner::embedded;
-use elbowroom_probability::{Likelihoods, likelihoods};
 use elbowroom_report::trace::TraceWriter;
 use elbowroom_sim::WorldModel;
 
-use super::{Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, clairvoyant};
-use elbowroom::execute::{
-    Analyst, Chooser, Embedded, Execution, Known, Likeliest, NamedText, RememberingPlanner,
-    RememberingPreparer, Replanning, Rollouts, RunSpec, SharedLikeliest,
+use super::place::Place;
+use super::{
+    Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, beginnings, clairvoyant,
 };
+use elbowroom::execute::{Embedded, Execution, NamedText, RememberingPlanner, RunSpec};
 use elbowroom::flow;
-use elbowroom::timed::{Policy, Settings};
 
 use crate::record::{TrialRecord, TrialRecords};
 
 /// The number of plans remembered for one problem: some megabytes.
-const PLANS: usize = 20_000;
+pub(super) const PLANS: usize = 20_000;
 
 /// How many plans made ready are remembered for one problem and column: some megabytes.
-const PREPARED: usize = 500;
+pub(super) const PREPARED: usize = 500;
 
 /// One problem, and some of its trials.
 pub(super) struct Setting<'a> {
@@ -48,21 +46,6 @@ struct Common<'a> {
     columns: Vec<Place>,
 }
 
-/// A column for one problem.
-struct Place {
-    world: WorldModel,
-    likelihoods: Arc<Likelihoods>,
-    foresight: Foresight,
-    preparer: RememberingPreparer<Analyst>,
-    /// For executors that look for likelier plans: who makes them, and the same with a memory.
-    odds: SharedLikeliest,
-    likeliest: RememberingPlanner<SharedLikeliest>,
-    /// For executors that weigh each move.
-    outlook: Option<Arc<dyn Outlook>>,
-    /// The plan that each executor begins with.
-    firsts: Vec<TimeTriggeredPlan>,
-}
-
 impl Setting<'_> {
     /// Makes the trials of a part. `tell` is called after each, and says whether to go on;
     /// `goes_on` says so in between.
@@ -79,6 +62,9 @@ impl Setting<'_> {
             return Ok(results);
         }
         let mut common = self.common(goes_on)?;
+        for place in &common.columns {
+            beginnings::merge(&mut results.beginnings, &place.beginnings);
+        }
         for trial in part.numbers().skip(self.piece).step_by(self.pieces) {
             for column in 0..experiment.columns.len() {
                 self.trial((trial, column), records, &mut common, &mut results);
@@ -107,110 +93,13 @@ impl Setting<'_> {
             PlanAnswer::NotFound { why } => return Err(self.wrong(&why)),
         };
         let task = Arc::new(task);
-        let columns = self.experiment.columns.iter();
+        let columns = 0..self.experiment.columns.len();
         let columns = columns.map(|column| self.place(column, &task, &first, goes_on));
         Ok(Common {
             columns: columns.collect::<Result<_, _>>()?,
             planner: RememberingPlanner::new(planner, PLANS),
             task,
         })
-    }
-
-    fn place(
-        &self,
-        column: &Column,
-        task: &Arc<Task>,
-        first: &TimeTriggeredPlan,
-        goes_on: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Place, ExperimentError> {
-        let world = world(column, task)?;
-        let likelihoods = Arc::new(match &column.likelihoods {
-            None => Likelihoods::certain(),
-            Some(text) => {
-                let name = format!("likelihoods of {}", column.name);
-                likelihoods::read(Source::new(name, text.as_str()), task)
-                    .map_err(ExperimentError::Text)?
-            }
-        });
-        let flow = self.flow(column, &world);
-        let mut preparer = RememberingPreparer::new(Analyst::new(flow), PREPARED);
-        for spec in &self.experiment.executors {
-            preparer
-                .prepare(task, first, spec.registered.need)
-                .map_err(|error| self.wrong(&error.to_string()))?;
-        }
-        let planning_time = match &self.experiment.settings.planning_time {
-            PlanningTime::Seconds(seconds) => seconds.clone(),
-            PlanningTime::Measured => Rational::ZERO,
-        };
-        let asks_outlook = self
-            .experiment
-            .executors
-            .iter()
-            .any(ExecutorSpec::asks_outlook);
-        let outlook = asks_outlook.then(|| {
-            let policy = Policy::new(task, &world, &Settings::default(), goes_on);
-            Some(Arc::new(policy.ok()??) as Arc<dyn Outlook>)
-        });
-        let odds = Likeliest::new(world.clone(), self.embedded(), planning_time);
-        let odds = SharedLikeliest::new(odds);
-        let mut likeliest = RememberingPlanner::new(odds.clone(), PLANS);
-        let mut firsts = Vec::with_capacity(self.experiment.executors.len());
-        for spec in &self.experiment.executors {
-            let chosen = self.chosen(spec, column, (task, &world, &likelihoods), goes_on);
-            let likely = (chosen.is_none() && spec.asks_outlook()).then(|| {
-                let answer = likeliest.plan(task, &Situation::initial(task)).answer;
-                match answer {
-                    PlanAnswer::Plan(plan) => Some(plan),
-                    _ => None,
-                }
-            });
-            let plan = chosen.or(likely.flatten());
-            firsts.push(plan.unwrap_or_else(|| first.clone()));
-        }
-        Ok(Place {
-            outlook: outlook.flatten(),
-            firsts,
-            world,
-            likelihoods,
-            foresight: Foresight::default(),
-            preparer,
-            likeliest,
-            odds,
-        })
-    }
-
-    /// The first plan that an executor begins with, if it is not the planner's; nor is it where
-    /// choosing was interrupted.
-    fn chosen(
-        &self,
-        spec: &ExecutorSpec,
-        column: &Column,
-        (task, world, likelihoods): (&Task, &WorldModel, &Arc<Likelihoods>),
-        goes_on: &(dyn Fn() -> bool + Sync),
-    ) -> Option<TimeTriggeredPlan> {
-        let experiment = self.experiment;
-        if experiment.first_plan.is_shortest() || experiment.planner != Planning::Embedded {
-            return None;
-        }
-        let embedded = self.embedded();
-        let chooser = Chooser {
-            most_states: embedded.most_states,
-            improve_states: embedded.improve_states,
-            known: Known::World(Rollouts {
-                world: Arc::new(world.clone()),
-                executor: spec.clone(),
-                settings: experiment.settings.clone(),
-                flow: self.flow(column, world),
-                likelihoods: Arc::clone(likelihoods),
-                replanning: Some(Replanning::within(&embedded)),
-                is_ready: true,
-            }),
-            settings: embedded.settings,
-            goes_on,
-        };
-        let choice = chooser.choose(task, &Situation::initial(task)).ok()?;
-        Some(choice.plan)
     }
 
     /// Every executor in the same world.
@@ -371,7 +260,9 @@ impl Setting<'_> {
             odds,
             likeliest,
             outlook,
+            rehearse,
             firsts,
+            beginnings: _,
         } = &mut common.columns[column];
         let asks_odds = spec.asks_odds();
         let odds = asks_odds.then(|| Box::new(odds.clone()) as _);
@@ -388,6 +279,7 @@ impl Setting<'_> {
             .with_foresight(foresight.clone())
             .with_odds(odds)
             .with_outlook(outlook.clone().filter(|_| spec.asks_outlook()))
+            .with_rehearsal(rehearse.clone().filter(|_| spec.asks_outlook()))
             .planned_by(planner)
             .prepared_by(preparer);
         // Nobody reads why there is no way on but those who look at a single run.
@@ -412,7 +304,7 @@ impl Setting<'_> {
         }
     }
 
-    fn embedded(&self) -> Embedded<'static> {
+    pub(super) fn embedded(&self) -> Embedded<'static> {
         Embedded {
             settings: embedded::Settings::default(),
             most_states: self.experiment.planner_states,
@@ -422,7 +314,7 @@ impl Setting<'_> {
         }
     }
 
-    fn flow(&self, column: &Column, world: &WorldModel) -> flow::Settings {
+    pub(super) fn flow(&self, column: &Column, world: &WorldModel) -> flow::Settings {
         let mut flow = flow::Settings {
             vary: column.vary.clone(),
             objective: self.experiment.objective,
@@ -462,7 +354,7 @@ impl Setting<'_> {
         Ok((domain, Source::new("problem", text.as_str())))
     }
 
-    fn wrong(&self, message: &str) -> ExperimentError {
+    pub(super) fn wrong(&self, message: &str) -> ExperimentError {
         if self.filling.is_empty() {
             return ExperimentError::other(format!("the problem: {message}"));
         }
@@ -470,7 +362,7 @@ impl Setting<'_> {
     }
 }
 
-fn world(column: &Column, task: &Task) -> Result<WorldModel, ExperimentError> {
+pub(super) fn world(column: &Column, task: &Task) -> Result<WorldModel, ExperimentError> {
     let world = Source::new(format!("world of {}", column.name), column.world.as_str());
     WorldModel::read(&world, task.problem()).map_err(ExperimentError::Text)
 }

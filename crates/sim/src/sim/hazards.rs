@@ -25,7 +25,7 @@ pub(super) struct Chance {
 }
 
 impl SimWorld<'_> {
-    /// Puts the first such moment of each fact on the agenda.
+    /// Puts the first such moment of each fact from now on on the agenda.
     pub(super) fn expose(&mut self) {
         let task = self.truth.task().clone();
         for (name, hazard) in self.model.hazardous(task.problem()) {
@@ -41,7 +41,7 @@ impl SimWorld<'_> {
                         becomes,
                         rate,
                         is_reported: hazard.is_reported,
-                        at: 0.0,
+                        at: self.now.to_f64(),
                         rng: keyed(self.seed, &name, u64::from(becomes), Purpose::Hazard),
                     });
                     self.come_again(self.chances.len() - 1);

@@ -10,13 +10,14 @@ use elbowroom_execution::{Need, NoPlanner, Odds, Outlook, Planner, PrepareError,
 use elbowroom_external::{self as external, PlannerError};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
+use elbowroom_probability::Likelihoods;
 use elbowroom_sim::{Paced, SimWorld, WorldModel};
 use elbowroom_text::Diagnostics;
 
 use super::{EMBEDDED, NOBODY, RunSpec};
 use crate::execute::{
-    Analyst, Chooser, Choosing, Embedded, Execution, External, Known, Likeliest, Replanning,
-    Rollouts, Spoiling,
+    Analyst, Chooser, Choosing, Embedded, Execution, External, FirstPlan, Known, Likeliest,
+    Rehearse, Replanning, Rollouts, SharedRehearse, Spoiling,
 };
 use crate::timed::{Policy, Settings};
 use crate::{BoxTextError, ChanceError, parse_box};
@@ -211,23 +212,58 @@ impl RunSpec {
         }
         let likelihoods = self.likelihoods(task)?;
         if let Some(world) = model.filter(|_| self.world.is_some()) {
-            let world = Arc::new(world.clone());
-            let mut flow = self.envelopes();
-            flow.world = Some(Arc::clone(&world));
-            return Ok(Some(Known::World(Rollouts {
-                world,
-                executor: self.executor.clone(),
-                settings: self.settings(),
-                flow,
-                likelihoods,
-                replanning: Some(Replanning::within(&self.embedded())),
-                is_ready: false,
-            })));
+            return Ok(Some(Known::World(self.rollouts(world, likelihoods))));
         }
         Ok(self.likelihoods.is_some().then(|| Known::Likelihoods {
             reorders: self.executor.reorders(),
             likelihoods,
         }))
+    }
+
+    /// Runs like this one, in samples of its world.
+    fn rollouts(&self, world: &WorldModel, likelihoods: Arc<Likelihoods>) -> Rollouts {
+        let world = Arc::new(world.clone());
+        let mut flow = self.envelopes();
+        flow.world = Some(Arc::clone(&world));
+        Rollouts {
+            world,
+            executor: self.executor.clone(),
+            settings: self.settings(),
+            flow,
+            likelihoods,
+            replanning: Some(Replanning::within(&self.embedded())),
+            is_ready: false,
+        }
+    }
+
+    /// Who tries out what can be done, for executors that weigh moves where there is no table; of
+    /// goals that are still to come, and of other planners, nothing can be tried out.
+    fn rehearse(
+        &self,
+        task: &Task,
+        model: Option<&WorldModel>,
+    ) -> Result<Option<SharedRehearse>, SpecError> {
+        if self.world.is_none() || self.is_lasting || !self.executor.asks_outlook() {
+            return Ok(None);
+        }
+        let Some(world) = model else {
+            return Ok(None);
+        };
+        let rollouts = self.rollouts(world, self.likelihoods(task)?);
+        let rehearse = Rehearse::new(rollouts, self.embedded());
+        Ok(Some(SharedRehearse::new(rehearse)))
+    }
+
+    /// By what a first plan is chosen if nobody says: by its probability where the embedded planner
+    /// makes it and something is known that it can be chosen by.
+    pub fn usual_first_plan(&self) -> FirstPlan {
+        let is_known = self.world.is_some() || self.likelihoods.is_some();
+        let is_embedded = self.planner.eq_ignore_ascii_case(EMBEDDED);
+        if is_known && is_embedded && !self.has_plan && !self.is_lasting {
+            FirstPlan::Likeliest
+        } else {
+            FirstPlan::Shortest
+        }
     }
 
     /// Whom [`Self::planner`] names.
@@ -326,10 +362,15 @@ impl RunSpec {
         let outlook = model.as_ref().filter(|_| self.executor.asks_outlook());
         let outlook = outlook.and_then(|model| {
             let policy = Policy::new(task, model, &Settings::default(), &|| true);
-            Some(Arc::new(policy.ok()??) as Arc<dyn Outlook>)
+            let policy = policy.ok()?.filter(Policy::is_close)?;
+            Some(Arc::new(policy) as Arc<dyn Outlook>)
         });
         let is_embedded = matches!(self.whom()?, Whom::Embedded);
         let model = model.filter(|_| is_embedded);
+        let rehearsal = match &outlook {
+            Some(_) => None,
+            None => self.rehearse(task, model.as_ref())?,
+        };
         let odds = model.map(|model| {
             let time = self.expected_planning_time();
             Box::new(Likeliest::new(model, self.embedded(), time)) as Box<dyn Odds>
@@ -342,7 +383,8 @@ impl RunSpec {
             .with_envelopes(envelopes)
             .with_likelihoods(self.likelihoods(task)?)
             .with_odds(odds)
-            .with_outlook(outlook))
+            .with_outlook(outlook)
+            .with_rehearsal(rehearsal))
     }
 }
 

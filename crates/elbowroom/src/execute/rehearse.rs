@@ -1,0 +1,413 @@
+//! What comes of each thing that can be done with a plan, in samples of the world: [`Rehearse`].
+
+mod stage;
+
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use elbowroom_execution::executors::{ExecutorSpec, Means};
+use elbowroom_execution::run::PlanningTime;
+use elbowroom_execution::run::here::{Guess, mission, rest_of, situation_at};
+use elbowroom_execution::{
+    Ending, Executor, Mission, Need, News, PlanAnswer, Planner, PlannerAnswer, Rehearsal,
+    Rehearsed, Rehearsing, Scene,
+};
+use elbowroom_model::ground::FactId;
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_sim::ExogenousChange;
+
+use super::first_plan::renumbered;
+use super::race::{Tally, is_behind, race};
+use super::rollouts::Rollouts;
+use super::{Analyst, Candidates, Embedded, Limits, RememberingPreparer, WholeRegion};
+use stage::Stage;
+
+/// Who may take up a new plan in place of `live`.
+const OF_BEGINNINGS: [&str; 3] = ["adaptable", "esterel", "guarded"];
+
+/// Who may take up what is left of a plan. Others need its envelope, which takes long to find.
+const OF_RESTS: [&str; 2] = ["adaptable", "esterel"];
+
+/// Who may execute a new plan.
+const OF_NEW_PLANS: [&str; 2] = ["live", "adaptable"];
+
+/// How many samples there are at the end of each round.
+const ROUNDS: [u64; 4] = [25, 50, 100, 200];
+
+/// The same, for who takes up a new plan.
+const ROUNDS_OF_NEW: [u64; 6] = [50, 100, 200, 400, 800, 1600];
+
+/// How many samples are tried out first. If all of them succeed, nothing else is tried out.
+const FIRST_LOOK: u64 = 25;
+
+/// How many of these may fail for nothing else to be tried out where nothing has gone wrong, and
+/// where something has, but the plan is not to be given up.
+const FEW: usize = 2;
+const FEWER: usize = 1;
+
+/// The first of the samples in which the best is tried once more.
+const AGAIN: u64 = 1_000_000;
+
+/// How many other plans are made, and how many states may be looked at for all but the first.
+const MOST_PLANS: usize = 4;
+const PLAN_STATES: u64 = 2_000;
+
+/// How many variants of the problem they are made for at most.
+const MOST_SEARCHES: usize = 6;
+
+/// How many states all new plans may take that are made in the samples of one scene.
+const SAMPLE_STATES: u64 = 4_000;
+
+/// Of so many samples, one more has to succeed for another executor than `live` to take up a plan.
+const MARGIN: u64 = 200;
+
+/// How many answers of the preparer are remembered.
+const MEMORY: usize = 2_000;
+
+/// Where the seeds of the samples begin: far from those that people choose.
+const SEED: u64 = 0x7265_6865_0000_0000;
+
+/// Tries out what can be done, in samples of the world that its file describes, given what was seen
+/// of it: going on, handing what is left of the plan to another executor (which tries again what
+/// has failed, or skips what is not needed), another plan, and waiting.
+///
+/// All are tried in the same samples (common random numbers), and who is behind by more than
+/// chance is tried no further. How much is tried is counted, so that no clock matters.
+pub struct Rehearse {
+    rollouts: Rollouts,
+    planner: Embedded<'static>,
+    planning_time: Rational,
+    /// Makes plans ready that are taken up.
+    preparer: RememberingPreparer<Analyst>,
+    /// Makes plans ready in samples, with the envelope that is found at once.
+    hasty: RememberingPreparer<Analyst>,
+    /// The plan that was found to be best for a situation.
+    chosen: Option<(Situation, TimeTriggeredPlan)>,
+    /// What was found at the beginning of a run, by the plan.
+    beginnings: Vec<(TimeTriggeredPlan, Choice)>,
+}
+
+/// One [`Rehearse`] behind both ports.
+#[derive(Clone)]
+pub struct SharedRehearse(Arc<Mutex<Rehearse>>);
+
+impl SharedRehearse {
+    /// Shares it.
+    pub fn new(rehearse: Rehearse) -> Self {
+        Self(Arc::new(Mutex::new(rehearse)))
+    }
+
+    /// A planner that gives the plan that was found to be best, where one was, and else asks this
+    /// one.
+    pub(super) fn before<'a>(&self, planner: Box<dyn Planner + 'a>) -> Box<dyn Planner + 'a> {
+        Box::new(Chosen {
+            rehearse: self.clone(),
+            planner,
+        })
+    }
+
+    fn get(&self) -> MutexGuard<'_, Rehearse> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Rehearsal for SharedRehearse {
+    fn watched(&self, task: &Task) -> Vec<FactId> {
+        self.get().watched(task)
+    }
+
+    fn rehearse(&mut self, scene: &Scene<'_>) -> Rehearsed {
+        self.get().rehearse(scene)
+    }
+}
+
+/// Gives plans that were found to be best.
+struct Chosen<'a> {
+    rehearse: SharedRehearse,
+    planner: Box<dyn Planner + 'a>,
+}
+
+impl Planner for Chosen<'_> {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        let chosen = self.rehearse.get().chosen_for(task, situation);
+        match chosen {
+            Some(plan) => PlannerAnswer::from(PlanAnswer::Plan(plan)),
+            None => self.planner.plan(task, situation),
+        }
+    }
+
+    fn expect(&mut self, task: &Task, situation: &Situation) {
+        self.planner.expect(task, situation);
+    }
+}
+
+/// Something that can be done.
+#[derive(Clone)]
+enum Way {
+    /// What whoever executes says, and whoever it is goes on.
+    AsDecided,
+    /// This executor takes up what is left.
+    TakesUp(ExecutorSpec, Box<Mission>),
+    /// This executor takes up another plan, made for this situation.
+    Replans(ExecutorSpec, Option<(Situation, TimeTriggeredPlan)>),
+    /// Nothing is begun before that.
+    WaitsUntil(Rational),
+}
+
+/// A way that was found to be best, and how often it and what was decided succeed.
+#[derive(Clone)]
+struct Choice {
+    way: usize,
+    value: Rational,
+    present: Rational,
+}
+
+impl Rehearsal for Rehearse {
+    fn watched(&self, task: &Task) -> Vec<FactId> {
+        let events = self.rollouts.world.exogenous.iter();
+        let facts = events.filter_map(|event| match &event.change {
+            ExogenousChange::Fact(name, _) => task.fact_named(name),
+            ExogenousChange::Value(..) => None,
+        });
+        let mut facts: Vec<FactId> = facts.collect();
+        facts.sort_unstable();
+        facts.dedup();
+        facts
+    }
+
+    fn rehearse(&mut self, scene: &Scene<'_>) -> Rehearsed {
+        self.chosen = None;
+        let ways = self.first_ways(scene);
+        let is_beginning = scene.is_new && scene.belief.time().is_zero();
+        let steps = scene.left.to_vec();
+        let plan = TimeTriggeredPlan { steps };
+        let known = self.beginnings.iter().find(|(known, _)| *known == plan);
+        if let Some((_, choice)) = known.filter(|_| is_beginning) {
+            let choice = choice.clone();
+            return self.answer(ways, &choice);
+        }
+        let (ways, choice) = self.choose(scene, ways);
+        if is_beginning {
+            self.beginnings.push((plan, choice.clone()));
+        }
+        self.answer(ways, &choice)
+    }
+}
+
+impl Rehearse {
+    /// For runs like those of `rollouts`. `planner` makes plans.
+    pub fn new(rollouts: Rollouts, planner: Embedded<'static>) -> Self {
+        let mut rollouts = rollouts;
+        let planning_time = match &rollouts.settings.planning_time {
+            PlanningTime::Seconds(seconds) => seconds.clone(),
+            PlanningTime::Measured => Rational::ZERO,
+        };
+        rollouts.settings.planning_time = PlanningTime::Seconds(planning_time.clone());
+        rollouts.settings.watches_room = false;
+        if let Some(replanning) = &mut rollouts.replanning {
+            replanning.improve_states = 0;
+            replanning.all_states = SAMPLE_STATES;
+        }
+        let analyst = Analyst::new(rollouts.flow.clone());
+        let hasty = analyst.clone().until(|| ControlFlow::Break(()));
+        Self {
+            planner,
+            preparer: RememberingPreparer::new(analyst, MEMORY),
+            hasty: RememberingPreparer::new(hasty, MEMORY),
+            planning_time,
+            rollouts,
+            chosen: None,
+            beginnings: Vec::new(),
+        }
+    }
+
+    /// The plan that was found to be best for a situation, once.
+    fn chosen_for(&mut self, task: &Task, situation: &Situation) -> Option<TimeTriggeredPlan> {
+        let (known, plan) = self.chosen.take()?;
+        let mut plan = renumbered(task, &plan).filter(|_| known == *situation)?;
+        // What is under way is in a plan as the situation has it.
+        for (step, running) in plan.steps.iter_mut().zip(&situation.running) {
+            step.action = running.action.clone();
+        }
+        Some(plan)
+    }
+
+    fn answer(&mut self, mut ways: Vec<Way>, choice: &Choice) -> Rehearsed {
+        let way = ways.swap_remove(choice.way.min(ways.len().saturating_sub(1)));
+        let choice_of = match way {
+            Way::AsDecided => Rehearsing::AsDecided,
+            Way::WaitsUntil(until) => Rehearsing::WaitsUntil(until),
+            Way::TakesUp(executor, mission) => {
+                Rehearsing::HandsOver(self.built(&executor), mission)
+            }
+            Way::Replans(_, plan) => {
+                self.chosen = plan;
+                Rehearsing::Replans
+            }
+        };
+        Rehearsed {
+            choice: choice_of,
+            value: choice.value.clone(),
+            present: choice.present.clone(),
+        }
+    }
+
+    fn built(&self, executor: &ExecutorSpec) -> Box<dyn Executor> {
+        executor.build(Means {
+            likelihoods: Arc::clone(&self.rollouts.likelihoods),
+            ..Means::from(Box::new(WholeRegion))
+        })
+    }
+
+    /// What can be done with the plan as it is: what was decided first.
+    fn first_ways(&mut self, scene: &Scene<'_>) -> Vec<Way> {
+        let mut ways = vec![Way::AsDecided];
+        let task = scene.belief.task();
+        let now = scene.belief.time();
+        let begins = now.is_zero() && scene.belief.running().is_empty();
+        let (situation, running) = if begins {
+            (Situation::initial(task), Vec::new())
+        } else {
+            situation_at(scene.belief, now + task.epsilon(), Guess::AQuarterLonger)
+        };
+        let Some(rest) = rest_of(task, &situation, scene.left.to_vec()) else {
+            return ways;
+        };
+        let names: &[&str] = if scene.is_new {
+            &OF_BEGINNINGS
+        } else {
+            &OF_RESTS
+        };
+        for name in names {
+            let Ok(executor) = name.parse::<ExecutorSpec>() else {
+                continue;
+            };
+            let here = (&**task, &situation, running.as_slice());
+            let need: Need = executor.registered.need;
+            if let Ok(mission) = mission(here, &rest, now, &mut self.preparer, need) {
+                ways.push(Way::TakesUp(executor, Box::new(mission)));
+            }
+        }
+        ways
+    }
+
+    /// Other plans, and waiting.
+    fn more_ways(&mut self, scene: &Scene<'_>, ways: &mut Vec<Way>) {
+        if scene.is_new {
+            return;
+        }
+        let task = scene.belief.task();
+        let time = scene.belief.time() + &self.planning_time + task.epsilon();
+        let (situation, _) = situation_at(scene.belief, time, Guess::AQuarterLonger);
+        for plan in self.plans(&task.with_own_table(), &situation) {
+            for name in OF_NEW_PLANS {
+                if let Ok(executor) = name.parse() {
+                    let plan = Some((situation.clone(), plan.clone()));
+                    ways.push(Way::Replans(executor, plan));
+                }
+            }
+        }
+        if let Some(until) = scene.belief.next_timed() {
+            ways.push(Way::WaitsUntil(until + task.epsilon()));
+        }
+    }
+
+    /// The planner's plan, and others where nothing is under way.
+    fn plans(&self, task: &Task, situation: &Situation) -> Vec<TimeTriggeredPlan> {
+        if !situation.running.is_empty() {
+            return match self.planner.counted(task, situation).0 {
+                PlanAnswer::Plan(plan) => vec![plan],
+                _ => Vec::new(),
+            };
+        }
+        let limits = Limits {
+            most_states: self.planner.most_states,
+            improve_states: self.planner.improve_states,
+            other_states: PLAN_STATES,
+            searches: MOST_SEARCHES,
+        };
+        let (world, settings) = (&*self.rollouts.world, self.planner.settings.clone());
+        let mut source = Candidates::new(task, situation, Some(world), settings, limits);
+        let plans = std::iter::from_fn(|| source.next(&mut |_| true));
+        plans.take(MOST_PLANS).map(|it| it.plan).collect()
+    }
+
+    fn choose(&mut self, scene: &Scene<'_>, mut ways: Vec<Way>) -> (Vec<Way>, Choice) {
+        let mut stage = Stage::new(scene, &self.rollouts);
+        let mut first = Vec::new();
+        for sample in 0..FIRST_LOOK {
+            first.push(stage.succeeds(self, scene, &ways[0], sample));
+        }
+        let failed = first.iter().filter(|success| !**success).count();
+        let few = match scene {
+            _ if scene.is_new || scene.is_given_up => 0,
+            _ if is_calm(scene) => FEW,
+            _ => FEWER,
+        };
+        if failed <= few {
+            let share = Rational::ONE - count(failed as u64) / count(FIRST_LOOK);
+            let choice = Choice {
+                way: 0,
+                value: share.clone(),
+                present: share,
+            };
+            return (ways, choice);
+        }
+        self.more_ways(scene, &mut ways);
+        let rounds: &[u64] = if scene.is_new {
+            &ROUNDS_OF_NEW
+        } else {
+            &ROUNDS
+        };
+        let (tallies, leader) = race(ways.len(), rounds, &mut |place, sample| {
+            let looked = usize::try_from(sample).ok().and_then(|it| first.get(it));
+            if let (0, Some(known)) = (place, looked) {
+                return Some(*known);
+            }
+            Some(stage.succeeds(self, scene, &ways[place], sample))
+        });
+        let is_ahead = if scene.is_new || scene.is_given_up {
+            let margin = if scene.is_new { MARGIN } else { u64::MAX };
+            let (best, own) = (tallies[leader].successes(), tallies[0].successes());
+            best > own && (best - own).saturating_mul(margin) >= tallies[leader].samples()
+        } else {
+            // Of many that were tried, some are ahead by chance: they must be so once more.
+            tallies[0].is_behind(&tallies[leader]) && {
+                let mut again = |way: &Way| {
+                    let samples = AGAIN..AGAIN + ROUNDS[ROUNDS.len() - 1];
+                    samples
+                        .map(|sample| stage.succeeds(self, scene, way, sample))
+                        .collect()
+                };
+                let own: Vec<bool> = again(&ways[0]);
+                is_behind(&own, &again(&ways[leader]))
+            }
+        };
+        let way = if is_ahead { leader } else { 0 };
+        let choice = Choice {
+            way,
+            value: share(&tallies[way]),
+            present: share(&tallies[0]),
+        };
+        (ways, choice)
+    }
+}
+
+/// Whether all has gone as it should.
+fn is_calm(scene: &Scene<'_>) -> bool {
+    let is_good = |news: &News| match news {
+        News::Started { .. } => true,
+        News::Ended { ending, .. } => *ending == Ending::Succeeded,
+        _ => false,
+    };
+    scene.news.iter().all(is_good)
+}
+
+fn count(number: u64) -> Rational {
+    Rational::from(i64::try_from(number).unwrap_or(i64::MAX))
+}
+
+fn share(tally: &Tally) -> Rational {
+    count(tally.successes()) / count(tally.samples().max(1))
+}

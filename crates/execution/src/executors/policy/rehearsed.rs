@@ -1,0 +1,403 @@
+//! `policy` where there is no table: what to do with a plan is tried out at each occasion.
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Step;
+use elbowroom_model::ground::FactId;
+use elbowroom_num::Rational;
+
+use crate::dispatch::replan;
+use crate::event::{Ending, Ticket};
+use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
+use crate::preparation::Need;
+use crate::progression::Progression;
+use crate::reason::{About, Cause, Reason};
+use crate::rehearsal::{Rehearsal, Rehearsing, Scene, SeenChange};
+
+use super::moves::wait;
+
+/// So often in the time that a plan takes it is looked ahead, whether or not something happens.
+const LOOKS: i64 = 8;
+
+/// Follows plans as `live` does, or as another executor does better, and gives them up when another
+/// one is likelier to succeed: as often as it reaches the goal in samples of the world.
+///
+/// Steps have numbers of their own for whoever executes: those of `live` are the run's, those of
+/// others are translated.
+pub(super) struct Rehearsed {
+    rehearsal: Box<dyn Rehearsal>,
+    /// `live`, who takes up each new plan.
+    keeper: Box<dyn Executor>,
+    /// Who has taken over from it.
+    other: Option<Box<dyn Executor>>,
+    /// By the run's number: what was ordered, or went on when the plan was taken up, and has not
+    /// ended.
+    steps: BTreeMap<StepId, Commanded>,
+    /// The run's next number.
+    next_step: u32,
+    /// The steps of the plan that were not begun, by the world's clock.
+    left: Vec<Step>,
+    /// The facts that may change by themselves, as they were last.
+    watched: Option<BTreeMap<FactId, bool>>,
+    seen: Vec<SeenChange>,
+    /// How many plans were taken up.
+    plans: usize,
+    /// What whoever executes is still to be told, because nothing was to be begun.
+    untold: Vec<News>,
+    /// Whether the plan is a new one.
+    is_new: bool,
+    /// Whether there was an occasion that could not be taken.
+    is_owed: bool,
+    /// When it was tried out last, and after how long to do so again.
+    looked: Option<Rational>,
+    period: Rational,
+}
+
+/// A step.
+#[derive(Clone, Debug)]
+struct Commanded {
+    /// The number by which whoever executes knows it; `None` if it does not.
+    inner: Option<StepId>,
+    name: String,
+    /// The ticket, if it is known.
+    ticket: Option<Ticket>,
+    /// The step of the plan, to be done again if it fails; `None` if it was under way when the plan
+    /// was taken up.
+    step: Option<Step>,
+    /// When it has started.
+    started: Option<Rational>,
+    is_let_go: bool,
+}
+
+impl Rehearsed {
+    pub(super) fn new(rehearsal: Box<dyn Rehearsal>, keeper: Box<dyn Executor>) -> Self {
+        Self {
+            rehearsal,
+            keeper,
+            other: None,
+            steps: BTreeMap::new(),
+            next_step: 0,
+            left: Vec::new(),
+            watched: None,
+            seen: Vec::new(),
+            plans: 0,
+            untold: Vec::new(),
+            is_new: false,
+            is_owed: false,
+            looked: None,
+            period: Rational::ONE,
+        }
+    }
+
+    fn present(&mut self) -> &mut dyn Executor {
+        match &mut self.other {
+            Some(other) => other.as_mut(),
+            None => self.keeper.as_mut(),
+        }
+    }
+
+    /// The news as whoever executes is told them.
+    fn learn(&mut self, moment: &Moment<'_>) -> Vec<News> {
+        self.watch(moment);
+        let mut told = Vec::with_capacity(moment.news.len());
+        for news in moment.news {
+            match news {
+                News::Started { step, .. } | News::Ended { step, .. } => {
+                    let inner = match self.steps.get(step) {
+                        Some(commanded) => commanded.inner,
+                        // Of a step before the present plan, as the run tells `live`.
+                        None => self.other.is_none().then_some(*step),
+                    };
+                    if let Some(inner) = inner {
+                        told.push(renamed(news, inner));
+                    }
+                    self.note(*step, news);
+                }
+                _ => told.push(news.clone()),
+            }
+        }
+        told
+    }
+
+    fn note(&mut self, step: StepId, news: &News) {
+        match news {
+            News::Started { time, .. } => {
+                if let Some(commanded) = self.steps.get_mut(&step) {
+                    commanded.started = Some(time.clone());
+                    let is_over = |step: &Step| step.duration.is_none();
+                    if commanded.step.as_ref().is_some_and(is_over) {
+                        self.steps.remove(&step);
+                    }
+                }
+            }
+            News::Ended { ending, .. } => {
+                if let Some(commanded) = self.steps.remove(&step)
+                    && *ending != Ending::Succeeded
+                {
+                    self.left.extend(commanded.step);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes note of changes of the facts that are watched.
+    fn watch(&mut self, moment: &Moment<'_>) {
+        let task = moment.belief.task();
+        let rehearsal = &self.rehearsal;
+        let watched = self.watched.get_or_insert_with(|| {
+            let initially = |fact: &FactId| task.initial().facts.contains(fact);
+            let facts = rehearsal.watched(task).into_iter();
+            facts.map(|fact| (fact, initially(&fact))).collect()
+        });
+        for (fact, known) in watched.iter_mut() {
+            let truth = moment.belief.fact(*fact);
+            if truth != *known {
+                *known = truth;
+                self.seen.push(SeenChange {
+                    time: moment.now.clone(),
+                    fact: *fact,
+                    truth,
+                    is_by_itself: moment.news.contains(&News::Fact(*fact)),
+                });
+            }
+        }
+    }
+
+    /// Whether it is to be tried out what does best. `kept` is what whoever executes says.
+    fn is_occasion(&mut self, moment: &Moment<'_>, kept: &Decided) -> bool {
+        let may_matter = |news: &News| !matches!(news, News::Started { .. });
+        let is_due = |looked: &Rational| *moment.now >= looked + &self.period;
+        let is_occasion = self.is_owed
+            || self.is_new
+            || kept.decision == Decision::Replan
+            || moment.news.iter().any(may_matter)
+            || self.looked.as_ref().is_none_or(is_due);
+        let mut steps = self.steps.values();
+        let is_busy = steps.any(|step| step.started.is_none() || step.is_let_go);
+        let is_over = matches!(kept.decision, Decision::GoalReached | Decision::Cancel(_));
+        self.is_owed = is_occasion && is_busy;
+        is_occasion && !is_busy && !is_over
+    }
+
+    /// The tickets of the steps that whoever executes knows of; its numbers.
+    fn running(&mut self, belief: &Progression) -> BTreeMap<StepId, Ticket> {
+        for commanded in self.steps.values_mut() {
+            let mut running = belief.running().iter();
+            let own = running.find(|(_, it)| {
+                it.action.name == commanded.name && Some(&it.start) == commanded.started.as_ref()
+            });
+            commanded.ticket = commanded.ticket.or(own.map(|(ticket, _)| *ticket));
+        }
+        let steps = self.steps.values();
+        let known = steps.filter_map(|it| Some((it.inner?, it.ticket?)));
+        known
+            .filter(|(_, ticket)| belief.running().contains_key(ticket))
+            .collect()
+    }
+
+    /// What to do, tried out. `before` is whoever executes, as it was before it decided `kept`.
+    fn rehearse(
+        &mut self,
+        moment: &Moment<'_>,
+        news: &[News],
+        before: Box<dyn Executor>,
+        kept: Decided,
+    ) -> Decided {
+        self.looked = Some(moment.now.clone());
+        let running = self.running(moment.belief);
+        let is_new = std::mem::take(&mut self.is_new);
+        let rehearsed = self.rehearsal.rehearse(&Scene {
+            belief: moment.belief,
+            seen: &self.seen,
+            present: before.as_ref(),
+            news,
+            running: &running,
+            is_given_up: kept.decision == Decision::Replan,
+            is_new,
+            left: &self.left,
+            replans: self.plans.saturating_sub(1),
+        });
+        match rehearsed.choice {
+            Rehearsing::AsDecided => self.outward(kept, moment.now),
+            Rehearsing::Replans => {
+                let about = About::Odds {
+                    present: rehearsed.present,
+                    other: rehearsed.value,
+                };
+                let reason = Reason::new(Cause::Likelier).about(about);
+                replan(reason.since(moment.now.clone()))
+            }
+            Rehearsing::WaitsUntil(until) => {
+                *self.present_box() = before;
+                self.untold = news.to_vec();
+                self.looked = None;
+                let value = rehearsed.value.to_f64();
+                wait(Some(until), About::NextDecision(value))
+            }
+            Rehearsing::HandsOver(executor, mission) => {
+                match self.hand_over(moment, executor, &mission) {
+                    Some(decided) => decided,
+                    None => self.outward(kept, moment.now),
+                }
+            }
+        }
+    }
+
+    fn present_box(&mut self) -> &mut Box<dyn Executor> {
+        match &mut self.other {
+            Some(other) => other,
+            None => &mut self.keeper,
+        }
+    }
+
+    /// Another executor takes up what is left; what it says.
+    fn hand_over(
+        &mut self,
+        moment: &Moment<'_>,
+        mut executor: Box<dyn Executor>,
+        mission: &Mission,
+    ) -> Option<Decided> {
+        executor.adopt(mission).ok()?;
+        for commanded in self.steps.values_mut() {
+            let mut running = mission.running.iter();
+            let own = running.find(|(_, ticket)| commanded.ticket == Some(**ticket));
+            commanded.inner = own.map(|(step, _)| *step);
+        }
+        let decided = executor.decide(&Moment {
+            news: &[],
+            ..*moment
+        });
+        self.other = Some(executor);
+        Some(self.outward(decided, moment.now))
+    }
+
+    /// A decision of whoever executes, in the run's numbers; it waits no longer than until it is
+    /// looked ahead again.
+    fn outward(&mut self, mut decided: Decided, now: &Rational) -> Decided {
+        match &mut decided.decision {
+            Decision::Start(orders) => {
+                for order in orders {
+                    self.order(order, now);
+                }
+            }
+            Decision::Cancel(steps) => {
+                for step in steps {
+                    let mut own = self.steps.iter_mut();
+                    if let Some((outer, commanded)) =
+                        own.find(|(_, commanded)| commanded.inner == Some(*step))
+                    {
+                        commanded.is_let_go = true;
+                        *step = *outer;
+                    }
+                }
+            }
+            Decision::Wait { until } => {
+                let next = self.looked.as_ref().map(|looked| looked + &self.period);
+                let next = next.filter(|next| next > now && !self.steps.is_empty());
+                *until = until.take().into_iter().chain(next).min();
+            }
+            Decision::Replan | Decision::GoalReached => {}
+        }
+        decided
+    }
+
+    fn order(&mut self, order: &mut Order, now: &Rational) {
+        let inner = order.step;
+        if self.other.is_some() {
+            order.step = StepId(self.next_step);
+            self.next_step = self.next_step.saturating_add(1);
+        }
+        let name = &order.action.name;
+        let mut left = self.left.iter().enumerate();
+        let place = left.find(|(_, step)| step.action.name == *name);
+        let step = match place.map(|(place, _)| place) {
+            Some(place) => self.left.remove(place),
+            None => Step {
+                start: now.clone(),
+                action: (*order.action).clone(),
+                duration: order.duration.clone(),
+            },
+        };
+        let commanded = Commanded {
+            inner: Some(inner),
+            name: name.clone(),
+            ticket: None,
+            step: Some(step),
+            started: None,
+            is_let_go: false,
+        };
+        self.steps.insert(order.step, commanded);
+    }
+}
+
+fn renamed(news: &News, inner: StepId) -> News {
+    let mut news = news.clone();
+    if let News::Started { step, .. } | News::Ended { step, .. } = &mut news {
+        *step = inner;
+    }
+    news
+}
+
+impl Executor for Rehearsed {
+    fn need(&self) -> Need {
+        self.keeper.need()
+    }
+
+    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+        self.other = None;
+        self.untold.clear();
+        let under_way = mission.time_triggered.steps.iter().zip(&mission.instances);
+        let own = |step: &Step| Step {
+            start: &step.start + &mission.origin,
+            ..step.clone()
+        };
+        self.steps = under_way
+            .filter_map(|(step, instance)| {
+                let number = StepId::from(*instance);
+                let commanded = Commanded {
+                    inner: Some(number),
+                    name: step.action.name.clone(),
+                    ticket: Some(*mission.running.get(&number)?),
+                    step: None,
+                    started: Some(mission.now.clone()),
+                    is_let_go: false,
+                };
+                Some((number, commanded))
+            })
+            .collect();
+        let steps = mission.time_triggered.steps.iter();
+        self.left = steps.skip(mission.running.len()).map(own).collect();
+        self.next_step = u32::try_from(mission.plan.plan.instances.len()).unwrap_or(u32::MAX);
+        self.plans += 1;
+        self.is_new = true;
+        let ends = mission.time_triggered.steps.iter().map(Step::end);
+        let length = ends.max().unwrap_or_default();
+        self.period = (length / Rational::from(LOOKS)).max(Rational::ONE);
+        self.keeper.adopt(mission)
+    }
+
+    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        let mut news = std::mem::take(&mut self.untold);
+        news.extend(self.learn(moment));
+        let before = self.present().fork();
+        let kept = self.present().decide(&Moment {
+            news: &news,
+            ..*moment
+        });
+        match before {
+            Some(before) if self.is_occasion(moment, &kept) => {
+                self.rehearse(moment, &news, before, kept)
+            }
+            _ => self.outward(kept, moment.now),
+        }
+    }
+
+    fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
+        let inner = self.steps.get(&step)?.inner?;
+        match &self.other {
+            Some(other) => other.window(inner, is_end),
+            None => self.keeper.window(inner, is_end),
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! What all trials of one problem in one column have in common: [`Place`].
+
+use std::sync::Arc;
+
+use elbowroom_execution::executors::{ExecutorSpec, Foresight};
+use elbowroom_execution::run::PlanningTime;
+use elbowroom_execution::{Outlook, PlanAnswer, Planner, Preparer};
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_pddl::Source;
+use elbowroom_probability::{Likelihoods, likelihoods};
+use elbowroom_sim::WorldModel;
+
+use super::beginnings::Beginning;
+use super::trials::{PLANS, PREPARED, Setting, world};
+use super::{Column, ExperimentError, Planning};
+use elbowroom::execute::{
+    Analyst, Choice, Chooser, Known, Likeliest, Rehearse, RememberingPlanner, RememberingPreparer,
+    Replanning, Rollouts, SharedLikeliest, SharedRehearse,
+};
+use elbowroom::timed::{Policy, Settings};
+
+/// A column for one problem.
+pub(super) struct Place {
+    pub(super) world: WorldModel,
+    pub(super) likelihoods: Arc<Likelihoods>,
+    pub(super) foresight: Foresight,
+    pub(super) preparer: RememberingPreparer<Analyst>,
+    /// For executors that look for likelier plans: who makes them, and the same with a memory.
+    pub(super) odds: SharedLikeliest,
+    pub(super) likeliest: RememberingPlanner<SharedLikeliest>,
+    /// For executors that weigh each move: the table, or who tries moves out where there is none.
+    pub(super) outlook: Option<Arc<dyn Outlook>>,
+    pub(super) rehearse: Option<SharedRehearse>,
+    /// The plan that each executor begins with.
+    pub(super) firsts: Vec<TimeTriggeredPlan>,
+    /// Those of them that were chosen by their probability.
+    pub(super) beginnings: Vec<Beginning>,
+}
+
+impl Setting<'_> {
+    /// A column, with the plan that each executor begins with; `first` is the planner's.
+    pub(super) fn place(
+        &self,
+        place: usize,
+        task: &Arc<Task>,
+        first: &TimeTriggeredPlan,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Place, ExperimentError> {
+        let column = &self.experiment.columns[place];
+        let world = world(column, task)?;
+        let likelihoods = Arc::new(match &column.likelihoods {
+            None => Likelihoods::certain(),
+            Some(text) => {
+                let name = format!("likelihoods of {}", column.name);
+                likelihoods::read(Source::new(name, text.as_str()), task)
+                    .map_err(ExperimentError::Text)?
+            }
+        });
+        let flow = self.flow(column, &world);
+        let mut preparer = RememberingPreparer::new(Analyst::new(flow), PREPARED);
+        for spec in &self.experiment.executors {
+            preparer
+                .prepare(task, first, spec.registered.need)
+                .map_err(|error| self.wrong(&error.to_string()))?;
+        }
+        let planning_time = match &self.experiment.settings.planning_time {
+            PlanningTime::Seconds(seconds) => seconds.clone(),
+            PlanningTime::Measured => Rational::ZERO,
+        };
+        let asks_outlook = self
+            .experiment
+            .executors
+            .iter()
+            .any(ExecutorSpec::asks_outlook);
+        let outlook = asks_outlook.then(|| {
+            let settings = Settings {
+                most_states: self.experiment.table_states,
+                ..Settings::default()
+            };
+            let policy = Policy::new(task, &world, &settings, goes_on);
+            let policy = policy.ok()?.filter(Policy::is_close)?;
+            Some(Arc::new(policy) as Arc<dyn Outlook>)
+        });
+        let outlook = outlook.flatten();
+        let rehearse = (asks_outlook && outlook.is_none()).then(|| {
+            // Who tries moves out is none of those that are tried.
+            let rollouts = self.rollouts(&ExecutorSpec::default(), column, (&world, &likelihoods));
+            SharedRehearse::new(Rehearse::new(rollouts, self.embedded()))
+        });
+        let odds = Likeliest::new(world.clone(), self.embedded(), planning_time);
+        let odds = SharedLikeliest::new(odds);
+        let mut likeliest = RememberingPlanner::new(odds.clone(), PLANS);
+        let mut firsts = Vec::with_capacity(self.experiment.executors.len());
+        let mut beginnings = Vec::new();
+        for (row, spec) in self.experiment.executors.iter().enumerate() {
+            let chosen = self.chosen(spec, column, (task, &world, &likelihoods), goes_on);
+            let likely = (chosen.is_none() && spec.asks_outlook()).then(|| {
+                let answer = likeliest.plan(task, &Situation::initial(task)).answer;
+                match answer {
+                    PlanAnswer::Plan(plan) => Some(plan),
+                    _ => None,
+                }
+            });
+            if let Some(choice) = &chosen {
+                beginnings.push(Beginning::of(choice, (self.problem, row, place)));
+            }
+            let plan = chosen.map(|choice| choice.plan).or(likely.flatten());
+            firsts.push(plan.unwrap_or_else(|| first.clone()));
+        }
+        Ok(Place {
+            outlook,
+            rehearse,
+            firsts,
+            beginnings,
+            world,
+            likelihoods,
+            foresight: Foresight::default(),
+            preparer,
+            likeliest,
+            odds,
+        })
+    }
+
+    /// The first plan that an executor begins with, if it is not the planner's; nor is it where
+    /// choosing was interrupted.
+    fn chosen(
+        &self,
+        spec: &ExecutorSpec,
+        column: &Column,
+        (task, world, likelihoods): (&Task, &WorldModel, &Arc<Likelihoods>),
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Choice> {
+        let experiment = self.experiment;
+        if experiment.first_plan.is_shortest() || experiment.planner != Planning::Embedded {
+            return None;
+        }
+        let embedded = self.embedded();
+        let chooser = Chooser {
+            most_states: embedded.most_states,
+            improve_states: embedded.improve_states,
+            known: Known::World(self.rollouts(spec, column, (world, likelihoods))),
+            settings: embedded.settings,
+            goes_on,
+        };
+        chooser.choose(task, &Situation::initial(task)).ok()
+    }
+
+    /// Trials of an executor in samples of a column's world.
+    fn rollouts(
+        &self,
+        spec: &ExecutorSpec,
+        column: &Column,
+        (world, likelihoods): (&WorldModel, &Arc<Likelihoods>),
+    ) -> Rollouts {
+        Rollouts {
+            world: Arc::new(world.clone()),
+            executor: spec.clone(),
+            settings: self.experiment.settings.clone(),
+            flow: self.flow(column, world),
+            likelihoods: Arc::clone(likelihoods),
+            replanning: Some(Replanning::within(&self.embedded())),
+            is_ready: true,
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! `policy` without its table: what can be done is tried out in samples of the world.
+//!
+//! `ELBOWROOM_TRIALS=400` makes that many trials of each world, and the table is printed
+//! (`--nocapture`); `ELBOWROOM_WORLDS="clumsy vase"` names other ones, and
+//! `ELBOWROOM_EXECUTORS="policy live"` other executors.
+
+#![allow(clippy::print_stdout, reason = "the table is worth seeing")]
+
+use elbowroom::execute::FirstPlan;
+use elbowroom_laboratory::compare::{Column, Experiment, Part, Results, run};
+use elbowroom_pddl::Source;
+
+/// `policy`, and whom it must not be below.
+const EXECUTORS: &str = "policy live:5 adaptable guarded esterel";
+
+fn told(name: &str, default: &str) -> String {
+    std::env::var(name).unwrap_or_else(|_| default.to_owned())
+}
+
+/// An experiment in which `policy` has no table.
+fn experiment(name: &str) -> Experiment {
+    let folder = format!("{}/../../experiments", env!("CARGO_MANIFEST_DIR"));
+    let file = |path: &str| {
+        std::fs::read_to_string(format!("{folder}/{path}")).map_err(|error| error.to_string())
+    };
+    let text = file(&format!("{name}.toml")).expect("it is there");
+    let read = Experiment::read(Source::new(name, text.as_str()), &file);
+    let executors = told("ELBOWROOM_EXECUTORS", EXECUTORS);
+    let executors = executors
+        .split_whitespace()
+        .map(|it| it.parse().expect("a name"));
+    Experiment {
+        executors: executors.collect(),
+        first_plan: FirstPlan::Shortest,
+        optimum: false,
+        clairvoyant: false,
+        table_states: 0,
+        ..read.expect("it is an experiment")
+    }
+}
+
+fn results(experiment: &Experiment, jobs: usize, trials: u64) -> Results {
+    let part = Part {
+        trials,
+        shard: 0,
+        shards: 1,
+        jobs,
+    };
+    run(experiment, part, &|_| true).expect("it runs")
+}
+
+/// The best that anybody reaches without foresight, by the bounds in docs/experiments.md, and how much
+/// less is near: three standard errors of 40 trials, and five points.
+const NEAR: [(&str, f64); 2] = [("weld", 0.957 - 0.15), ("vase", 0.976 - 0.13)];
+
+#[test]
+#[allow(clippy::cast_precision_loss, reason = "there are few trials")]
+fn without_a_table_it_is_near_the_optimum_and_not_below_who_does_not_weigh_moves() {
+    let trials = told("ELBOWROOM_TRIALS", "40").parse().expect("a number");
+    for name in told("ELBOWROOM_WORLDS", "vase weld").split_whitespace() {
+        let mut experiment = experiment(name);
+        if let Ok(only) = std::env::var("ELBOWROOM_COLUMN") {
+            let is_meant = |column: &Column| column.name.contains(&only);
+            experiment.columns.retain(is_meant);
+        }
+        let results = results(&experiment, 2, trials);
+        for (column, place) in experiment.columns.iter().enumerate() {
+            for (row, executor) in results.rows.iter().enumerate() {
+                let cell = &results.cells[row][column];
+                let pair = results.pairs[row][column];
+                println!(
+                    "{name} {}: {executor} {} of {}, {} replans; only policy {}, only {executor} {}",
+                    place.name,
+                    cell.successes,
+                    cell.runs,
+                    cell.replans,
+                    pair.only_first,
+                    pair.only_this,
+                );
+                let (lost, won) = (pair.only_this as f64, pair.only_first as f64);
+                assert!(
+                    lost - won <= 3.0 * (lost + won).sqrt(),
+                    "{name}: {executor} is better: {lost} against {won}"
+                );
+            }
+            let share = results.cells[0][column].successes as f64 / trials as f64;
+            for (_, near) in NEAR.iter().filter(|(near, _)| *near == name) {
+                assert!(share >= *near, "{name}: {share} is not near the optimum");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_tried_out_does_not_depend_on_the_number_of_threads() {
+    let mut experiment = experiment("weld");
+    experiment.executors.truncate(1);
+    let (one, many) = (results(&experiment, 1, 6), results(&experiment, 3, 6));
+    assert_eq!(one.json(), many.json());
+}

@@ -1,0 +1,213 @@
+//! Worlds that begin in the middle of things, as they may go on after what has been seen of them.
+
+use elbowroom_execution::{Progression, SeenChange, Ticket, Underway};
+use elbowroom_model::ground::FactId;
+use elbowroom_num::Rational;
+use rand::Rng;
+
+use super::{Coming, Commanded, SimWorld};
+use crate::draw::{Purpose, keyed};
+use crate::model::{Exogenous, ExogenousChange, Failure, WorldModel};
+
+/// So many draws are made for one that goes with what has been seen.
+const DRAWS: u64 = 64;
+
+/// When two times count as the same, to find out which event it was: that part of the range of what
+/// can be drawn.
+const SAME: f64 = 0.05;
+
+/// What an observer has seen of the facts that may change by themselves.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    /// Each change of such a fact, in the order of time, and whether the world has made it.
+    pub changes: Vec<SeenChange>,
+}
+
+impl Seen {
+    /// Whether the fact was so at that time, which is before the present; `initially` if nothing
+    /// was seen before.
+    fn was(&self, fact: FactId, time: &Rational, initially: bool) -> bool {
+        let mut before = self
+            .changes
+            .iter()
+            .filter(|it| it.fact == fact && it.time <= *time);
+        before.next_back().map_or(initially, |it| it.truth)
+    }
+}
+
+impl<'a> SimWorld<'a> {
+    /// A world that goes on from what is believed, which is taken for true, at its time.
+    ///
+    /// What is under way has the rest of a duration that is drawn from those that are longer than
+    /// it has taken by now, and fails as often as what has not failed by now. Events that are to
+    /// come are drawn from those that go with what was seen. What is started from now on depends
+    /// on the seed and on how often it was started from now on alone, so that others who go on from
+    /// here meet the same world, as far as they do the same.
+    pub fn amid(belief: &Progression, model: &'a WorldModel, seed: u64, past: &Seen) -> Self {
+        let now = belief.time().clone();
+        let mut world = Self::empty(belief.clone(), model, seed);
+        world.now.clone_from(&now);
+        for (ticket, underway) in belief.running() {
+            world.go_on(*ticket, underway);
+        }
+        let over = world.matched(past);
+        for (index, exogenous) in model.exogenous.iter().enumerate() {
+            if over.contains(&index) {
+                continue;
+            }
+            if let Some(time) = world.to_come(index, exogenous, past) {
+                world.put(time, Coming::Exogenous(index));
+            }
+        }
+        world.expose();
+        world
+    }
+
+    /// Draws how an action under way goes on.
+    fn go_on(&mut self, ticket: Ticket, underway: &Underway) {
+        let name = &underway.action.name;
+        let mut commanded = Commanded {
+            action: underway.action.clone(),
+            planned: Some(underway.planned.clone()),
+            occurrence: 0,
+            has_started: true,
+            outcome: None,
+            is_broken: false,
+        };
+        let key = format!("{name} under way since {}", underway.start);
+        let failing = self.model.failing(name);
+        let mut coming = None;
+        for draw in 0..DRAWS {
+            let rng = |purpose| keyed(self.seed, &key, draw, purpose);
+            let duration =
+                self.model
+                    .duration(name, &underway.planned, &mut rng(Purpose::Duration));
+            let mut dice = rng(Purpose::Failure);
+            let fails = failing.filter(|failing| dice.random::<f64>() < failing.probability);
+            let Some(failing) = fails.filter(|failing| failing.when != Failure::AtStart) else {
+                let end = &underway.start + &duration;
+                // What failed at its start is not under way.
+                if fails.is_none() && end > self.now {
+                    coming = Some((end, Coming::End(ticket)));
+                    break;
+                }
+                continue;
+            };
+            let outcome = failing.outcome(&mut rng(Purpose::Outcome));
+            let share = match failing.when {
+                Failure::Midway => crate::draw::rounded(dice.random(), &self.model.resolution),
+                _ => Rational::ONE,
+            };
+            let breaks = &underway.start + duration * share;
+            let fails = outcome.map_or(breaks.clone(), |outcome| &breaks + &outcome.delay);
+            if fails > self.now {
+                commanded.outcome = outcome;
+                commanded.is_broken = breaks <= self.now;
+                coming = Some(if commanded.is_broken {
+                    (fails, Coming::Fail(ticket))
+                } else {
+                    (breaks, Coming::Break(ticket))
+                });
+                break;
+            }
+        }
+        // Nobody has seen it last that long: it may as well last a quarter longer.
+        let late = || {
+            let elapsed = &self.now - &underway.start;
+            let quarter = elapsed / Rational::from(4);
+            &self.now + quarter.max(self.model.resolution.clone())
+        };
+        let (time, what) = coming.unwrap_or_else(|| (late(), Coming::End(ticket)));
+        self.actions.insert(ticket, commanded);
+        self.put(time, what);
+    }
+
+    /// Which events were those that were seen: of several that it may have been, each as often as
+    /// it comes at such a time.
+    fn matched(&self, past: &Seen) -> Vec<usize> {
+        let mut matched: Vec<usize> = Vec::new();
+        let changes = past.changes.iter().filter(|change| change.is_by_itself);
+        for (number, change) in changes.enumerate() {
+            let events = self.model.exogenous.iter().enumerate();
+            let weights: Vec<(usize, u64)> = events
+                .filter(|(index, event)| {
+                    !matched.contains(index)
+                        && self.changes(event) == Some((change.fact, change.truth))
+                })
+                .map(|(index, event)| (index, self.often_at(index, event, &change.time)))
+                .collect();
+            let all: u64 = weights.iter().map(|(_, weight)| weight).sum();
+            if all == 0 {
+                // A fact that changes at a rate, or what a failure has left behind.
+                continue;
+            }
+            let key = format!("seen {number}");
+            let mut left = keyed(self.seed, &key, 0, Purpose::Exogenous).random_range(0..all);
+            for (index, weight) in weights {
+                if left < weight {
+                    matched.push(index);
+                    break;
+                }
+                left -= weight;
+            }
+        }
+        matched
+    }
+
+    /// The fact that an event changes, and what it becomes.
+    fn changes(&self, event: &Exogenous) -> Option<(FactId, bool)> {
+        match &event.change {
+            ExogenousChange::Fact(name, truth) => {
+                Some((self.truth.task().fact_named(name)?, *truth))
+            }
+            ExogenousChange::Value(..) => None,
+        }
+    }
+
+    fn drawn(&self, index: usize, event: &Exogenous, draw: u64) -> Option<Rational> {
+        let name = match &event.change {
+            ExogenousChange::Fact(name, _) | ExogenousChange::Value(name, _) => name,
+        };
+        let key = format!("{name} seen from {}", self.now);
+        let occurrence = index as u64 * DRAWS + draw;
+        let mut rng = keyed(self.seed, &key, occurrence, Purpose::Exogenous);
+        let happens = rng.random::<f64>() < event.probability;
+        let time = event
+            .time
+            .draw(&Rational::ZERO, &self.model.resolution, &mut rng);
+        happens.then(|| time.max(Rational::ZERO))
+    }
+
+    /// How many draws come at about that time.
+    fn often_at(&self, index: usize, event: &Exogenous, time: &Rational) -> u64 {
+        let drawn = (0..DRAWS).filter_map(|draw| self.drawn(index, event, draw));
+        let drawn: Vec<f64> = drawn.map(|time| time.to_f64()).collect();
+        let least = drawn.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = drawn.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let width = ((most - least) * SAME).max(self.model.resolution.to_f64());
+        let near = |it: &&f64| (*it - time.to_f64()).abs() <= width;
+        drawn.iter().filter(near).count() as u64
+    }
+
+    /// When an event is still to come, if it is: given that it was not seen.
+    fn to_come(&self, index: usize, event: &Exogenous, past: &Seen) -> Option<Rational> {
+        for draw in 0..DRAWS {
+            let time = self.drawn(index, event, draw)?;
+            if time > self.now {
+                return Some(time);
+            }
+            // If it has happened and was to be seen, it must have changed nothing.
+            let went_unseen = match self.changes(event) {
+                Some((fact, truth)) => {
+                    let initially = self.truth.task().initial().facts.contains(&fact);
+                    !event.is_reported || past.was(fact, &time, initially) == truth
+                }
+                None => true,
+            };
+            if went_unseen {
+                return (!event.is_reported).then(|| self.now.clone());
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,171 @@
+//! Worlds that begin in the middle of things, beside a plain twin: of many worlds from the
+//! beginning, those in which the same has been seen until then.
+
+use std::sync::Arc;
+
+use elbowroom_execution::{
+    Command, Ending, Event, Passage, Progression, SeenChange, Ticket, World,
+};
+use elbowroom_model::Task;
+use elbowroom_model::ground::Action;
+use elbowroom_model::problem::SchemaId;
+use elbowroom_num::Rational;
+use elbowroom_pddl::{Source, read_problem};
+use elbowroom_sim::{Seen, WorldModel};
+
+const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions)
+    (:predicates (done) (open) (lit))
+    (:durative-action work :parameters () :duration (= ?duration 5)
+      :condition () :effect (at end (done))))";
+
+const PROBLEM: &str = "(define (problem p) (:domain d) (:init (open) (lit)) (:goal (done)))";
+
+/// It takes 2 to 8, and fails midway three times in ten; the door shuts once, early or late, and the
+/// light goes out half of the time.
+const WORLD: &str = "format = \"elbowroom-world\"\nversion = 1\n
+    [[duration]]\naction = \"work\"\nuniform = { from = 2, to = 8 }\n
+    [[failure]]\naction = \"work\"\nprobability = 0.3\nwhen = \"midway\"\n
+    [[event]]\nfact = \"(open)\"\nbecomes = false\nuniform = { from = 0, to = 6 }\nprobability = 0.5\n
+    [[event]]\nfact = \"(open)\"\nbecomes = false\nuniform = { from = 3, to = 12 }\nprobability = 0.8\n
+    [[event]]\nfact = \"(lit)\"\nbecomes = false\nuniform = { from = 0, to = 10 }\nprobability = 0.5\n";
+
+fn task() -> Arc<Task> {
+    let source = |text: &str| Source::new("test", text);
+    let (problem, _) = read_problem(&source(DOMAIN), &source(PROBLEM)).unwrap();
+    Arc::new(Task::new(problem))
+}
+
+fn work(task: &Task) -> Action {
+    task.instantiate(SchemaId::from(0), &[]).unwrap()
+}
+
+/// What is seen of a world from now until 20.
+#[derive(Debug, Default, PartialEq)]
+struct Course {
+    /// When the action has ended, and whether as it should.
+    ended: Option<(f64, bool)>,
+    door_shut: Option<f64>,
+    light_out: Option<f64>,
+}
+
+fn course(task: &Task, world: &mut dyn World) -> Course {
+    let mut course = Course::default();
+    let end = Rational::from(20);
+    loop {
+        let Passage { now, observations } = world.wait(&end).unwrap();
+        for observation in observations {
+            let time = observation.time.to_f64();
+            match observation.event {
+                Event::Ended { ending, .. } => {
+                    course.ended = Some((time, ending == Ending::Succeeded));
+                }
+                Event::Fact { fact, .. } if task.fact_name(fact) == "(open)" => {
+                    course.door_shut = course.door_shut.or(Some(time));
+                }
+                Event::Fact { .. } => course.light_out = Some(time),
+                _ => {}
+            }
+        }
+        if now >= end {
+            return course;
+        }
+    }
+}
+
+/// Worlds from the beginning, in which the work is begun at 0.
+fn from_the_beginning(task: &Arc<Task>, model: &WorldModel, seed: u64) -> Course {
+    let mut world = model.world(task, seed);
+    let action = work(task);
+    let start = Command::Start {
+        ticket: Ticket(0),
+        action: Arc::new(action),
+        duration: Some(Rational::from(5)),
+    };
+    world.command(&Rational::ZERO, &start).unwrap();
+    course(task, world.as_mut())
+}
+
+/// By 4 the work goes on, the light is on, and the door is shut since 3.5 or open.
+#[allow(clippy::cast_precision_loss, reason = "there are few worlds")]
+fn shares(courses: &[Course]) -> [f64; 4] {
+    let share = |is_so: &dyn Fn(&Course) -> bool| {
+        courses.iter().filter(|it| is_so(it)).count() as f64 / courses.len() as f64
+    };
+    [
+        share(&|it| it.ended.is_some_and(|(_, succeeded)| succeeded)),
+        share(&|it| it.ended.is_some_and(|(time, _)| time > 6.0)),
+        share(&|it| it.light_out.is_some()),
+        share(&|it| it.door_shut.is_some_and(|time| time > 4.0)),
+    ]
+}
+
+#[test]
+fn what_is_to_come_is_drawn_given_what_was_seen() {
+    let task = task();
+    let model = WorldModel::read(WORLD, task.problem()).unwrap();
+    let goes_with = |course: &Course| {
+        let is_later = |time: Option<f64>| time.is_none_or(|time| time > 4.0);
+        is_later(course.ended.map(|(time, _)| time))
+            && is_later(course.light_out)
+            && is_later(course.door_shut)
+    };
+    let all = (0..20_000).map(|seed| from_the_beginning(&task, &model, seed));
+    let kept: Vec<Course> = all.filter(goes_with).collect();
+
+    let mut belief = Progression::new(Arc::clone(&task));
+    let action = Arc::new(work(&task));
+    belief
+        .start(Ticket(0), &action, &Rational::from(5), &[])
+        .unwrap();
+    belief.advance(&Rational::from(4)).unwrap();
+    let drawn = (0..4000).map(|seed| {
+        let mut world = model.world_amid(&belief, seed, &Seen::default());
+        course(&task, world.as_mut())
+    });
+    let drawn: Vec<Course> = drawn.collect();
+    assert!(drawn.iter().all(goes_with));
+    assert!(kept.len() > 1000, "{}", kept.len());
+    for (plain, drawn) in shares(&kept).into_iter().zip(shares(&drawn)) {
+        assert!((plain - drawn).abs() < 0.05, "{plain} beside {drawn}");
+    }
+}
+
+/// The door was seen to shut at 3.5: nothing more shuts it.
+#[test]
+fn what_was_seen_does_not_come_again() {
+    let task = task();
+    let model = WorldModel::read(WORLD, task.problem()).unwrap();
+    let fact = task.fact_named("(open)").unwrap();
+    let mut belief = Progression::new(Arc::clone(&task));
+    belief.advance(&Rational::from(4)).unwrap();
+    belief.change_fact(fact, false);
+    let seen = Seen {
+        changes: vec![SeenChange {
+            time: Rational::new(7, 2),
+            fact,
+            truth: false,
+            is_by_itself: true,
+        }],
+    };
+    let again = (0..200).filter(|seed| {
+        let mut world = model.world_amid(&belief, *seed, &seen);
+        course(&task, world.as_mut()).door_shut.is_some()
+    });
+    // The other event, with the door shut already, is told and changes nothing.
+    let again = again.count();
+    assert!((40..=180).contains(&again), "{again}");
+}
+
+/// Two who go on from here meet the same world as far as they do the same.
+#[test]
+fn the_same_seed_goes_on_in_the_same_way() {
+    let task = task();
+    let model = WorldModel::read(WORLD, task.problem()).unwrap();
+    let belief = Progression::new(Arc::clone(&task));
+    let one = |seed| {
+        let mut world = model.world_amid(&belief, seed, &Seen::default());
+        course(&task, world.as_mut())
+    };
+    assert!((0..20).all(|seed| one(seed) == one(seed)));
+    assert!((1..20).any(|seed| one(seed) != one(0)));
+}
