@@ -37,9 +37,10 @@ pub(crate) struct RunArgs {
     pub(crate) planner_time: Option<Rational>,
     /// By what the plan to begin with is chosen, where the embedded planner makes it: the shortest,
     /// or, of several, the one with which the executor succeeds most often in samples of --world;
-    /// without a world file, the one whose actions are likeliest to succeed by --likelihoods
-    #[arg(long = "first-plan", value_enum, default_value_t = FirstPlanChoice::Shortest)]
-    pub(crate) first_plan_by: FirstPlanChoice,
+    /// without a world file, the one whose actions are likeliest to succeed by --likelihoods. By
+    /// default the likeliest where one of the two is given, and the shortest elsewhere
+    #[arg(long = "first-plan", value_enum)]
+    pub(crate) first_plan_by: Option<FirstPlanChoice>,
     /// Number of states that the embedded planner may evaluate for a plan
     #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = whole)]
     #[arg(allow_negative_numbers = true)]

@@ -71,6 +71,10 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         return Ok(Exit::Yes);
     }
     spec.is_lasting = true;
+    // Whoever asks for another first plan is told why there is none.
+    if arguments.run.first_plan_by.is_none() {
+        spec.first_plan = spec.usual_first_plan();
+    }
     if spec.world_process.is_none() && spec.realtime.is_none() {
         spec.realtime = Some(Rational::ONE);
         if arguments.run.planning_time.is_none() {

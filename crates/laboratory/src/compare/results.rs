@@ -8,6 +8,7 @@ use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
 use serde::{Deserialize, Serialize};
 
+use super::beginnings::{self, Beginning};
 use super::clairvoyant;
 use super::experiment::CLAIRVOYANT;
 use super::optimum::{self, ColumnOptimum};
@@ -41,6 +42,9 @@ pub struct Results {
     pub cells: Vec<Vec<Cell>>,
     /// The rows compared in pairs with the first one, by row and column.
     pub pairs: Vec<Vec<Pair>>,
+    /// With which plans executors begin, where these were chosen by their probability.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub beginnings: Vec<Beginning>,
     /// By column, if the experiment asks for it: what the best of all executors could reach.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub optimum: Vec<ColumnOptimum>,
@@ -102,6 +106,7 @@ impl Results {
             is_interrupted: false,
             cells: vec![vec![Cell::default(); columns.len()]; rows.len()],
             pairs: vec![vec![Pair::default(); columns.len()]; rows.len()],
+            beginnings: Vec::new(),
             optimum: Vec::new(),
             rows,
             columns,
@@ -256,6 +261,11 @@ impl Results {
         if !self.optimum.is_empty() {
             notes.push(format!("`{}`: {}", optimum::ROW, optimum::SUMMARY));
         }
+        notes.extend(beginnings::notes(
+            &self.beginnings,
+            &self.rows,
+            &self.columns,
+        ));
         for (name, column) in self.columns.iter().zip(&self.optimum) {
             let reason = column.unknown.as_ref();
             notes.extend(
@@ -297,6 +307,7 @@ impl Partial for Results {
 
     fn add(&mut self, other: &Self) {
         self.is_interrupted |= other.is_interrupted;
+        beginnings::merge(&mut self.beginnings, &other.beginnings);
         // Every part has all of it.
         if self.optimum.is_empty() {
             self.optimum.clone_from(&other.optimum);

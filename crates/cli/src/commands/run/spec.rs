@@ -31,10 +31,6 @@ pub(in crate::commands) fn of(
         world_process: arguments.world_process.clone(),
         has_plan: arguments.plan().is_some(),
         seed: arguments.seed,
-        first_plan: match arguments.first_plan_by {
-            FirstPlanChoice::Shortest => FirstPlan::Shortest,
-            FirstPlanChoice::Likeliest => FirstPlan::Likeliest,
-        },
         planner_states: arguments.planner_states,
         improve_states: arguments.improve_states,
         guarantee: arguments.guarantee.into(),
@@ -81,6 +77,11 @@ pub(in crate::commands) fn of(
         spec.world = Some(source.text().to_owned());
         world = Some(source);
     }
+    spec.first_plan = match arguments.first_plan_by {
+        Some(FirstPlanChoice::Shortest) => FirstPlan::Shortest,
+        Some(FirstPlanChoice::Likeliest) => FirstPlan::Likeliest,
+        None => spec.usual_first_plan(),
+    };
     Ok((spec, world))
 }
 

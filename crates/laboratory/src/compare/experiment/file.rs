@@ -87,15 +87,20 @@ impl File {
         Ok(())
     }
 
-    /// By what first plans are chosen; another planner gives only its own plan.
+    /// By what first plans are chosen: by their probability, unless it is said otherwise; another
+    /// planner gives only its own plan.
     pub(super) fn first_plan(&self) -> Result<FirstPlan, (Span, String)> {
-        let Some(given) = &self.first_plan else {
-            return Ok(FirstPlan::default());
-        };
         let is_embedded = self
             .planner
             .as_ref()
             .is_none_or(|name| name.get_ref() == EMBEDDED);
+        let Some(given) = &self.first_plan else {
+            return Ok(if is_embedded {
+                FirstPlan::Likeliest
+            } else {
+                FirstPlan::Shortest
+            });
+        };
         if is_embedded || given.get_ref().is_shortest() {
             return Ok(*given.get_ref());
         }
