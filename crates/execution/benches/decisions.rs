@@ -70,6 +70,7 @@ fn row(executor: &str, robots: usize, actions: usize) {
         odds: None,
         foresight: Foresight::default(),
         outlook: None,
+        rehearsal: None,
     });
     let begin = Instant::now();
     decider.adopt(&mission).expect("a plan with orders");

@@ -82,6 +82,7 @@ fn rows(name: &str) {
                     odds: None,
                     foresight: Foresight::default(),
                     outlook: spec.asks_outlook().then(|| Arc::clone(&policy)),
+                    rehearsal: None,
                 }),
                 times: Arc::clone(&times),
             };

@@ -69,13 +69,14 @@ fn without_a_table_it_is_near_the_optimum_and_not_below_who_does_not_weigh_moves
                 let cell = &results.cells[row][column];
                 let pair = results.pairs[row][column];
                 println!(
-                    "{name} {}: {executor} {} of {}, {} replans; only policy {}, only {executor} {}",
+                    "{name} {}: {executor} {} of {}, {} replans; only policy {}, only {executor} {}; {:?}",
                     place.name,
                     cell.successes,
                     cell.runs,
                     cell.replans,
                     pair.only_first,
                     pair.only_this,
+                    cell.causes,
                 );
                 let (lost, won) = (pair.only_this as f64, pair.only_first as f64);
                 assert!(

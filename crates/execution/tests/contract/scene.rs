@@ -63,6 +63,7 @@ impl Scene {
             preparer: Box::new(ByHand),
             executor: spec.build(Means {
                 outlook: None,
+                rehearsal: None,
                 region: Box::new(Everywhere),
                 likelihoods: Arc::new(Likelihoods::certain()),
                 odds: None,
