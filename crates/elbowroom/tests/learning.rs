@@ -85,6 +85,7 @@ fn learnt(logs: Vec<Log>, inside: Option<InsideRequest>) -> LearnAnswer {
         logs,
         settings: Settings::default(),
         inside,
+        expected: None,
     };
     learn(&request, &mut Unwatched).expect("an answer")
 }
@@ -349,4 +350,74 @@ fn what_a_failure_undoes_has_not_changed_by_itself() {
     let picks = answer.actions.iter().find(|action| action.action == "pick");
     assert!(picks.is_some_and(|pick| pick.failures.failed > 0));
     assert_eq!(answer.changes, []);
+}
+
+/// Whoever went by the true rates sees as many changes as they let expect; whoever went by others is
+/// told so, also of facts that did not change at all.
+#[test]
+fn expected_changes_stand_beside_those_that_were_seen() {
+    let world = format!(
+        "{WORLD}[[hazard]]\nfact = \"unlocked\"\nbecomes_true_per_second = 0.01\n\
+         becomes_false_per_second = 0.04\n"
+    );
+    let logs: Vec<Log> = (0..50)
+        .map(|number| {
+            let (trace, _) = run(&world, number);
+            Log::read(&Source::new(format!("run {number}"), trace)).expect("a trace")
+        })
+        .collect();
+    let asked = |logs: &[Log], expected: &str| {
+        let request = LearnRequest {
+            logs: logs.to_vec(),
+            settings: Settings::default(),
+            inside: None,
+            expected: Some(Source::new("expected.toml", expected)),
+        };
+        learn(&request, &mut Unwatched)
+    };
+    let answer = asked(&logs, &world).expect("an answer");
+    assert_eq!(answer.changes.len(), 2);
+    for (learnt, rate) in answer.changes.iter().zip([0.04, 0.01]) {
+        let expected = learnt.all.expected.expect("it was asked for");
+        assert!((expected - rate * learnt.all.seconds).abs() < 1e-6 * expected);
+        #[allow(clippy::cast_precision_loss, reason = "few changes")]
+        let seen = learnt.all.changes as f64;
+        assert!(
+            (seen - expected).abs() <= 3.5 * expected.sqrt(),
+            "{learnt:?}"
+        );
+    }
+    // Of two predicates: one that changed where nothing was expected, and the other way round.
+    let other = "format = \"elbowroom-world\"\nversion = 1\n[[hazard]]\nfact = \"idle\"\n\
+                 becomes_false_per_second = 0.5\n";
+    let answer = asked(&logs, other).expect("an answer");
+    let told: Vec<_> = answer
+        .changes
+        .iter()
+        .map(|it| (it.predicate.as_str(), it.becomes, it.all.changes > 0))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            ("idle", false, false),
+            ("unlocked", false, true),
+            ("unlocked", true, true)
+        ]
+    );
+    assert!(answer.changes[0].all.expected > Some(1.0));
+    assert_eq!(answer.changes[1].all.expected, Some(0.0));
+    // What cannot be compared is said.
+    let without_facts: Vec<Log> = logs
+        .iter()
+        .cloned()
+        .map(|log| Log {
+            course: None,
+            ..log
+        })
+        .collect();
+    let refused = asked(&without_facts, &world).expect_err("tables tell nothing of facts");
+    assert!(refused.to_string().contains("tables of attempts do not"));
+    let wrong = world.replace("\"unlocked\"", "\"unlokced\"");
+    let refused = asked(&logs, &wrong).expect_err("no such predicate");
+    assert!(refused.to_string().contains("unlocked"), "{refused}");
 }

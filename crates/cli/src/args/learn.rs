@@ -16,6 +16,9 @@ pub(crate) struct LearnArgs {
     /// Write what was learnt as a world file, for `elbowroom run --world`
     #[arg(short, long, value_name = "WORLD.toml")]
     pub(crate) output: Option<PathBuf>,
+    /// Compare how often facts changed by themselves with the rates of this world file
+    #[arg(long, value_name = "WORLD.toml")]
+    pub(crate) world: Option<PathBuf>,
     /// Times in the logs are multiples of this, in seconds
     #[arg(long, value_name = "S", default_value = "0.001", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]

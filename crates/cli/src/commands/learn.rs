@@ -56,6 +56,10 @@ pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
             seed: arguments.seed,
         },
         inside,
+        expected: match &arguments.world {
+            Some(path) => Some(input::source(path, "world")?),
+            None => None,
+        },
     };
     let answer = learn(&request, &mut Unwatched).map_err(|error| Failure::new(error, ""))?;
     if let Some(path) = &arguments.output {
@@ -185,16 +189,21 @@ fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
     if answer.changes.is_empty() {
         return;
     }
+    // Expectation beside reality, where a world was expected.
+    let is_expected = answer.changes.iter().any(|it| it.all.expected.is_some());
     let row = |name: &str, becomes: bool, rate: &RateLearnt| {
         let (lower, upper) = rate.interval.unwrap_or((0.0, f64::INFINITY));
-        vec![
-            name.to_owned(),
-            becomes.to_string(),
+        let mut row = vec![name.to_owned(), becomes.to_string()];
+        if is_expected {
+            row.push(rate.expected.map_or(String::new(), short));
+        }
+        row.extend([
             rate.changes.to_string(),
             short(rate.seconds),
             rate.per_second.map_or(String::new(), rate_words),
             format!("{} to {}", rate_words(lower), rate_words(upper)),
-        ]
+        ]);
+        row
     };
     let mut rows = Vec::new();
     for learnt in &answer.changes {
@@ -202,11 +211,14 @@ fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
         let apart = learnt.apart.iter();
         rows.extend(apart.map(|(fact, rate)| row(&format!("  {fact}"), learnt.becomes, rate)));
     }
+    let mut headings = vec!["fact", "becomes"];
+    if is_expected {
+        headings.push("expected");
+    }
+    headings.extend(["times", "seconds", "per second", "95 %"]);
     let table = Table {
         caption: String::new(),
-        headings: ["fact", "becomes", "times", "seconds", "per second", "95 %"]
-            .map(str::to_owned)
-            .to_vec(),
+        headings: headings.into_iter().map(str::to_owned).collect(),
         keys: 2,
         rows,
         notes: Vec::new(),
@@ -214,6 +226,31 @@ fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
     text.push('\n');
     text.push_str("Changes that no action and no timed initial makes:\n\n");
     text.push_str(table.within(look.width).trim_start_matches('\n'));
+    for learnt in answer.changes.iter().filter(|it| is_surprising(&it.all)) {
+        let becomes = if learnt.becomes { "true" } else { "false" };
+        let words = format!(
+            "{}: that facts of {} become {becomes} {} hardly be so by chance, if the rate is the \
+             one of the world file.",
+            styled(HINT, "surprise"),
+            learnt.predicate,
+            if learnt.all.changes == 1 {
+                "once can".to_owned()
+            } else {
+                format!("{} times can", learnt.all.changes)
+            },
+        );
+        text.push('\n');
+        push_paragraph(text, &words, look.width);
+    }
+}
+
+/// Whether the rate that was expected lies outside the 95 % interval of what was seen.
+fn is_surprising(rate: &RateLearnt) -> bool {
+    let Some((expected, (lower, upper))) = rate.expected.zip(rate.interval) else {
+        return false;
+    };
+    let expected = expected / rate.seconds;
+    expected < lower || expected > upper
 }
 
 /// Rates are small numbers: four digits behind the point.

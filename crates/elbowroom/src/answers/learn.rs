@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{RequestError, Version, Watcher};
 
+use changes::Expected;
 pub use changes::{ChangesLearnt, RateLearnt};
 pub use courses::Course;
 pub use elbowroom_learning::learn::Settings;
@@ -29,6 +30,8 @@ pub struct LearnRequest {
     pub settings: Settings,
     /// Whether the next run will stay inside the envelope of a plan, if that is asked.
     pub inside: Option<InsideRequest>,
+    /// The world file that was expected, if changes by themselves are to be compared with it.
+    pub expected: Option<Source>,
 }
 
 /// The content of one log.
@@ -98,7 +101,8 @@ pub struct LearnAnswer {
     pub attempts: usize,
     /// Statistics of the attempts, by the actions' names.
     pub actions: Vec<ActionLearnt>,
-    /// How often facts change by themselves: those of each predicate of which one did.
+    /// How often facts change by themselves: those of each predicate of which one did, or was
+    /// expected to.
     #[serde(default)]
     pub changes: Vec<ChangesLearnt>,
     /// All of it as a world file.
@@ -224,8 +228,9 @@ pub struct DriftAnswer {
 /// Says what logs tell about the world.
 ///
 /// # Errors
-/// When the plan that is asked about has no envelope that can be computed. That the logs are too
-/// few for an answer is an answer.
+/// When the plan that is asked about has no envelope that can be computed, when the world that was
+/// expected does not go with the problem of a log, or when no log tells of facts with which it
+/// could be compared. That the logs are too few for an answer is an answer.
 pub fn learn(
     request: &LearnRequest,
     watcher: &mut dyn Watcher,
@@ -236,7 +241,15 @@ pub fn learn(
         .flat_map(|log| log.records.iter().cloned())
         .collect();
     let learnt = learn::learn(&records, &request.settings);
+    let expected = match &request.expected {
+        Some(world) => Some(Expected::new(&request.logs, world)?),
+        None => None,
+    };
     let changes = changes::of(&request.logs);
+    let told = |changes| ChangesLearnt::of(changes, expected.as_ref());
+    let mut told: Vec<ChangesLearnt> = changes.iter().map(told).collect();
+    told.extend(expected.iter().flat_map(|it| it.unseen(&changes)));
+    told.sort_by(|a, b| (&a.predicate, a.becomes).cmp(&(&b.predicate, b.becomes)));
     let inside = match &request.inside {
         Some(inside) => Some(inside::answer(inside, &learnt, watcher)?),
         None => None,
@@ -247,7 +260,7 @@ pub fn learn(
         logs: request.logs.iter().map(|log| log.name.clone()).collect(),
         attempts: records.len(),
         actions: learnt.iter().map(ActionLearnt::of).collect(),
-        changes: changes.iter().map(ChangesLearnt::of).collect(),
+        changes: told,
         world: world::write(&learnt, &changes, request.settings.resolution),
         inside,
     })

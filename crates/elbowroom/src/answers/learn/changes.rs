@@ -1,10 +1,12 @@
 //! How often facts change by themselves, as an answer.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_learning::changes::{Changes, Exposure, Rate, learn};
+use elbowroom_text::Source;
 use serde::{Deserialize, Serialize};
 
+use super::super::RequestError;
 use super::{Course, Log};
 
 /// How often the facts of a predicate become true, or false, by themselves.
@@ -32,9 +34,93 @@ pub struct RateLearnt {
     pub per_second: Option<f64>,
     /// Garwood's 95 % interval of that.
     pub interval: Option<(f64, f64)>,
+    /// How many changes the world file that was expected lets expect in these seconds; `None` where
+    /// none was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected: Option<f64>,
 }
 
-/// What all logs say that have a course.
+/// How often facts were expected to change by themselves in the logs.
+#[derive(Debug)]
+pub(super) struct Expected {
+    /// The predicates whose facts have rates.
+    predicates: BTreeSet<String>,
+    /// By fact and what it becomes: how many changes, and in how many seconds it could have become
+    /// so.
+    changes: BTreeMap<(String, bool), (f64, f64)>,
+}
+
+impl Expected {
+    /// By the rates of a world file, `[[hazard]]`.
+    pub(super) fn new(logs: &[Log], world: &Source) -> Result<Self, RequestError> {
+        let mut expected = Self {
+            predicates: BTreeSet::new(),
+            changes: BTreeMap::new(),
+        };
+        let courses = logs.iter().filter_map(|log| log.course.as_ref());
+        let mut is_compared = false;
+        for course in courses {
+            is_compared = true;
+            for (exposure, rate) in course.expected(world)? {
+                let predicate = predicate_of(&exposure.fact).to_owned();
+                expected.predicates.insert(predicate);
+                let key = (exposure.fact, exposure.becomes);
+                let entry = expected.changes.entry(key).or_default();
+                entry.0 += rate * exposure.seconds;
+                entry.1 += exposure.seconds;
+            }
+        }
+        if is_compared {
+            return Ok(expected);
+        }
+        Err(RequestError::Unsupported(
+            "no log tells of facts, so there is nothing to compare with the world that was \
+             expected: traces of `elbowroom run --trace` do, tables of attempts do not"
+                .to_owned(),
+        ))
+    }
+
+    fn of(&self, fact: &str, becomes: bool) -> f64 {
+        let found = self.changes.get(&(fact.to_owned(), becomes));
+        found.map_or(0.0, |(changes, _)| *changes)
+    }
+
+    /// The predicates of which changes were expected, and none was seen.
+    pub(super) fn unseen(&self, seen: &[Changes]) -> Vec<ChangesLearnt> {
+        let is_seen = |predicate: &str| seen.iter().any(|it| it.predicate == predicate);
+        let unseen = self.predicates.iter().filter(|it| !is_seen(it));
+        let both = unseen.flat_map(|predicate| [false, true].map(|becomes| (predicate, becomes)));
+        let answers = both.map(|(predicate, becomes)| {
+            let of_it = self
+                .changes
+                .iter()
+                .filter(|((fact, truth), _)| *truth == becomes && predicate_of(fact) == predicate);
+            let (changes, seconds) = of_it.fold((0.0, 0.0), |sum, (_, (changes, seconds))| {
+                (sum.0 + changes, sum.1 + seconds)
+            });
+            let rate = Rate {
+                changes: 0,
+                seconds,
+            };
+            ChangesLearnt {
+                predicate: predicate.clone(),
+                becomes,
+                all: RateLearnt::of(rate, Some(changes)),
+                apart: Vec::new(),
+            }
+        });
+        let is_expected = |answer: &ChangesLearnt| answer.all.expected > Some(0.0);
+        answers.filter(is_expected).collect()
+    }
+}
+
+/// `open` of `(open office)`.
+fn predicate_of(fact: &str) -> &str {
+    let name = fact.trim_matches(['(', ')']);
+    name.split_whitespace().next().unwrap_or_default()
+}
+
+/// What all logs say that have a course: of predicates of which a fact has changed by itself.
 pub(super) fn of(logs: &[Log]) -> Vec<Changes> {
     let courses = || logs.iter().filter_map(|log| log.course.as_ref());
     let predicates: BTreeSet<String> = courses().flat_map(Course::changing).collect();
@@ -46,22 +132,28 @@ pub(super) fn of(logs: &[Log]) -> Vec<Changes> {
 }
 
 impl ChangesLearnt {
-    pub(super) fn of(changes: &Changes) -> Self {
-        let facts = changes.facts.iter().filter(|_| changes.is_apart);
+    pub(super) fn of(changes: &Changes, expected: Option<&Expected>) -> Self {
+        let of_fact = |fact: &str| expected.map(|expected| expected.of(fact, changes.becomes));
+        let facts = || changes.facts.iter();
         Self {
             predicate: changes.predicate.clone(),
             becomes: changes.becomes,
-            all: RateLearnt::of(changes.all),
-            apart: facts
-                .map(|(fact, rate)| (fact.clone(), RateLearnt::of(*rate)))
+            all: RateLearnt::of(
+                changes.all,
+                expected.map(|_| facts().filter_map(|(fact, _)| of_fact(fact)).sum()),
+            ),
+            apart: facts()
+                .filter(|_| changes.is_apart)
+                .map(|(fact, rate)| (fact.clone(), RateLearnt::of(*rate, of_fact(fact))))
                 .collect(),
         }
     }
 }
 
 impl RateLearnt {
-    fn of(rate: Rate) -> Self {
+    fn of(rate: Rate, expected: Option<f64>) -> Self {
         Self {
+            expected,
             changes: rate.changes,
             seconds: rate.seconds,
             per_second: rate.per_second(),

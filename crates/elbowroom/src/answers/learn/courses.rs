@@ -14,6 +14,7 @@ use elbowroom_report::trace::{Line, Stored};
 use elbowroom_sim::WorldModel;
 use elbowroom_text::Source;
 
+use super::super::RequestError;
 use crate::execute::RunSpec;
 
 /// The facts of one run, as its trace tells: what was true at the beginning, what the actions and
@@ -87,6 +88,28 @@ impl Course {
         known
             .flat_map(|(fact, name)| self.exposure(fact, &name))
             .collect()
+    }
+
+    /// The facts that change by themselves in a world, as above, each with the rate at which it
+    /// does.
+    pub(super) fn expected(&self, world: &Source) -> Result<Vec<(Exposure, f64)>, RequestError> {
+        let problem = self.task.problem();
+        let model = WorldModel::read(world.clone(), problem).map_err(|mistakes| {
+            RequestError::Unsupported(format!(
+                "the world that was expected does not go with the problem of a log: {mistakes}"
+            ))
+        })?;
+        let rates = model.hazardous(problem).into_iter();
+        let known =
+            rates.filter_map(|(name, rate)| Some((self.task.fact_named(&name)?, name, rate)));
+        let both = known.flat_map(|(fact, name, rate)| {
+            let exposures = self.exposure(fact, &name).into_iter();
+            exposures.map(|exposure| {
+                let rate = rate.rate(exposure.becomes);
+                (exposure, rate)
+            })
+        });
+        Ok(both.collect())
     }
 
     fn exposure(&self, fact: FactId, name: &str) -> [Exposure; 2] {
