@@ -22,6 +22,7 @@ use elbowroom::plan::ParametrizedPlan;
 use elbowroom::verify::sound::{Control, Failing, Schedules, Sound, Way};
 use elbowroom::verify::{AnswerError, Certificate, Flaw, Verified, added_up, verify_answer};
 use elbowroom::{AnyPlan, pddl};
+use judge::{certificate_in, is_about_the_box};
 use serde_json::Value;
 use shared::case::Case;
 use shared::changed::{changed, numbers};
@@ -153,36 +154,6 @@ const CHANGED: [(&str, Guarantee, Objective); 13] = [
     ("battery", Guarantee::Weak, Objective::LeastSlack),
     ("match", Guarantee::Strong, Objective::LeastSlack),
 ];
-
-/// The certificate in an answer.
-fn certificate_in(answer: &Value) -> Certificate {
-    let certificate = answer.pointer("/best/certificate").expect("a certificate");
-    serde_json::from_value(certificate.clone()).expect("the form of a certificate")
-}
-
-/// Whether a change there says nothing about why no box is better: it is in why the box is inside, or
-/// in a constraint that no proof of an inequality mentions.
-fn is_about_the_box(answer: &Value, place: &str) -> bool {
-    if place.starts_with("/best/certificate/sound/") {
-        return true;
-    }
-    let Some(rest) = place.strip_prefix("/best/certificate/constraints/") else {
-        return false;
-    };
-    let index: u64 = rest
-        .split('/')
-        .next()
-        .and_then(|own| own.parse().ok())
-        .expect("a position");
-    let proofs = answer.pointer("/best/certificate/proofs").expect("proofs");
-    let mut mentioned = Vec::new();
-    numbers(proofs, "", &mut mentioned);
-    mentioned.iter().all(|at| {
-        let part = ["least", "most", "early", "late", "unlabelled"];
-        let is_part = part.iter().any(|own| at.ends_with(&format!("/{own}")));
-        !is_part || proofs.pointer(at).and_then(Value::as_u64) != Some(index)
-    })
-}
 
 /// What is changed and still accepted has to be a proof of what the answer then claims: where a bound
 /// of the network or of a way to fail leaves room, another number is as good.

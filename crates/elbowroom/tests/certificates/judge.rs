@@ -9,9 +9,42 @@ use elbowroom::stn::uncertain::{ContingentLink, UncertainNetwork};
 use elbowroom::stn::{self, ConsistentNetwork, Network, NodeId};
 use elbowroom::verify::sound::{Condition, Difference, Failing, Multiplied, Sound, Way};
 use elbowroom::verify::{Certificate, End, Guarantee, Limit};
+use serde_json::Value;
+
+use crate::shared::changed::numbers;
 
 /// Later than anything, for ends that are infinite.
 const EVER: i64 = 1_000_000_000;
+
+/// The certificate in an answer.
+pub(crate) fn certificate_in(answer: &Value) -> Certificate {
+    let certificate = answer.pointer("/best/certificate").expect("a certificate");
+    serde_json::from_value(certificate.clone()).expect("the form of a certificate")
+}
+
+/// Whether a change there says nothing about why no box is better: it is in why the box is inside, or
+/// in a constraint that no proof of an inequality mentions.
+pub(crate) fn is_about_the_box(answer: &Value, place: &str) -> bool {
+    if place.starts_with("/best/certificate/sound/") {
+        return true;
+    }
+    let Some(rest) = place.strip_prefix("/best/certificate/constraints/") else {
+        return false;
+    };
+    let index: u64 = rest
+        .split('/')
+        .next()
+        .and_then(|own| own.parse().ok())
+        .expect("a position");
+    let proofs = answer.pointer("/best/certificate/proofs").expect("proofs");
+    let mut mentioned = Vec::new();
+    numbers(proofs, "", &mut mentioned);
+    mentioned.iter().all(|at| {
+        let part = ["least", "most", "early", "late", "unlabelled"];
+        let is_part = part.iter().any(|own| at.ends_with(&format!("/{own}")));
+        !is_part || proofs.pointer(at).and_then(Value::as_u64) != Some(index)
+    })
+}
 
 /// Whether the box is inside the envelope, as far as the certificate tells what that takes.
 pub(crate) fn is_inside(certificate: &Certificate) -> bool {
