@@ -27,8 +27,15 @@ const KNOWN: &[(&str, &[&str], &str)] = &[
     ),
     (
         "model",
-        &["constraint", "expression", "ground", "problem"],
-        "lifted and ground expressions are one type with different leaves, and so are constraints",
+        &[
+            "autonomous",
+            "constraint",
+            "expression",
+            "ground",
+            "problem",
+        ],
+        "lifted and ground expressions are one type with different leaves, and so are constraints; \
+         processes and events stand beside their ground forms",
     ),
 ];
 

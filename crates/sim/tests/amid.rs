@@ -31,12 +31,12 @@ const WORLD: &str = "format = \"elbowroom-world\"\nversion = 1\n
 
 fn task() -> Arc<Task> {
     let source = |text: &str| Source::new("test", text);
-    let (problem, _) = read_problem(&source(DOMAIN), &source(PROBLEM)).unwrap();
+    let (problem, _) = read_problem(&source(DOMAIN), &source(PROBLEM)).expect("it works");
     Arc::new(Task::new(problem))
 }
 
 fn work(task: &Task) -> Action {
-    task.instantiate(SchemaId::from(0), &[]).unwrap()
+    task.instantiate(SchemaId::from(0), &[]).expect("it works")
 }
 
 /// What is seen of a world from now until 20.
@@ -52,7 +52,7 @@ fn course(task: &Task, world: &mut dyn World) -> Course {
     let mut course = Course::default();
     let end = Rational::from(20);
     loop {
-        let Passage { now, observations } = world.wait(&end).unwrap();
+        let Passage { now, observations } = world.wait(&end).expect("it works");
         for observation in observations {
             let time = observation.time.to_f64();
             match observation.event {
@@ -81,7 +81,7 @@ fn from_the_beginning(task: &Arc<Task>, model: &WorldModel, seed: u64) -> Course
         action: Arc::new(action),
         duration: Some(Rational::from(5)),
     };
-    world.command(&Rational::ZERO, &start).unwrap();
+    world.command(&Rational::ZERO, &start).expect("it works");
     course(task, world.as_mut())
 }
 
@@ -102,7 +102,7 @@ fn shares(courses: &[Course]) -> [f64; 4] {
 #[test]
 fn what_is_to_come_is_drawn_given_what_was_seen() {
     let task = task();
-    let model = WorldModel::read(WORLD, task.problem()).unwrap();
+    let model = WorldModel::read(WORLD, task.problem()).expect("it works");
     let goes_with = |course: &Course| {
         let is_later = |time: Option<f64>| time.is_none_or(|time| time > 4.0);
         is_later(course.ended.map(|(time, _)| time))
@@ -116,8 +116,8 @@ fn what_is_to_come_is_drawn_given_what_was_seen() {
     let action = Arc::new(work(&task));
     belief
         .start(Ticket(0), &action, &Rational::from(5), &[])
-        .unwrap();
-    belief.advance(&Rational::from(4)).unwrap();
+        .expect("it works");
+    belief.advance(&Rational::from(4)).expect("it works");
     let drawn = (0..4000).map(|seed| {
         let mut world = model.world_amid(&belief, seed, &Seen::default());
         course(&task, world.as_mut())
@@ -134,10 +134,10 @@ fn what_is_to_come_is_drawn_given_what_was_seen() {
 #[test]
 fn what_was_seen_does_not_come_again() {
     let task = task();
-    let model = WorldModel::read(WORLD, task.problem()).unwrap();
-    let fact = task.fact_named("(open)").unwrap();
+    let model = WorldModel::read(WORLD, task.problem()).expect("it works");
+    let fact = task.fact_named("(open)").expect("it works");
     let mut belief = Progression::new(Arc::clone(&task));
-    belief.advance(&Rational::from(4)).unwrap();
+    belief.advance(&Rational::from(4)).expect("it works");
     belief.change_fact(fact, false);
     let seen = Seen {
         changes: vec![SeenChange {
@@ -160,7 +160,7 @@ fn what_was_seen_does_not_come_again() {
 #[test]
 fn the_same_seed_goes_on_in_the_same_way() {
     let task = task();
-    let model = WorldModel::read(WORLD, task.problem()).unwrap();
+    let model = WorldModel::read(WORLD, task.problem()).expect("it works");
     let belief = Progression::new(Arc::clone(&task));
     let one = |seed| {
         let mut world = model.world_amid(&belief, seed, &Seen::default());
