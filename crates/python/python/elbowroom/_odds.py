@@ -58,6 +58,9 @@ class ActionShare(NamedTuple):
     """The probability if it never failed."""
     if_retried: float | None
     """The probability if failed attempts to start it were repeated; ``None``: too long to say."""
+    if_done_again: float | None
+    """The probability if it were started again at once whenever its end fails; ``None``: its end does not
+    fail, or a failure may leave one thing or another behind, or it is too long to say."""
 
 
 class FactShare(NamedTuple):
