@@ -38,7 +38,11 @@ pub struct Best {
     /// Why the box is inside the envelope, and no box has more than `bound`, for [`elbowroom_verify`] to
     /// check; `None` if the search
     /// was ended before it was done, or if that could not be told of all ends.
+    ///
+    /// In a browser it is written and not read: answers are read there to be drawn, and what reads
+    /// certificates would be a thirtieth of the module.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(target_family = "wasm", serde(skip_deserializing))]
     pub certificate: Option<Certificate>,
     /// How likely all durations stay inside, if that is the objective.
     #[serde(default, skip_serializing_if = "Option::is_none")]
