@@ -187,14 +187,13 @@ fn gains(text: &mut String, odds: &Odds, look: Look) {
     heading(text, "What would help");
     let row = |p: f64, what: String| vec![number(p), what];
     let mut rows: Vec<Vec<String>> = Vec::new();
-    let mut unknown: Vec<String> = Vec::new();
+    let mut unknown: Vec<(String, String)> = Vec::new();
     let mut value = |value: &ValueAnswer, what: &str| match value {
         ValueAnswer::Probability(p) => rows.push(row(*p, what.to_owned())),
-        ValueAnswer::Unknown(why) => {
-            if !unknown.contains(why) {
-                unknown.push(why.clone());
-            }
-        }
+        ValueAnswer::Unknown(why) => match unknown.iter_mut().find(|(_, known)| known == why) {
+            Some((all, _)) => *all = format!("{all}, or {what}"),
+            None => unknown.push((what.to_owned(), why.clone())),
+        },
     };
     let gains = &odds.gains;
     value(&gains.any_action, "any action, chosen as the state asks");
@@ -217,9 +216,9 @@ fn gains(text: &mut String, odds: &Odds, look: Look) {
             .map(|(p, what)| row(p, format!("if {what}"))),
     );
     table(text, &["then", "with"], rows, look);
-    for why in unknown {
+    for (what, why) in unknown {
         let words = format!(
-            "{}: what choosing as the state asks would gain is not calculated: {why}",
+            "{}: what this would gain is not calculated: {what}: {why}",
             styled(HINT, "note")
         );
         text.push('\n');
