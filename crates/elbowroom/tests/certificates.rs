@@ -27,26 +27,10 @@ use serde_json::Value;
 use shared::case::Case;
 use shared::changed::{changed, numbers};
 use shared::instances::{Instance, figure_3, figure_4};
+use shared::own::case;
 
 const GUARANTEES: [Guarantee; 3] = [Guarantee::Weak, Guarantee::Dynamic, Guarantee::Strong];
 const OBJECTIVES: [Objective; 3] = [Objective::LeastSlack, Objective::Widths, Objective::Volume];
-
-/// A case of this repository.
-fn case(name: &str) -> (Arc<Task>, AnyPlan) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../cases")
-        .join(name);
-    let source = |file: &str| {
-        let text = std::fs::read_to_string(folder.join(file)).expect("a file of the case");
-        pddl::Source::new(file, text)
-    };
-    let read = pddl::read_problem(&source("domain.pddl"), &source("problem.pddl"));
-    let task = Arc::new(Task::new(read.expect("a case without mistakes").0));
-    let plan = read_plan(&source("plan.plan"), &task)
-        .expect("a plan without mistakes")
-        .0;
-    (task, plan.into())
-}
 
 fn largest(
     task: &Arc<Task>,

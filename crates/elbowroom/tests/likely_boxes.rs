@@ -6,7 +6,6 @@
 mod judge;
 mod shared;
 
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -15,7 +14,7 @@ use elbowroom::answers::{EnvelopeOutcome, RequestError, Unwatched};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
-use elbowroom::pddl::{self, read_plan};
+use elbowroom::pddl;
 use elbowroom::plan::ParametrizedPlan;
 use elbowroom::sim::WorldModel;
 use elbowroom::verify::{AnswerError, verify_answer};
@@ -24,6 +23,7 @@ use serde_json::Value;
 use shared::case::Case;
 use shared::changed::{changed, numbers};
 use shared::instances::{figure_3, figure_4};
+use shared::own::case;
 
 /// Every duration spread around what is planned.
 const AROUND: &str = "
@@ -47,23 +47,6 @@ const MIXED: &str = "
     [[duration]]
     action = \"drop\"
     lognormal = { mean = 3, deviation = 0.4 }";
-
-/// A case of this repository.
-fn case(name: &str) -> (Arc<Task>, AnyPlan) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../cases")
-        .join(name);
-    let source = |file: &str| {
-        let text = std::fs::read_to_string(folder.join(file)).expect("a file of the case");
-        pddl::Source::new(file, text)
-    };
-    let read = pddl::read_problem(&source("domain.pddl"), &source("problem.pddl"));
-    let task = Arc::new(Task::new(read.expect("a case without mistakes").0));
-    let plan = read_plan(&source("plan.plan"), &task)
-        .expect("a plan without mistakes")
-        .0;
-    (task, plan.into())
-}
 
 fn world(sections: &str, task: &Task) -> Arc<WorldModel> {
     let text = format!("format = \"elbowroom-world\"\nversion = 1\n{sections}");

@@ -5,7 +5,6 @@
 mod shared;
 
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -17,28 +16,14 @@ use elbowroom::answers::{EnvelopeRequest, Halt, RegionOutcome, Unwatched, Watche
 use elbowroom::envelope::{Guarantee, Oracle};
 use elbowroom::model::Task;
 use elbowroom::num::{Interval, Rational};
-use elbowroom::pddl::{Source, read_plan, read_problem};
+use elbowroom::pddl::{Source, read_problem};
 use elbowroom::plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan, format};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shared::case::Case;
 use shared::draw;
 use shared::instances::{figure_3, figure_4};
-
-/// A case of this repository.
-fn case(name: &str) -> (Arc<Task>, AnyPlan) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../cases")
-        .join(name);
-    let source = |file: &str| {
-        let text = std::fs::read_to_string(folder.join(file)).expect("a file of the case");
-        Source::new(file, text)
-    };
-    let read = read_problem(&source("domain.pddl"), &source("problem.pddl"));
-    let task = Arc::new(Task::new(read.expect("a case without mistakes").0));
-    let plan = read_plan(&source("plan.plan"), &task);
-    (task, plan.expect("a plan without mistakes").0.into())
-}
+use shared::own::case;
 
 fn of(task: &Arc<Task>, plan: AnyPlan) -> RegionOutcome {
     region(

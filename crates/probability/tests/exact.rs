@@ -76,79 +76,67 @@ fn compare(case: &Case, semantics: Semantics, rng: &mut ChaCha8Rng) -> usize {
     possible
 }
 
-#[test]
-fn independent_facts_have_exact_probabilities() {
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
+/// Compares random cases that `make` makes, under both semantics; how many steps were possible at all.
+fn possible_steps(seed: u64, mut make: impl FnMut(&mut ChaCha8Rng, usize) -> Case) -> usize {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut possible = 0;
-    for _ in 0..1500 {
-        let case = case(&mut rng, FACTORED);
+    for round in 0..1500 {
+        let case = make(&mut rng, round);
         for semantics in [Semantics::Paper, Semantics::World] {
             possible += compare(&case, semantics, &mut rng);
         }
     }
+    possible
+}
+
+/// In every second round, conditions that couple facts.
+fn coupled_now_and_then(round: usize) -> Taste {
+    Taste {
+        couples: round.is_multiple_of(2),
+        actions: 3,
+        ..FACTORED
+    }
+}
+
+#[test]
+fn independent_facts_have_exact_probabilities() {
+    let possible = possible_steps(1, |rng, _| case(rng, FACTORED));
     assert!(possible > 20_000, "{possible} steps were possible at all");
 }
 
 #[test]
 fn coupled_facts_have_exact_probabilities() {
-    let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let mut possible = 0;
     let taste = Taste {
         couples: true,
         actions: 3,
         ..FACTORED
     };
-    for _ in 0..1500 {
-        let case = case(&mut rng, taste);
-        for semantics in [Semantics::Paper, Semantics::World] {
-            possible += compare(&case, semantics, &mut rng);
-        }
-    }
+    let possible = possible_steps(2, |rng, _| case(rng, taste));
     assert!(possible > 15_000, "{possible} steps were possible at all");
 }
 
 #[test]
 fn facts_that_change_with_time_have_exact_probabilities() {
-    let mut rng = ChaCha8Rng::seed_from_u64(4);
-    let mut possible = 0;
-    for round in 0..1500 {
-        let taste = Taste {
-            couples: round % 2 == 0,
-            actions: 3,
-            ..FACTORED
-        };
-        let case = case(&mut rng, taste);
-        let case = in_time(&mut rng, case);
-        for semantics in [Semantics::Paper, Semantics::World] {
-            possible += compare(&case, semantics, &mut rng);
-        }
-    }
+    let possible = possible_steps(4, |rng, round| {
+        let case = case(rng, coupled_now_and_then(round));
+        in_time(rng, case)
+    });
     assert!(possible > 15_000, "{possible} steps were possible at all");
 }
 
 #[test]
 fn actions_that_fail_after_their_start_have_exact_probabilities() {
-    let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let mut possible = 0;
-    for round in 0..1500 {
-        let taste = Taste {
-            couples: round % 2 == 0,
-            actions: 3,
-            ..FACTORED
-        };
-        let case = case(&mut rng, taste);
-        let case = with_failing_ends(&mut rng, case);
-        let case = match round % 3 {
+    let possible = possible_steps(5, |rng, round| {
+        let case = case(rng, coupled_now_and_then(round));
+        let case = with_failing_ends(rng, case);
+        match round % 3 {
             0 => case,
-            1 => failing_in_time(&mut rng, case),
+            1 => failing_in_time(rng, case),
             _ => {
-                let case = in_time(&mut rng, case);
-                failing_in_time(&mut rng, case)
+                let case = in_time(rng, case);
+                failing_in_time(rng, case)
             }
-        };
-        for semantics in [Semantics::Paper, Semantics::World] {
-            possible += compare(&case, semantics, &mut rng);
         }
-    }
+    });
     assert!(possible > 10_000, "{possible} steps were possible at all");
 }

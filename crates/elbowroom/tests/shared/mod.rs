@@ -7,6 +7,7 @@ pub(crate) mod chains;
 pub(crate) mod changed;
 pub(crate) mod draw;
 pub(crate) mod instances;
+pub(crate) mod own;
 pub(crate) mod rounds;
 
 #[path = "../../../../testing/skipped.rs"]
