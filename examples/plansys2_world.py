@@ -26,6 +26,9 @@ ASK_EVERY = 1.0
 GIVE_UP_ASKING = 30.0
 LOST_AFTER = 5.0
 """A performer whose status came every second, and has not come for so long, is lost."""
+IDLE_AFTER = 3.0
+"""A performer that has said for so long that it does nothing is not going to say how its action ended: either it
+was never told to begin, or its last word is lost."""
 
 
 class Deal:
@@ -36,6 +39,7 @@ class Deal:
         self.asked = None
         self.since = now
         self.performer = None
+        self.idle = None
         self.cancelled = None
 
 
@@ -95,7 +99,7 @@ class Hub:
             elif deal is None or node != deal.performer:
                 return
             elif message.type == FEEDBACK:
-                deal.since = self._clock()
+                deal.since, deal.idle = self._clock(), None
                 if deal.cancelled is None:
                     deal.action.feedback(message.completion, message.status)
             elif message.type == FINISH:
@@ -110,21 +114,30 @@ class Hub:
     def status(self, status):
         """Takes what came on `performers_status`."""
         with self._lock:
-            self._heard[status.node_name] = self._clock()
+            now = self._clock()
+            self._heard[status.node_name] = now, getattr(status, "action", "")
             for deal in list(self._deals.values()):
                 if deal.performer != status.node_name:
                     continue
-                if deal.cancelled is not None and status.state != RUNNING:
-                    del self._deals[deal.key]
-                    deal.action.was_cancelled()
-                elif deal.cancelled is None and status.state == FAILURE:
+                if deal.cancelled is not None:
+                    if status.state != RUNNING:
+                        del self._deals[deal.key]
+                        deal.action.was_cancelled()
+                elif status.state == FAILURE:
                     self._lose(deal, f"{deal.performer} reports a failure")
+                elif status.state == RUNNING:
+                    deal.idle = None
+                else:
+                    deal.idle = now if deal.idle is None else deal.idle
+                    if now - deal.idle >= IDLE_AFTER:
+                        self._lose(deal, f"{deal.performer} does nothing, and has not said how this has ended")
 
     def performers(self):
-        """Those that were heard of lately."""
+        """Those that were heard of lately, each with the action that it performs: `robot1 (move)`."""
         with self._lock:
             now = self._clock()
-            return sorted(name for name, at in self._heard.items() if now - at <= LOST_AFTER)
+            lately = sorted((name, action) for name, (at, action) in self._heard.items() if now - at <= LOST_AFTER)
+            return [f"{name} ({action})" if action else name for name, action in lately]
 
     def tick(self):
         """Asks again, and notices who is lost. To be called a few times a second."""
@@ -140,7 +153,7 @@ class Hub:
                         deal.asked = now
                         self._tell(REQUEST, deal, "elbowroom")
                     continue
-                heard = self._heard.get(deal.performer)
+                heard, _ = self._heard.get(deal.performer, (None, ""))
                 if heard is not None and now - max(heard, deal.since) > LOST_AFTER:
                     self._lose(deal, f"{deal.performer} is lost: nothing was heard of it for {LOST_AFTER:g} s")
 
@@ -175,13 +188,16 @@ def main():
     node.create_timer(0.2, hub.tick)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    threading.Thread(target=executor.spin, daemon=True).start()
+    spinning = threading.Thread(target=executor.spin, daemon=True)
+    spinning.start()
 
     # Time begins when performers are there: what is asked for before that is lost to discovery.
     patience = float(os.environ.get("ELBOWROOM_PERFORMERS_WITHIN", "10"))
     begun = time.monotonic()
     while not hub.performers() and time.monotonic() - begun < patience:
         time.sleep(0.1)
+    # Each says once a second that it is there: after a round, all have been heard.
+    time.sleep(1.2)
     print(f"performers: {', '.join(hub.performers()) or 'none has been heard'}", file=sys.stderr)
 
     world = World("plansys2", speed=float(os.environ.get("ELBOWROOM_SPEED", "1")))
@@ -190,8 +206,10 @@ def main():
     world.run()
     # What was told to stop is to hear of it.
     time.sleep(0.2)
+    # In this order: Python must not end while a thread of ROS still runs.
     executor.shutdown()
     rclpy.try_shutdown()
+    spinning.join(timeout=5)
 
 
 if __name__ == "__main__":

@@ -120,6 +120,17 @@ class Performers(unittest.TestCase):
         self.says(FINISH, success=True)
         self.assertEqual(len(action.told), 2)
 
+    def test_a_performer_that_does_nothing_has_lost_a_word(self):
+        action = self.begin()
+        self.says(RESPONSE)
+        self.after(2, alive=READY)
+        self.after(1, alive=RUNNING)
+        self.after(3, alive=READY)
+        self.assertEqual(action.told, ["started"])
+        self.after(1, alive=READY)
+        self.assertEqual(action.told[1:], ["failed: robot1 does nothing, and has not said how this has ended"])
+        self.assertEqual(self.kinds()[-1], (CANCEL, "robot1"))
+
     def test_a_failure_has_its_reason(self):
         action, other = self.begin(), self.begin("wait", ["s"])
         self.says(RESPONSE)

@@ -75,6 +75,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("web", &["elbowroom", "page"]),
     ("cli", &["elbowroom", "laboratory", "page"]),
     ("python", &["elbowroom", "laboratory", "cli"]),
+    // A program beside the command, which it knows by the protocol of worlds alone.
+    ("plansys2", &[]),
 ];
 
 #[test]

@@ -1,0 +1,118 @@
+//! What the program is asked for, on the command line and in the environment.
+
+use std::env;
+use std::net::{IpAddr, Ipv4Addr};
+use std::str::FromStr;
+use std::time::Duration;
+
+use clap::Parser;
+
+const ABOUT: &str = "\
+A world for `elbowroom run … --world-process elbowroom-plansys2`: the action performers of PlanSys2, over DDS and without ROS.
+
+PlanSys2's own executor must be off: two of them would both choose performers. docs/plansys2.md says what happens when.";
+
+/// What can be given.
+#[derive(Debug, Parser)]
+#[command(version, about = ABOUT)]
+pub(super) struct Options {
+    /// Actions that must have a performer before time begins, separated by commas; without any of them the
+    /// program ends and names it. By default, time begins a second after the first performer was heard
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub(super) needs: Vec<String>,
+    /// How many seconds to wait for performers
+    /// [default: the environment's `ELBOWROOM_PERFORMERS_WITHIN`, or 10]
+    #[arg(long, value_name = "S")]
+    within: Option<f64>,
+    /// How many seconds of the plan pass in one real second
+    /// [default: the environment's `ELBOWROOM_SPEED`, or 1]
+    #[arg(long, value_name = "X")]
+    speed: Option<f64>,
+    /// The domain of DDS, from 0 to 232
+    /// [default: the environment's `ROS_DOMAIN_ID`, or 0]
+    #[arg(long, value_name = "N")]
+    domain_id: Option<u16>,
+    /// The namespace of the performers' topics, as in `/robot1`
+    #[arg(long, value_name = "NAME", default_value = "/")]
+    namespace: String,
+    /// Speak and listen on the network interface with this address alone; may be repeated
+    /// [default: all; with `ROS_LOCALHOST_ONLY=1` in the environment, 127.0.0.1]
+    #[arg(long, value_name = "ADDRESS")]
+    interface: Vec<IpAddr>,
+}
+
+/// The same, complete and checked.
+#[derive(Debug)]
+pub(super) struct Settings {
+    pub(super) needs: Vec<String>,
+    pub(super) within: Duration,
+    pub(super) speed: f64,
+    pub(super) domain_id: u16,
+    pub(super) namespace: String,
+    /// Empty: all.
+    pub(super) interfaces: Vec<IpAddr>,
+}
+
+impl Options {
+    /// Adds what the environment says.
+    ///
+    /// # Errors
+    /// Something cannot be used; the text says what to do.
+    pub(super) fn settings(self) -> Result<Settings, String> {
+        let within = or_variable(self.within, "ELBOWROOM_PERFORMERS_WITHIN", 10.0)?;
+        let within = Duration::try_from_secs_f64(within)
+            .map_err(|_| format!("{within} s is no time to wait; give a number from 0"))?;
+        let speed = or_variable(self.speed, "ELBOWROOM_SPEED", 1.0)?;
+        if !(speed > 0.0 && speed.is_finite()) {
+            return Err(format!("the speed must be a number above 0, not {speed}"));
+        }
+        let domain_id = or_variable(self.domain_id, "ROS_DOMAIN_ID", 0)?;
+        if domain_id > 232 {
+            return Err(format!("the domain must be from 0 to 232, not {domain_id}"));
+        }
+        let mut interfaces = self.interface;
+        if interfaces.is_empty() && env::var("ROS_LOCALHOST_ONLY").is_ok_and(|it| it == "1") {
+            interfaces.push(Ipv4Addr::LOCALHOST.into());
+        }
+        Ok(Settings {
+            needs: self.needs.iter().map(|it| it.to_lowercase()).collect(),
+            within,
+            speed,
+            domain_id,
+            namespace: namespace(&self.namespace)?,
+            interfaces,
+        })
+    }
+}
+
+/// What was given, or what a variable of the environment says, or else the default.
+fn or_variable<T: FromStr>(given: Option<T>, variable: &str, default: T) -> Result<T, String> {
+    match (given, env::var(variable)) {
+        (Some(given), _) => Ok(given),
+        (None, Ok(text)) if !text.is_empty() => {
+            let read = text.trim().parse();
+            read.map_err(|_| format!("{variable} is {text:?} in the environment, which cannot be used; change or unset it"))
+        }
+        _ => Ok(default),
+    }
+}
+
+/// With slashes around: `/` or `/robot1/`.
+fn namespace(text: &str) -> Result<String, String> {
+    let inner = text.trim_matches('/');
+    let is_name = |part: &str| {
+        part.starts_with(|it: char| it.is_ascii_alphabetic() || it == '_')
+            && part
+                .chars()
+                .all(|it| it.is_ascii_alphanumeric() || it == '_')
+    };
+    if inner.is_empty() {
+        Ok("/".to_owned())
+    } else if inner.split('/').all(is_name) {
+        Ok(format!("/{inner}/"))
+    } else {
+        Err(format!(
+            "{text:?} is no namespace; letters, digits and _ between slashes are"
+        ))
+    }
+}

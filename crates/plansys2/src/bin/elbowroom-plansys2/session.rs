@@ -1,0 +1,165 @@
+//! One run: waits for the performers, then connects the two conversations until Elbowroom says stop.
+
+use std::io::{self, Write as _};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use elbowroom_plansys2::{Census, Command, Effect, Hub, World};
+
+use super::options::Settings;
+use super::topics::Topics;
+use super::{Input, remark};
+
+/// How often the hub looks whether somebody is lost.
+const TICK: Duration = Duration::from_millis(200);
+/// What was told to stop is to hear of it before this program ends.
+const FAREWELL: Duration = Duration::from_millis(300);
+
+pub(super) struct Session {
+    topics: Topics,
+    inputs: Receiver<Input>,
+    hub: Hub,
+    world: World,
+    census: Census,
+    zero: Instant,
+}
+
+impl Session {
+    pub(super) fn new(settings: &Settings, topics: Topics, inputs: Receiver<Input>) -> Self {
+        Self {
+            topics,
+            inputs,
+            hub: Hub::new("elbowroom"),
+            world: World::new("plansys2", settings.speed),
+            census: Census::new(settings.needs.clone(), settings.within),
+            zero: now(),
+        }
+    }
+
+    /// Until Elbowroom says stop or is gone.
+    ///
+    /// # Errors
+    /// A performer is missing; it is named.
+    pub(super) fn run(mut self) -> Result<(), String> {
+        let said = self.wait_for_performers()?;
+        remark(&format!("performers: {}", self.hub.listed(self.now())));
+        if !said.into_iter().any(|input| self.take(input)) {
+            self.converse();
+        }
+        self.leave();
+        Ok(())
+    }
+
+    fn converse(&mut self) {
+        loop {
+            self.settle();
+            let left = self.world.due_in(self.now());
+            match self
+                .inputs
+                .recv_timeout(left.map_or(TICK, |it| it.min(TICK)))
+            {
+                Ok(input) => {
+                    if self.take(input) {
+                        return;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            self.hub.tick(self.now());
+        }
+    }
+
+    /// What is asked for before nodes have found each other is lost, so that time begins when they are there.
+    /// What Elbowroom has said meanwhile comes back.
+    fn wait_for_performers(&mut self) -> Result<Vec<Input>, String> {
+        let mut said = Vec::new();
+        while !self.census.is_over(&self.hub, self.now())? {
+            match self.inputs.recv_timeout(TICK) {
+                Ok(Input::Status(status)) => self.hub.status(&status, self.now()),
+                Ok(Input::Hub(message)) => self.hub.message(&message, self.now()),
+                Ok(Input::Trouble(text)) => remark(&text),
+                Ok(Input::Closed) => {
+                    said.push(Input::Closed);
+                    break;
+                }
+                Ok(line) => said.push(line),
+                Err(_) => {}
+            }
+            self.settle();
+        }
+        Ok(said)
+    }
+
+    /// Takes what has come; `true` when the run is over.
+    fn take(&mut self, input: Input) -> bool {
+        let now = self.now();
+        match input {
+            Input::Line(line) => {
+                let mut said = Vec::new();
+                let command = self.world.hear(&line, now, &mut said);
+                say(&said);
+                match command {
+                    Ok(Some(Command::Begin(action))) => self.hub.begin(action, now),
+                    Ok(Some(Command::Cancel(ticket))) => self.hub.cancel(ticket),
+                    Ok(Some(Command::Stop)) => return true,
+                    Ok(None) => {}
+                    Err(error) => remark(&format!("not understood: {line}: {error}")),
+                }
+            }
+            Input::Closed => return true,
+            Input::Hub(message) => self.hub.message(&message, now),
+            Input::Status(status) => self.hub.status(&status, now),
+            Input::Trouble(text) => remark(&text),
+        }
+        false
+    }
+
+    /// Does what the hub has decided, and answers if that is due.
+    fn settle(&mut self) {
+        let now = self.now();
+        for effect in self.hub.effects() {
+            match effect {
+                Effect::Send(message) => {
+                    if let Err(why) = self.topics.send(message) {
+                        remark(&why);
+                    }
+                }
+                Effect::Tell(ticket, told) => self.world.tell(ticket, &told, now),
+                Effect::Remark(text) => remark(&text),
+            }
+        }
+        say(&self.world.answer(now));
+    }
+
+    /// The run is over, or Elbowroom is gone: what runs is to stop.
+    fn leave(mut self) {
+        for ticket in self.world.running() {
+            self.hub.cancel(ticket);
+        }
+        self.settle();
+        thread::sleep(FAREWELL);
+    }
+
+    fn now(&self) -> Duration {
+        now().saturating_duration_since(self.zero)
+    }
+}
+
+#[allow(
+    clippy::disallowed_methods,
+    reason = "robots are on the wall clock; the conversations get it as an argument"
+)]
+fn now() -> Instant {
+    Instant::now()
+}
+
+/// Says it to Elbowroom. That nobody listens any more is said by the end of the input, too.
+fn say(lines: &[String]) {
+    let mut out = io::stdout().lock();
+    for line in lines {
+        let _ = writeln!(out, "{line}");
+    }
+    let _ = out.flush();
+}

@@ -1,0 +1,139 @@
+use super::*;
+
+fn at(seconds: f64) -> Duration {
+    Duration::from_secs_f64(seconds)
+}
+
+fn greeted(speed: f64) -> World {
+    let mut world = World::new("plansys2", speed);
+    let mut said = vec![];
+    let hello = r#"{"type":"hello","protocol":"elbowroom-world","version":1,"versions":[1,2]}"#;
+    assert_eq!(world.hear(hello, at(0.0), &mut said).expect("JSON"), None);
+    assert_eq!(
+        said,
+        [r#"{"type":"hello","version":2,"name":"plansys2","can":["cancel","feedback"]}"#]
+    );
+    world
+}
+
+fn hears(world: &mut World, line: &str, now: f64) -> Option<Command> {
+    world.hear(line, at(now), &mut vec![]).expect("JSON")
+}
+
+const START: &str = r#"{"type":"start","ticket":3,"action":"(drive r a b)","duration":{"exact":"5","decimal":5.0},"now":{"exact":"0","decimal":0.0}}"#;
+const WAIT: &str = r#"{"type":"wait","until":{"exact":"4","decimal":4.0},"question":9}"#;
+
+#[test]
+fn a_start_is_a_command_once() {
+    let mut world = greeted(1.0);
+    let action = Action {
+        ticket: 3,
+        name: "drive".into(),
+        arguments: ["r", "a", "b"].map(String::from).into(),
+        is_instantaneous: false,
+    };
+    assert_eq!(hears(&mut world, START, 0.0), Some(Command::Begin(action)));
+    assert_eq!(hears(&mut world, START, 0.1), None);
+}
+
+#[test]
+fn time_begins_with_the_first_thing_to_do_and_runs_at_its_speed() {
+    let mut world = greeted(2.0);
+    hears(&mut world, START, 10.0);
+    world.tell(3, &Told::Started, at(10.5));
+    hears(&mut world, WAIT, 10.5);
+    assert_eq!(
+        world.answer(at(10.75)),
+        [
+            r#"{"type":"started","ticket":3,"time":1.0}"#,
+            r#"{"type":"time","now":1.5,"question":9}"#
+        ]
+    );
+}
+
+#[test]
+fn a_question_is_answered_when_its_time_has_come() {
+    let mut world = greeted(1.0);
+    hears(&mut world, WAIT, 1.0);
+    assert!(world.answer(at(4.99)).is_empty());
+    assert!(world.due_in(at(4.5)).is_some_and(|left| left >= at(0.5)));
+    assert_eq!(
+        world.answer(at(5.0)),
+        [r#"{"type":"time","now":4.0,"question":9}"#]
+    );
+    assert_eq!(world.due_in(at(5.0)), None);
+}
+
+#[test]
+fn each_start_and_each_end_is_reported_once_and_in_this_order() {
+    let mut world = greeted(1.0);
+    hears(&mut world, START, 0.0);
+    for told in [
+        Told::Succeeded,
+        Told::Started,
+        Told::Cancelled,
+        Told::Failed("late".into()),
+    ] {
+        world.tell(3, &told, at(2.0));
+    }
+    hears(&mut world, WAIT, 2.0);
+    let lines = world.answer(at(2.0));
+    assert_eq!(lines[0], r#"{"type":"started","ticket":3,"time":2.0}"#);
+    assert_eq!(
+        lines[1],
+        r#"{"type":"ended","ticket":3,"time":2.0,"outcome":"succeeded"}"#
+    );
+    assert_eq!(lines.len(), 3);
+    let cancel = r#"{"type":"cancel","ticket":3}"#;
+    assert_eq!(hears(&mut world, cancel, 2.0), None, "it has ended");
+    assert!(world.running().is_empty());
+}
+
+#[test]
+fn what_takes_no_time_has_ended_when_it_has_started() {
+    let mut world = greeted(1.0);
+    let start = r#"{"type":"start","ticket":1,"action":"(beep)","duration":null}"#;
+    let Some(Command::Begin(action)) = hears(&mut world, start, 0.0) else {
+        panic!("a start");
+    };
+    assert!(action.is_instantaneous && action.arguments.is_empty());
+    assert_eq!(world.running(), [1]);
+    world.tell(1, &Told::Started, at(1.0));
+    assert!(world.running().is_empty());
+}
+
+#[test]
+fn version_1_is_told_no_feedback() {
+    let mut world = World::new("plansys2", 1.0);
+    let mut said = vec![];
+    let hello = r#"{"type":"hello","protocol":"elbowroom-world","version":1}"#;
+    world.hear(hello, at(0.0), &mut said).expect("JSON");
+    assert!(said.is_empty());
+    hears(&mut world, START, 0.0);
+    let feedback = Told::Feedback {
+        completion: f32::NAN,
+        note: String::new(),
+    };
+    world.tell(3, &feedback, at(1.0));
+    hears(&mut world, r#"{"type":"look","facts":[]}"#, 1.0);
+    assert_eq!(world.answer(at(1.0)), [r#"{"type":"time","now":1.0}"#]);
+}
+
+#[test]
+fn what_is_not_known_is_passed_over_and_what_is_no_json_is_an_error() {
+    let mut world = greeted(1.0);
+    for line in [
+        r#"{"type":"dance"}"#,
+        "{}",
+        r#"{"type":"cancel","ticket":99}"#,
+        r#"{"type":"start","ticket":5,"action":"()"}"#,
+    ] {
+        assert_eq!(hears(&mut world, line, 0.0), None, "{line}");
+    }
+    assert!(world.hear("[1]", at(0.0), &mut vec![]).is_err());
+    assert!(world.hear("nonsense", at(0.0), &mut vec![]).is_err());
+    assert_eq!(
+        hears(&mut world, r#"{"type":"stop"}"#, 0.0),
+        Some(Command::Stop)
+    );
+}

@@ -1,0 +1,217 @@
+"""Runs of Elbowroom with performers on real ROS 2 (`performers.py`), through the program `elbowroom-plansys2` and
+through `examples/plansys2_world.py`.
+
+`scenarios.py ELBOWROOM ELBOWROOM_PLANSYS2` in a shell in which rclpy and plansys2_msgs can be imported; `.ci/ros2`
+makes one. Each scenario has a DDS domain of its own, so that four are played at a time.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+ROOT = os.path.join(HERE, "..", "..", "..", "..")
+ELBOWROOM, PROGRAM = (os.path.abspath(it) for it in sys.argv[1:3])
+PYTHON_WORLD = f"{sys.executable} {os.path.join(ROOT, 'examples', 'plansys2_world.py')}"
+YARD = [os.path.join(HERE, "yard", it) for it in ("domain.pddl", "problem.pddl", "plan.plan")]
+MATCH = [os.path.join(ROOT, "cases", "match", it) for it in ("domain.pddl", "problem.pddl", "plan.plan")]
+DRIVERS = {
+    "driver1": {"action": "move", "lasts": 2, "only": "r1"},
+    "driver2": {"action": "move", "lasts": 2, "only": "r2"},
+    "signaller": {"action": "signal", "lasts": 1},
+}
+
+
+class Stage:
+    """A place of its own for one scenario."""
+
+    def __init__(self, world, domain_id, folder):
+        self.world, self.folder = world, folder
+        self.environment = dict(os.environ, ROS_DOMAIN_ID=str(domain_id))
+        self.log_file = os.path.join(folder, "performers.jsonl")
+        self.trace_file = os.path.join(folder, "run.jsonl")
+
+    def start(self, command, **more):
+        return subprocess.Popen(command, env=self.environment, text=True, **more)
+
+    def play(self, performers, files, *options, speed=1, interrupt_after=None, command="run"):
+        """Elbowroom, among these performers; until it ends, or is told to `interrupt_after` an event."""
+        self.environment["ELBOWROOM_SPEED"] = str(speed)
+        script = os.path.join(HERE, "performers.py")
+        there = self.start([sys.executable, script, json.dumps(performers), self.log_file])
+        try:
+            # A robot's nodes are up before its plan begins.
+            self.wait_for(lambda: os.path.exists(self.log_file))
+            time.sleep(1)
+            line = [ELBOWROOM, command, *files, *options]
+            if command == "run":
+                line += ["--world-process", self.world, "--trace", self.trace_file]
+            else:
+                line.insert(2, self.world)
+            run = self.start(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            if interrupt_after:
+                self.wait_for(lambda: any(it["event"] == interrupt_after for it in self.log()))
+                time.sleep(0.3)
+                run.send_signal(signal.SIGINT)
+            self.out, self.errors = run.communicate(timeout=90)
+            self.code = run.returncode
+            time.sleep(0.3)
+        finally:
+            there.terminate()
+            there.wait()
+        return self
+
+    def wait_for(self, holds):
+        until = time.monotonic() + 20
+        while not holds():
+            assert time.monotonic() < until, "waited in vain"
+            time.sleep(0.05)
+
+    def log(self):
+        with open(self.log_file, encoding="utf-8") as file:
+            return [json.loads(line) for line in file]
+
+    def when(self, event, action):
+        """The only time at which that happened."""
+        (at,) = [it["at"] for it in self.log() if (it["event"], it["action"]) == (event, action)]
+        return at
+
+    def trace(self):
+        with open(self.trace_file, encoding="utf-8") as file:
+            return file.read()
+
+    def __str__(self):
+        log = open(self.log_file, encoding="utf-8").read() if os.path.exists(self.log_file) else ""
+        return f"exit code {self.code}\n{self.out}\n{self.errors}\n{log}"
+
+
+def two_robots_at_a_time(stage):
+    stage.play(DRIVERS, YARD)
+    assert stage.code == 0 and "goal reached" in stage.out
+    first, second = "(move r1 shed gate)", "(move r2 barn gate)"
+    assert stage.when("begins", second) < stage.when("ends", first)
+    assert stage.when("begins", first) < stage.when("ends", second)
+    assert stage.when("begins", "(signal r2 gate)") > stage.when("ends", second)
+    assert "performers: driver1 (move), driver2 (move), signaller (signal)" in stage.errors
+
+
+def required_concurrency(stage):
+    """The match cellar: what is done by the light must lie within it."""
+    crew = {"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 0.9}}
+    stage.play(crew, MATCH, "--executor", "live", speed=10)
+    assert stage.code == 0 and "goal reached" in stage.out
+    burning = [stage.when(it, "(burn torch)") for it in ("begins", "ends")]
+    for weld in ("hull", "keel"):
+        begins, ends = (stage.when(it, f"(inspect {weld})") for it in ("begins", "ends"))
+        assert burning[0] < begins < ends < burning[1]
+
+
+def a_performer_finishes_three_times(stage):
+    crew = {name: dict(spec, repeats=3) for name, spec in DRIVERS.items()}
+    stage.play(crew, YARD, "--strict-world")
+    assert stage.code == 0 and "goal reached" in stage.out
+    assert len([it for it in stage.log() if it["event"] == "begins"]) == 3
+
+
+def two_performers_of_the_same_action(stage):
+    crew = {name: {"action": "move", "lasts": 1} for name in ("driver1", "driver2")}
+    stage.play({**crew, "signaller": DRIVERS["signaller"]}, YARD)
+    assert stage.code == 0 and "goal reached" in stage.out
+    events = [it["event"] for it in stage.log()]
+    assert events.count("begins") == 3 and "rejected" in events
+
+
+def a_failure_has_its_reason(stage):
+    crew = {**DRIVERS, "driver2": dict(DRIVERS["driver2"], lasts=1, fails="the wheels slip")}
+    stage.play(crew, YARD)
+    assert stage.code == 1 and "the wheels slip" in stage.trace()
+
+
+def a_performer_is_lost(stage):
+    crew = {**DRIVERS, "driver1": dict(DRIVERS["driver1"], dies=0.5)}
+    stage.play(crew, YARD)
+    assert stage.code == 1 and "driver1 is lost: nothing was heard of it for 5 s" in stage.trace()
+
+
+def a_performer_never_says_that_it_has_ended(stage):
+    """It is told to cancel when no plan can bear it any longer, and does."""
+    crew = {"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 0.9, "mute": True}}
+    stage.play(crew, MATCH, speed=10)
+    assert stage.code == 1 and "told to cancel" in [it["event"] for it in stage.log()]
+    assert '"cancelled"' in stage.trace()
+
+
+def what_is_late_has_its_reason(stage):
+    """A deviation is seen when the interval that the plan can bear is left, and is told with that interval."""
+    crew = {"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 2.2}}
+    stage.play(crew, MATCH, speed=10)
+    assert stage.code == 1 and "inspect hull" in stage.out and "allowed" in stage.trace()
+
+
+def a_run_is_interrupted(stage):
+    crew = {**DRIVERS, "driver1": dict(DRIVERS["driver1"], lasts=30), "driver2": dict(DRIVERS["driver2"], lasts=30)}
+    stage.play(crew, YARD, interrupt_after="begins")
+    told = {it["action"] for it in stage.log() if it["event"] == "told to cancel"}
+    assert told == {"(move r1 shed gate)", "(move r2 barn gate)"}
+    assert "terminate called" not in stage.errors
+
+
+def the_protocol_is_kept(stage):
+    crew = {"driver": {"action": "move", "lasts": 1.5}, "driver2": {"action": "move", "lasts": 1.5}}
+    stage.play(crew, YARD, command="world-check")
+    assert stage.code == 0
+
+
+def a_missing_performer_is_named(stage):
+    stage.world += " --needs move,signal --within 8"
+    stage.play({"driver": {"action": "move", "lasts": 1}}, YARD)
+    assert stage.code == 2 and "no performer of signal was heard within 8 s; heard: driver (move)" in stage.errors
+    assert stage.log() == []
+
+
+BOTH = [
+    two_robots_at_a_time,
+    required_concurrency,
+    a_performer_finishes_three_times,
+    two_performers_of_the_same_action,
+    a_failure_has_its_reason,
+    a_performer_is_lost,
+    a_performer_never_says_that_it_has_ended,
+    what_is_late_has_its_reason,
+    a_run_is_interrupted,
+    the_protocol_is_kept,
+]
+
+
+def play(number, scenario, name, world):
+    with tempfile.TemporaryDirectory() as folder:
+        stage = Stage(world, number + 1, folder)
+        begun = time.monotonic()
+        stage.code = stage.out = stage.errors = None
+        try:
+            scenario(stage)
+            said = "ok"
+        except Exception as error:  # every mistake is told, with what was said on stage
+            said = f"WRONG: {type(error).__name__}: {error} at line {error.__traceback__.tb_next.tb_lineno}\n{stage}"
+        print(f"{scenario.__name__}, {name}: {said} ({time.monotonic() - begun:.0f} s)", flush=True)
+        return said == "ok"
+
+
+def main():
+    only = sys.argv[3:]
+    plays = [(it, name, world) for it in BOTH for name, world in (("program", PROGRAM), ("Python", PYTHON_WORLD))]
+    plays.append((a_missing_performer_is_named, "program", PROGRAM))
+    plays = [it for it in plays if not only or it[0].__name__ in only]
+    with ThreadPoolExecutor(4) as pool:
+        went_well = list(pool.map(lambda it: play(it[0], *it[1]), enumerate(plays)))
+    print(f"{sum(went_well)} of {len(went_well)} scenarios went as they should")
+    sys.exit(0 if all(went_well) else 1)
+
+
+if __name__ == "__main__":
+    main()
