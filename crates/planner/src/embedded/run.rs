@@ -245,7 +245,7 @@ impl Planner<'_> {
         let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, most_turns);
         let mut reported = (0, search.lookups());
         let (mut turn, mut spent) = (0, 0);
-        while spent < budget {
+        while spent < budget || self.keeps_its_turn(search, budget, spent) {
             turn += 1;
             let result = search.turn();
             spent += search.price();
@@ -282,6 +282,16 @@ impl Planner<'_> {
         }
         self.count(&before, search);
         Outcome::BudgetSpent
+    }
+
+    /// Whether a search goes on though its turns are used up: it still comes nearer to a first plan.
+    /// One that does not compress works no more than a first round may come to.
+    fn keeps_its_turn(&self, search: &Search<'_>, budget: u64, spent: u64) -> bool {
+        let tuning = &self.compiled.tuning;
+        self.best.is_none()
+            && budget > tuning.root_check_after
+            && (search.compresses() || spent < tuning.first_round_work / (1 + search.size()))
+            && search.has_come_nearer()
     }
 
     fn count(&mut self, before: &(Counts, Counts), search: &Search<'_>) {

@@ -72,6 +72,8 @@ pub(crate) struct Search<'a> {
     pub(crate) has_lost: bool,
     /// How much the last turn counts for.
     price: u64,
+    /// What the turns since the last better estimate count for.
+    idle: u64,
     /// The number of successors that had their turn.
     drawn: u64,
     pub(crate) expanded: u64,
@@ -122,8 +124,7 @@ impl<'a> Search<'a> {
         let step_costs = metric.map(|metric| StepCosts::of(compiled, metric));
         let mut relaxed = Relaxed::new(compiled, strategy.compresses);
         relaxed.is_chronological = strategy.is_chronological;
-        let draws = compiled.tuning.uses(Technique::Consumables);
-        if draws && strategy.is_chronological && !strategy.saves_consumables {
+        if strategy.draws_on_consumables && compiled.tuning.uses(Technique::Consumables) {
             relaxed.count_consumables();
         }
         let mut stepper = Stepper::new(compiled);
@@ -170,6 +171,7 @@ impl<'a> Search<'a> {
             horizon: NEVER,
             has_lost: strategy.is_chronological,
             price: 1,
+            idle: 0,
             drawn: 0,
             expanded: 0,
             generated: 0,
@@ -228,6 +230,19 @@ impl<'a> Search<'a> {
         self.price
     }
 
+    /// Whether it compresses: its states take less time than those of others where actions are many.
+    pub(crate) fn compresses(&self) -> bool {
+        self.strategy.compresses.is_some()
+    }
+
+    /// Whether a better estimate was found lately: see
+    /// [`Tuning::patience`](super::tuning::Tuning::patience). A search that only looks for what is
+    /// new has no estimates.
+    pub(crate) fn has_come_nearer(&self) -> bool {
+        self.strategy.novelty != Some(NoveltyOf::Successors)
+            && self.idle < self.compiled.tuning.patience
+    }
+
     /// How many pairs the stronger bound has looked up.
     pub(crate) fn lookups(&self) -> u64 {
         self.dead_ends.lookups()
@@ -282,6 +297,7 @@ impl<'a> Search<'a> {
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
         let unsettled = state.network.node_count() as u64;
         self.price += unsettled * unsettled / (8 * (1 + self.size()));
+        self.idle += self.price;
         if self.strategy.is_chronological && unsettled > self.compiled.tuning.most_unsettled {
             return Turn::Nothing;
         }

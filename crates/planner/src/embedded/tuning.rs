@@ -199,14 +199,21 @@ constants! {
     /// The same where searches that fill up reservoirs take turns with others. Not measured; less,
     /// as only one of the two kinds usually has a chance.
     first_round_with_reservoirs: u64 = 2_048;
-    /// The same where chronological searches take turns with others. Not measured; less, for the
-    /// same reason.
-    first_round_with_concurrency: u64 = 4_096;
+    /// The same where chronological searches take turns with others. Measured together with
+    /// `patience`, on the domains with required concurrency, from 256 to 4,096: with less, problems
+    /// that one search alone can solve wait less for it, and the sum of all changes little.
+    first_round_with_concurrency: u64 = 1_024;
     /// The most operators of estimates that a first round comes to, so that a large problem, each
     /// state of which takes long, does not wait for one search. Measured on parking, 18th of IPC
     /// 2014, with 25,215 actions: BFWS(f₅) finds a plan after 17 states, but had no turn within 20
     /// s while the first round went by states alone.
     first_round_work: u64 = 20_000_000;
+    /// A search keeps its turn as long as it found a better estimate within so many states. From
+    /// machine shop (all instances take one descent of 600 to 1,600 states): with 64, the largest
+    /// ones lose their turn on the way. In a search that does not compress this ends with
+    /// `first_round_work`: in turn and open, with up to 18,490 actions, a chronological search would take
+    /// all the time.
+    patience: u64 = 128;
     /// How many states an incomplete search looks at for each one of the complete search. Not
     /// measured; the complete search seldom finds a first plan, but is needed for proofs.
     incomplete_share: u64 = 8;

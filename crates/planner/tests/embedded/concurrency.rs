@@ -1,8 +1,33 @@
 //! Plans in which things must happen at the same time, and for long enough.
 
-use elbowroom_planner::{Answer, Counts};
+use std::ops::ControlFlow;
 
-use crate::world::{answer, describe};
+use elbowroom_model::Situation;
+use elbowroom_planner::{Answer, Counts, Member, Settings, Technique, Tuning, plan};
+
+use crate::world::{answer, describe, task};
+
+/// The answer with other constants of the search, within so many states.
+fn tuned(domain: &str, problem: &str, tuning: Tuning, states: u64) -> Answer {
+    let task = task(domain, problem);
+    let settings = Settings {
+        first_plan_only: true,
+        tuning,
+        ..Settings::default()
+    };
+    plan(
+        &task,
+        &Situation::initial(&task),
+        &settings,
+        &mut |progress| {
+            if progress.counts.evaluated > states {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        },
+    )
+}
 
 /// The counts of a search that found a plan.
 fn counts(answer: &Answer) -> Counts {
@@ -158,6 +183,34 @@ fn a_can_that_is_still_needed_is_not_shipped() {
     let answer = answer(&domain, &problem);
     let evaluated = counts(&answer).evaluated;
     assert!(evaluated < 10_000, "{evaluated} states");
+}
+
+#[test]
+fn a_search_that_compresses_keeps_what_is_needed_too() {
+    let cups: Vec<usize> = (0..8).map(|n| 1 + n % 3).collect();
+    let (domain, problem) = filling(&cups, &cups);
+    let mut tuning = Tuning::default();
+    tuning.only = Some(Member::Compressing);
+    let with = tuned(&domain, &problem, tuning.clone(), 1_000);
+    assert!(with.found().is_some(), "{}", describe(&with));
+    tuning.without.push(Technique::Consumables);
+    let without = tuned(&domain, &problem, tuning, 1_000);
+    assert!(without.found().is_none(), "{}", describe(&without));
+}
+
+/// One descent of a single search leads to the goal. Interrupted on the way, it has to wait for all
+/// others.
+#[test]
+fn a_search_that_comes_nearer_keeps_its_turn() {
+    let (domain, problem) = pottery(40);
+    let evaluated = |patience: u64| {
+        let mut tuning = Tuning::default();
+        tuning.first_round_with_concurrency = 65;
+        tuning.patience = patience;
+        counts(&tuned(&domain, &problem, tuning, 50_000)).evaluated
+    };
+    let (with, without) = (evaluated(128), evaluated(0));
+    assert!(2 * with < without, "{with} and {without} states");
 }
 
 #[test]

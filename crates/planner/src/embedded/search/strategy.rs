@@ -21,6 +21,8 @@ pub(crate) struct Strategy {
     /// Whether what is new comes first, and then what has more of the goal; and whether successors
     /// are looked at one by one for that, or the states that are expanded.
     pub(crate) novelty: Option<NoveltyOf>,
+    /// Whether relaxed plans draw on what is never filled up.
+    pub(crate) draws_on_consumables: bool,
     /// Whether what is used up and never filled up is spared.
     pub(crate) saves_consumables: bool,
     /// Whether the estimate counts what a relaxed plan uses up, and fills it up.
@@ -60,6 +62,7 @@ impl Strategy {
         compresses: None,
         variants: usize::MAX,
         is_chronological: false,
+        draws_on_consumables: false,
         saves_consumables: false,
         novelty: None,
         replenishes: false,
@@ -75,6 +78,7 @@ impl Strategy {
             Member::Chronological => Self {
                 variants: tuning.chronological_variants,
                 is_chronological: true,
+                draws_on_consumables: true,
                 ..Self::COMPLETE
             },
             Member::Saving => Self {
@@ -85,10 +89,12 @@ impl Strategy {
             },
             Member::Novelty => Self {
                 novelty: Some(NoveltyOf::Expanded),
+                draws_on_consumables: false,
                 ..Self::of(Member::Compressing, tuning)
             },
             Member::Width => Self {
                 novelty: Some(NoveltyOf::Successors),
+                draws_on_consumables: false,
                 ..Self::of(Member::Compressing, tuning)
             },
             Member::Complete => Self::COMPLETE,
@@ -100,6 +106,7 @@ impl Strategy {
         Self {
             compresses: Some(least),
             variants: tuning.compressed_variants,
+            draws_on_consumables: true,
             ..Self::COMPLETE
         }
     }

@@ -17,6 +17,7 @@ impl Search<'_> {
         }
         if estimate.steps < self.best_steps {
             self.best_steps = estimate.steps;
+            self.idle = 0;
             self.turns[0] -= self.compiled.tuning.boost;
         }
         if number == 0 {
