@@ -6,6 +6,8 @@
 //! program `elbowroom-plansys2` connects the two with standard input and output and with DDS; it is built
 //! with the feature `dds`.
 //!
+//! [`Goals`], [`Lifecycle`] and [`Progress`] are what it takes to stand in for `PlanSys2`'s planner and executor.
+//!
 //! Nothing here has a clock, a thread or a socket: time comes in as an argument, and what is to be said
 //! comes out as a value. `docs/plansys2.md` has the table of what happens when; each row is a test, and
 //! the same scripts are played to the `Hub` of `examples/plansys2_world.py`, which must do the same.
@@ -24,12 +26,19 @@
 //! assert!(hub.effects().contains(&Effect::Tell(1, Told::Started)));
 //! ```
 
+pub mod interface;
 pub mod message;
 
 mod census;
+mod goals;
 mod hub;
+mod lifecycle;
+mod progress;
 mod world;
 
 pub use census::Census;
+pub use goals::Goals;
 pub use hub::{Action, Effect, Hub, Ticket, Told};
+pub use lifecycle::Lifecycle;
+pub use progress::{Progress, plan_text};
 pub use world::{Command, World};

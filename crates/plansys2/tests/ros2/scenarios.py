@@ -174,6 +174,63 @@ def a_missing_performer_is_named(stage):
     assert stage.log() == []
 
 
+def serve(stage, crew, *options):
+    """The program stands in for PlanSys2's planner and executor; what a client of theirs is told."""
+    script = os.path.join(HERE, "performers.py")
+    there = [stage.start([sys.executable, script, json.dumps(crew), stage.log_file])]
+    there.append(stage.start([*stage.world.split(), "serve", "--elbowroom", ELBOWROOM], stdout=subprocess.DEVNULL))
+    try:
+        client = stage.start([sys.executable, os.path.join(HERE, "client.py"), *YARD[:2], *options],
+                             stdout=subprocess.PIPE, stderr=subprocess.PIPE)  # fmt: skip
+        stage.out, stage.errors = client.communicate(timeout=90)
+        stage.code = client.returncode
+        assert stage.code == 0
+        there[1].send_signal(signal.SIGINT)
+        assert there[1].wait(timeout=15) == 0, "it ends in order"
+    finally:
+        for it in there:
+            it.terminate()
+            it.wait()
+    return json.loads(stage.out)
+
+
+def a_plan_is_asked_for_and_executed(stage):
+    said = serve(stage, DRIVERS)
+    assert said["before"] == ["unconfigured", "unconfigured", "rejected"]
+    assert said["made ready"] == 4 * [True] and said["then"] == ["active", "active"]
+    is_planned, why = said["broken"]
+    assert not is_planned and "domain.pddl:1:9" in why
+    is_planned, actions = said["planned"]
+    assert is_planned and len(actions) == 3
+    executed = said["executed"]
+    assert executed["outcome"] == "succeeded" and executed["success"] and executed["was_executing"]
+    assert set(executed["actions"]) == {"(move r1 shed gate):0", "(move r2 barn gate):0", "(signal r1 gate):2000"}
+    assert all(status == 4 for status, _ in executed["actions"].values())
+    assert said["followed"] == [True, sorted(executed["actions"])], "tools can follow"
+    assert [it["event"] for it in stage.log()].count("ends") == 3
+
+
+def an_executed_plan_is_cancelled(stage):
+    crew = {name: dict(spec, lasts=30) for name, spec in DRIVERS.items()}
+    executed = serve(stage, crew, "2")["executed"]
+    assert executed["outcome"] == "canceled" and not executed["success"]
+    assert sorted(status for status, _ in executed["actions"].values()) == [1, 5, 5]
+    assert [it["event"] for it in stage.log()].count("told to cancel") == 2
+
+
+def an_executed_plan_fails_with_its_reason(stage):
+    crew = {**DRIVERS, "driver1": dict(DRIVERS["driver1"], lasts=0.5, fails="the wheels slip")}
+    executed = serve(stage, crew)["executed"]
+    assert executed["outcome"] == "aborted" and not executed["success"]
+    assert executed["actions"]["(move r1 shed gate):0"] == [3, "the wheels slip"]
+
+
+PROGRAM_ONLY = [
+    a_missing_performer_is_named,
+    a_plan_is_asked_for_and_executed,
+    an_executed_plan_is_cancelled,
+    an_executed_plan_fails_with_its_reason,
+]
 BOTH = [
     two_robots_at_a_time,
     required_concurrency,
@@ -205,7 +262,7 @@ def play(number, scenario, name, world):
 def main():
     only = sys.argv[3:]
     plays = [(it, name, world) for it in BOTH for name, world in (("program", PROGRAM), ("Python", PYTHON_WORLD))]
-    plays.append((a_missing_performer_is_named, "program", PROGRAM))
+    plays += [(it, "program", PROGRAM) for it in PROGRAM_ONLY]
     plays = [it for it in plays if not only or it[0].__name__ in only]
     with ThreadPoolExecutor(4) as pool:
         went_well = list(pool.map(lambda it: play(it[0], *it[1]), enumerate(plays)))

@@ -1,18 +1,30 @@
 //! Elbowroom on standard input and output, the action performers of `PlanSys2` over DDS.
 
+mod command;
+mod network;
 mod options;
+mod serve;
+mod services;
 mod session;
 mod topics;
 
 use std::io::{self, BufRead as _, Write as _};
+use std::os::unix::net::UnixStream;
 use std::process::ExitCode;
 use std::sync::mpsc::{self, Sender};
 use std::thread;
 
 use clap::Parser as _;
+use elbowroom_plansys2::interface::PlanRequest;
 use elbowroom_plansys2::message::{ActionExecution, ActionPerformerStatus};
 
-/// What comes in, from either side.
+use command::Planned;
+use network::{Asker, Network};
+use options::{Mode, Options, ServeOptions};
+use services::{Asked, Services};
+use topics::Topics;
+
+/// What comes in, from any side.
 pub(crate) enum Input {
     /// A line of Elbowroom.
     Line(String),
@@ -24,15 +36,25 @@ pub(crate) enum Input {
     Status(ActionPerformerStatus),
     /// Something for people to know.
     Trouble(String),
+    /// Somebody asks for something.
+    Asked(Box<Asked>),
+    /// A planner has ended: for whom, for what, and with what.
+    Planned(Asker, PlanRequest, Result<Planned, String>),
+    /// A run has begun to talk; it is answered there.
+    Talks(UnixStream),
+    /// A run is over, with that exit code.
+    Over(Option<i32>),
+    /// The user asks the program to end.
+    End,
 }
 
 fn main() -> ExitCode {
-    let outcome = options::Options::parse().settings().and_then(|settings| {
-        let (inputs, received) = mpsc::channel();
-        let topics = topics::Topics::join(&settings, inputs.clone())?;
-        thread::spawn(move || read(&inputs));
-        session::Session::new(&settings, topics, received).run()
-    });
+    let mut options = Options::parse();
+    let outcome = match options.command.take() {
+        Some(Mode::Relay { socket }) => command::relay(&socket),
+        Some(Mode::Serve(serving)) => serve(options, serving),
+        None => world(options),
+    };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
@@ -40,6 +62,33 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+fn world(options: Options) -> Result<(), String> {
+    let settings = options.settings()?;
+    let (inputs, received) = mpsc::channel();
+    let mut network = Network::join(&settings)?;
+    let topics = Topics::join(&mut network)?;
+    network.listen(inputs.clone())?;
+    thread::spawn(move || read(&inputs));
+    session::Session::new(&settings, topics, received).run()
+}
+
+fn serve(options: Options, serving: ServeOptions) -> Result<(), String> {
+    let serving = serving.checked()?;
+    let settings = options.settings()?;
+    let (inputs, received) = mpsc::channel();
+    let mut network = Network::join(&settings)?;
+    let topics = Topics::join(&mut network)?;
+    let services = Services::offer(&mut network)?;
+    network.listen(inputs.clone())?;
+    let ends = inputs.clone();
+    let ended = ctrlc::set_handler(move || {
+        let _ = ends.send(Input::End);
+    });
+    ended.map_err(|e| format!("cannot listen to signals: {e}"))?;
+    serve::Serving::new(&settings, serving, topics, services, inputs).run(&received);
+    Ok(())
 }
 
 fn read(inputs: &Sender<Input>) {

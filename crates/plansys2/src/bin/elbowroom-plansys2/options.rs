@@ -2,10 +2,11 @@
 
 use std::env;
 use std::net::{IpAddr, Ipv4Addr};
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use clap::Parser;
+use clap::{Args, Parser, Subcommand};
 
 const ABOUT: &str = "\
 A world for `elbowroom run … --world-process elbowroom-plansys2`: the action performers of PlanSys2, over DDS and without ROS.
@@ -14,8 +15,12 @@ PlanSys2's own executor must be off: two of them would both choose performers. d
 
 /// What can be given.
 #[derive(Debug, Parser)]
-#[command(version, about = ABOUT)]
+#[command(version, about = ABOUT, args_conflicts_with_subcommands = true)]
 pub(super) struct Options {
+    #[command(subcommand)]
+    pub(super) command: Option<Mode>,
+    #[command(flatten)]
+    pub(super) network: NetworkOptions,
     /// Actions that must have a performer before time begins, separated by commas; without any of them the
     /// program ends and names it. By default, time begins a second after the first performer was heard
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
@@ -24,20 +29,90 @@ pub(super) struct Options {
     /// [default: the environment's `ELBOWROOM_PERFORMERS_WITHIN`, or 10]
     #[arg(long, value_name = "S")]
     within: Option<f64>,
+}
+
+/// What the program does instead of being a world.
+#[derive(Debug, Subcommand)]
+pub(super) enum Mode {
+    /// Stand in for planner and executor
+    #[command(
+        about = "Stand in for PlanSys2's planner and executor: planner/get_plan, execute_plan, and the states of both nodes"
+    )]
+    Serve(ServeOptions),
+    /// Pass on what is said to a program that serves
+    #[command(hide = true)]
+    Relay {
+        /// Its socket.
+        socket: PathBuf,
+    },
+}
+
+/// For `serve`.
+#[derive(Debug, Args)]
+pub(super) struct ServeOptions {
+    /// The command that plans and executes
+    #[arg(long, value_name = "COMMAND", default_value = "elbowroom")]
+    pub(super) elbowroom: String,
+    /// The executor, see `elbowroom run --help`
+    #[arg(long, value_name = "NAME", default_value = "guarded")]
+    pub(super) executor: String,
+    /// How many seconds a plan may take to be found
+    #[arg(long, value_name = "S", default_value = "60")]
+    plan_within: f64,
+}
+
+/// The same, checked.
+#[derive(Debug)]
+pub(super) struct ServeSettings {
+    pub(super) elbowroom: String,
+    pub(super) executor: String,
+    pub(super) plan_within: Duration,
+}
+
+impl ServeOptions {
+    /// # Errors
+    /// Something cannot be used; the text says what to do.
+    pub(super) fn checked(self) -> Result<ServeSettings, String> {
+        let plan_within = seconds(self.plan_within)?;
+        // Runs are started elsewhere; a name without a folder is looked for in PATH.
+        let elbowroom = if self.elbowroom.contains('/') {
+            let full = std::path::absolute(&self.elbowroom);
+            full.map_err(|e| format!("{} cannot be used: {e}", self.elbowroom))?
+                .display()
+                .to_string()
+        } else {
+            self.elbowroom
+        };
+        Ok(ServeSettings {
+            elbowroom,
+            executor: self.executor,
+            plan_within,
+        })
+    }
+}
+
+fn seconds(number: f64) -> Result<Duration, String> {
+    Duration::try_from_secs_f64(number)
+        .map_err(|_| format!("{number} s is no time to wait; give a number from 0"))
+}
+
+/// For whatever speaks to robots.
+#[derive(Debug, Args)]
+pub(super) struct NetworkOptions {
     /// How many seconds of the plan pass in one real second
     /// [default: the environment's `ELBOWROOM_SPEED`, or 1]
-    #[arg(long, value_name = "X")]
+    #[arg(long, global = true, value_name = "X")]
     speed: Option<f64>,
     /// The domain of DDS, from 0 to 232
     /// [default: the environment's `ROS_DOMAIN_ID`, or 0]
-    #[arg(long, value_name = "N")]
+    #[arg(long, global = true, value_name = "N")]
     domain_id: Option<u16>,
     /// The namespace of the performers' topics, as in `/robot1`
-    #[arg(long, value_name = "NAME", default_value = "/")]
+    #[arg(long, global = true, value_name = "NAME", default_value = "/")]
     namespace: String,
     /// Speak and listen on the network interface with this address alone; may be repeated
     /// [default: all; with `ROS_LOCALHOST_ONLY=1` in the environment, 127.0.0.1]
-    #[arg(long, value_name = "ADDRESS")]
+    #[arg(long, global = true, value_name = "ADDRESS")]
     interface: Vec<IpAddr>,
 }
 
@@ -60,17 +135,17 @@ impl Options {
     /// Something cannot be used; the text says what to do.
     pub(super) fn settings(self) -> Result<Settings, String> {
         let within = or_variable(self.within, "ELBOWROOM_PERFORMERS_WITHIN", 10.0)?;
-        let within = Duration::try_from_secs_f64(within)
-            .map_err(|_| format!("{within} s is no time to wait; give a number from 0"))?;
-        let speed = or_variable(self.speed, "ELBOWROOM_SPEED", 1.0)?;
+        let within = seconds(within)?;
+        let network = self.network;
+        let speed = or_variable(network.speed, "ELBOWROOM_SPEED", 1.0)?;
         if !(speed > 0.0 && speed.is_finite()) {
             return Err(format!("the speed must be a number above 0, not {speed}"));
         }
-        let domain_id = or_variable(self.domain_id, "ROS_DOMAIN_ID", 0)?;
+        let domain_id = or_variable(network.domain_id, "ROS_DOMAIN_ID", 0)?;
         if domain_id > 232 {
             return Err(format!("the domain must be from 0 to 232, not {domain_id}"));
         }
-        let mut interfaces = self.interface;
+        let mut interfaces = network.interface;
         if interfaces.is_empty() && env::var("ROS_LOCALHOST_ONLY").is_ok_and(|it| it == "1") {
             interfaces.push(Ipv4Addr::LOCALHOST.into());
         }
@@ -79,7 +154,7 @@ impl Options {
             within,
             speed,
             domain_id,
-            namespace: namespace(&self.namespace)?,
+            namespace: namespace(&network.namespace)?,
             interfaces,
         })
     }

@@ -84,8 +84,9 @@ impl Session {
                     said.push(Input::Closed);
                     break;
                 }
-                Ok(line) => said.push(line),
-                Err(_) => {}
+                Ok(line @ Input::Line(_)) => said.push(line),
+                // Nobody serves here.
+                Ok(_) | Err(_) => {}
             }
             self.settle();
         }
@@ -112,6 +113,8 @@ impl Session {
             Input::Hub(message) => self.hub.message(&message, now),
             Input::Status(status) => self.hub.status(&status, now),
             Input::Trouble(text) => remark(&text),
+            // Nobody serves here.
+            _ => {}
         }
         false
     }
@@ -151,7 +154,7 @@ impl Session {
     clippy::disallowed_methods,
     reason = "robots are on the wall clock; the conversations get it as an argument"
 )]
-fn now() -> Instant {
+pub(super) fn now() -> Instant {
     Instant::now()
 }
 

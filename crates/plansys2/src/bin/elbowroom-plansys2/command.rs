@@ -1,0 +1,249 @@
+//! The command `elbowroom`, which plans and executes, as a process of its own.
+
+use std::fs::{self, File};
+use std::io::{self, BufRead as _, BufReader, Write as _};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::Sender;
+use std::thread;
+use std::time::Duration;
+
+use elbowroom_plansys2::interface::{Plan, PlanItem, PlanRequest};
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::Input;
+
+/// How often it is looked whether a planner has ended.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// A plan, and the text in which it is exact.
+#[derive(Clone, Debug)]
+pub(super) struct Planned {
+    pub(super) plan: Plan,
+    pub(super) text: String,
+}
+
+/// Has the command plan.
+///
+/// # Errors
+/// There is no plan, or none within that time; the text says why.
+pub(super) fn plan(
+    elbowroom: &str,
+    request: &PlanRequest,
+    within: Duration,
+) -> Result<Planned, String> {
+    let folder = folder_with(request)?;
+    let [out, errors] = ["out", "errors"].map(|name| folder.path().join(name));
+    let create = |path: &Path| File::create(path).map_err(|e| unusable(path, &e));
+    let mut child = Command::new(elbowroom)
+        .arg("plan")
+        .args(["domain.pddl", "problem.pddl", "--json"])
+        .current_dir(folder.path())
+        .stdin(Stdio::null())
+        .stdout(create(&out)?)
+        .stderr(create(&errors)?)
+        .spawn()
+        .map_err(|e| not_started(elbowroom, &e))?;
+    let ended = wait(&mut child, within).map_err(|e| format!("{elbowroom} was lost: {e}"))?;
+    let Some(status) = ended else {
+        return Err(format!(
+            "no plan was found within {} s",
+            within.as_secs_f64()
+        ));
+    };
+    let read = |path: &Path| fs::read_to_string(path).unwrap_or_default();
+    match status.code() {
+        Some(0) => {
+            steps_of(&read(&out)).ok_or_else(|| format!("{elbowroom} has not printed a plan"))
+        }
+        Some(1) => Err("no plan reaches the goal".to_owned()),
+        _ => Err(format!(
+            "the planner gave up ({status}): {}",
+            read(&errors).trim()
+        )),
+    }
+}
+
+/// `None` where it had to be ended.
+fn wait(child: &mut Child, within: Duration) -> io::Result<Option<ExitStatus>> {
+    let mut waited = Duration::ZERO;
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        if waited >= within {
+            child.kill()?;
+            child.wait()?;
+            return Ok(None);
+        }
+        thread::sleep(LOOK);
+        waited += LOOK;
+    }
+}
+
+fn steps_of(document: &str) -> Option<Planned> {
+    let document: Value = serde_json::from_str(document).ok()?;
+    let number = |value: &Value| value["decimal"].as_f64();
+    let step = |step: &Value| {
+        Some(PlanItem {
+            time: narrowed(number(&step["start"])?),
+            action: step["action"].as_str()?.to_owned(),
+            // What takes no time has none.
+            duration: number(&step["duration"]).map_or(0.0, narrowed),
+        })
+    };
+    let items: Option<Vec<_>> = document["steps"].as_array()?.iter().map(step).collect();
+    let text = document["plan"].as_str()?.to_owned();
+    Some(Planned {
+        plan: Plan { items: items? },
+        text,
+    })
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "the messages have no wider numbers"
+)]
+fn narrowed(number: f64) -> f32 {
+    number as f32
+}
+
+/// A run of the command, in which this program is the world.
+pub(super) struct Running {
+    pid: Option<Pid>,
+    socket: PathBuf,
+    _folder: TempDir,
+}
+
+impl Running {
+    /// Starts it; what it says, and that it is over, goes to `inputs`.
+    ///
+    /// # Errors
+    /// It cannot be started; the text says why.
+    pub(super) fn start(
+        elbowroom: &str,
+        executor: &str,
+        texts: &PlanRequest,
+        plan: &str,
+        inputs: &Sender<Input>,
+    ) -> Result<Self, String> {
+        let folder = folder_with(texts)?;
+        let path = folder.path().join("plan.plan");
+        fs::write(&path, plan).map_err(|e| unusable(&path, &e))?;
+        let socket = folder.path().join("world");
+        let listener = UnixListener::bind(&socket).map_err(|e| unusable(&socket, &e))?;
+        let own = std::env::current_exe()
+            .map_err(|e| format!("this program does not know where it is: {e}"))?;
+        // The world is started in that folder, so that only this program's own path could have blanks in it.
+        let relay = folder.path().join("relay");
+        std::os::unix::fs::symlink(&own, &relay).map_err(|e| unusable(&relay, &e))?;
+        let mut child = Command::new(elbowroom)
+            .arg("run")
+            .args([
+                "domain.pddl",
+                "problem.pddl",
+                "plan.plan",
+                "--executor",
+                executor,
+            ])
+            .args(["--world-process", "./relay relay world"])
+            .current_dir(folder.path())
+            .stdin(Stdio::null())
+            .spawn()
+            .map_err(|e| not_started(elbowroom, &e))?;
+        let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+        let heard = inputs.clone();
+        thread::spawn(move || listen(&listener, &heard));
+        let over = inputs.clone();
+        thread::spawn(move || {
+            let code = child.wait().ok().and_then(|status| status.code());
+            let _ = over.send(Input::Over(code));
+        });
+        Ok(Self {
+            pid,
+            socket,
+            _folder: folder,
+        })
+    }
+
+    /// Asks it to end in order.
+    pub(super) fn interrupt(&self) {
+        if let Some(pid) = self.pid {
+            // Whoever has ended already cannot be told.
+            let _ = kill_process(pid, Signal::INT);
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // Nobody may have called; then somebody still waits for the call.
+        let _ = UnixStream::connect(&self.socket);
+    }
+}
+
+fn listen(listener: &UnixListener, inputs: &Sender<Input>) {
+    let Ok((stream, _)) = listener.accept() else {
+        return;
+    };
+    let Ok(answers) = stream.try_clone() else {
+        return;
+    };
+    let _ = inputs.send(Input::Talks(answers));
+    for line in BufReader::new(stream).lines() {
+        let Ok(line) = line else { break };
+        if inputs.send(Input::Line(line)).is_err() {
+            break;
+        }
+    }
+}
+
+/// Passes on what Elbowroom says to the program that started it, and back.
+///
+/// # Errors
+/// That program is gone.
+pub(super) fn relay(socket: &Path) -> Result<(), String> {
+    let failed = |e: io::Error| format!("the program that executes is gone: {e}");
+    let mut stream = UnixStream::connect(socket).map_err(failed)?;
+    let answers = stream.try_clone().map_err(failed)?;
+    thread::spawn(move || {
+        for line in io::stdin().lock().lines() {
+            let Ok(line) = line else { break };
+            if writeln!(stream, "{line}").is_err() {
+                break;
+            }
+        }
+        let _ = stream.shutdown(std::net::Shutdown::Both);
+    });
+    for line in BufReader::new(answers).lines() {
+        let mut out = io::stdout().lock();
+        writeln!(out, "{}", line.map_err(failed)?)
+            .and_then(|()| out.flush())
+            .map_err(failed)?;
+    }
+    Ok(())
+}
+
+fn folder_with(texts: &PlanRequest) -> Result<TempDir, String> {
+    let folder =
+        tempfile::tempdir().map_err(|e| format!("no folder for files can be made: {e}"))?;
+    for (name, text) in [
+        ("domain.pddl", &texts.domain),
+        ("problem.pddl", &texts.problem),
+    ] {
+        let path = folder.path().join(name);
+        fs::write(&path, text).map_err(|e| unusable(&path, &e))?;
+    }
+    Ok(folder)
+}
+
+fn unusable(path: &Path, error: &io::Error) -> String {
+    format!("{} cannot be used: {error}", path.display())
+}
+
+fn not_started(elbowroom: &str, error: &io::Error) -> String {
+    format!("{elbowroom} cannot be started: {error}; --elbowroom says where it is")
+}

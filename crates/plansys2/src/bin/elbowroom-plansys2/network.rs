@@ -1,0 +1,291 @@
+//! DDS, as ROS 2 uses it: names and types of topics and services, and a thread that listens.
+//!
+//! The program takes part in DDS, and is no node of ROS: it does not publish `ros_discovery_info`. Its layout
+//! changed between Humble and Iron, and nodes of one side abort when they read that of the other. Who does not
+//! speak of nodes can do no harm to either; topics, services and actions need no nodes.
+
+use std::io;
+use std::sync::mpsc::Sender;
+use std::thread;
+
+use rustdds::mio1::event::Source;
+use rustdds::mio1::{Events, Interest, Poll, Registry, Token};
+use rustdds::no_key::{DataWriterCdr, SimpleDataReaderCdr};
+use rustdds::policy::{Durability, History, Reliability};
+use rustdds::rpc::SampleIdentity;
+use rustdds::{
+    DomainParticipant, DomainParticipantBuilder, Duration, Publisher, QosPolicies,
+    QosPolicyBuilder, SequenceNumber, Subscriber, Timestamp, Topic, TopicKind, WriteOptionsBuilder,
+};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::Input;
+use super::options::Settings;
+
+/// Which request an answer belongs to.
+pub(super) type Asker = SampleIdentity;
+
+/// A connection to a domain of DDS.
+pub(super) struct Network {
+    participant: DomainParticipant,
+    publisher: Publisher,
+    subscriber: Subscriber,
+    namespace: String,
+    ears: Vec<Box<dyn Ear>>,
+}
+
+impl Network {
+    /// Joins the domain.
+    ///
+    /// # Errors
+    /// The network does not let it; the text says what.
+    pub(super) fn join(settings: &Settings) -> Result<Self, String> {
+        let mut builder = DomainParticipantBuilder::new(settings.domain_id);
+        if !settings.interfaces.is_empty() {
+            builder = builder.with_only_networks(settings.interfaces.iter().copied());
+        }
+        let failed = |e: rustdds::dds::CreateError| {
+            let domain = settings.domain_id;
+            format!(
+                "cannot join the DDS domain {domain}: {e}; is a network interface up, with multicast?"
+            )
+        };
+        let participant = builder.build().map_err(failed)?;
+        Ok(Self {
+            publisher: participant
+                .create_publisher(&reliable(100))
+                .map_err(failed)?,
+            subscriber: participant
+                .create_subscriber(&reliable(100))
+                .map_err(failed)?,
+            participant,
+            namespace: settings.namespace.clone(),
+            ears: Vec::new(),
+        })
+    }
+
+    /// A topic of that name, in the namespace; `kind` is its type, as in `plansys2_msgs::msg::dds_::Plan_`.
+    fn topic(
+        &self,
+        prefix: &str,
+        name: &str,
+        kind: &str,
+        qos: &QosPolicies,
+    ) -> Result<Topic, String> {
+        let full = format!("{prefix}{}{name}", self.namespace);
+        let topic = self
+            .participant
+            .create_topic(full, kind.to_owned(), qos, TopicKind::NoKey);
+        topic.map_err(|e| format!("cannot use the topic {name}: {e}"))
+    }
+
+    fn hear<T>(
+        &mut self,
+        topic: &Topic,
+        input: impl Fn(Asker, T) -> Input + Send + 'static,
+    ) -> Result<(), String>
+    where
+        T: DeserializeOwned + Send + 'static,
+    {
+        let reader = self.subscriber.create_simple_datareader_no_key(topic, None);
+        let reader = reader.map_err(|e| format!("cannot listen: {e}"))?;
+        self.ears.push(Box::new(Listening { reader, input }));
+        Ok(())
+    }
+
+    /// Publishes on a topic.
+    ///
+    /// # Errors
+    /// DDS refuses; the text says what.
+    pub(super) fn publish<T>(
+        &self,
+        name: &str,
+        kind: &str,
+        qos: &QosPolicies,
+    ) -> Result<Mouth<T>, String>
+    where
+        T: Serialize,
+    {
+        let topic = self.topic("rt", name, kind, qos)?;
+        let writer = self.publisher.create_datawriter_no_key_cdr(&topic, None);
+        Ok(Mouth(
+            writer.map_err(|e| format!("cannot publish {name}: {e}"))?,
+        ))
+    }
+
+    /// Listens to a topic, once [`Self::listen`] is called.
+    ///
+    /// # Errors
+    /// DDS refuses; the text says what.
+    pub(super) fn subscribe<T>(
+        &mut self,
+        name: &str,
+        kind: &str,
+        qos: &QosPolicies,
+        input: impl Fn(T) -> Input + Send + 'static,
+    ) -> Result<(), String>
+    where
+        T: DeserializeOwned + Send + 'static,
+    {
+        let topic = self.topic("rt", name, kind, qos)?;
+        self.hear(&topic, move |_, message| input(message))
+    }
+
+    /// Serves a service; `kind` is its type, as in `plansys2_msgs::srv::dds_::GetPlan`.
+    ///
+    /// # Errors
+    /// DDS refuses; the text says what.
+    pub(super) fn serve<Request, Response>(
+        &mut self,
+        name: &str,
+        kind: &str,
+        input: impl Fn(Asker, Request) -> Input + Send + 'static,
+    ) -> Result<Mouth<Response>, String>
+    where
+        Request: DeserializeOwned + Send + 'static,
+        Response: Serialize,
+    {
+        let qos = reliable(10);
+        let requests = self.topic(
+            "rq",
+            &format!("{name}Request"),
+            &format!("{kind}_Request_"),
+            &qos,
+        )?;
+        self.hear(&requests, input)?;
+        let replies = self.topic(
+            "rr",
+            &format!("{name}Reply"),
+            &format!("{kind}_Response_"),
+            &qos,
+        )?;
+        let writer = self.publisher.create_datawriter_no_key_cdr(&replies, None);
+        Ok(Mouth(
+            writer.map_err(|e| format!("cannot serve {name}: {e}"))?,
+        ))
+    }
+
+    /// Begins to listen, in a thread of its own; what is heard goes to `inputs`.
+    ///
+    /// # Errors
+    /// The system refuses; the text says what.
+    pub(super) fn listen(&mut self, inputs: Sender<Input>) -> Result<(), String> {
+        let failed = |e: io::Error| format!("cannot listen to the network: {e}");
+        let mut poll = Poll::new().map_err(failed)?;
+        let mut ears = std::mem::take(&mut self.ears);
+        for (number, ear) in ears.iter_mut().enumerate() {
+            ear.register(poll.registry(), Token(number))
+                .map_err(failed)?;
+        }
+        thread::spawn(move || {
+            let mut events = Events::with_capacity(16);
+            // Whoever receives is gone when the program ends.
+            while ears.iter().all(|ear| ear.forward(&inputs)) {
+                if let Err(error) = poll.poll(&mut events, None)
+                    && error.kind() != io::ErrorKind::Interrupted
+                {
+                    let _ = inputs.send(Input::Trouble(failed(error)));
+                    return;
+                }
+            }
+        });
+        Ok(())
+    }
+}
+
+/// Reliable and volatile, with the last ones kept: as the hub of `PlanSys2` has it with 100, and services with 10.
+pub(super) fn reliable(depth: i32) -> QosPolicies {
+    let max_blocking_time = Duration::from_millis(100);
+    QosPolicyBuilder::new()
+        .reliability(Reliability::Reliable { max_blocking_time })
+        .durability(Durability::Volatile)
+        .history(History::KeepLast { depth })
+        .build()
+}
+
+/// The last one is told to whoever comes later.
+pub(super) fn latched() -> QosPolicies {
+    let max_blocking_time = Duration::from_millis(100);
+    QosPolicyBuilder::new()
+        .reliability(Reliability::Reliable { max_blocking_time })
+        .durability(Durability::TransientLocal)
+        .history(History::KeepLast { depth: 1 })
+        .build()
+}
+
+/// Something to publish on, or to answer by.
+pub(super) struct Mouth<T: Serialize>(DataWriterCdr<T>);
+
+impl<T: Serialize> Mouth<T> {
+    /// Publishes a message.
+    ///
+    /// # Errors
+    /// It could not be sent.
+    pub(super) fn say(&self, message: T) -> Result<(), String> {
+        self.0
+            .write(message, None)
+            .map_err(|e| format!("a message was not sent: {e}"))
+    }
+
+    /// Answers a request.
+    ///
+    /// # Errors
+    /// It could not be sent.
+    pub(super) fn answer(&self, asker: Asker, response: T) -> Result<(), String> {
+        let options = WriteOptionsBuilder::new()
+            .source_timestamp(Timestamp::now())
+            .related_sample_identity(asker);
+        let written = self.0.write_with_options(response, options.build());
+        written
+            .map(|_| ())
+            .map_err(|e| format!("an answer was not sent: {e}"))
+    }
+}
+
+/// Whatever can be listened to.
+trait Ear: Send {
+    fn register(&mut self, registry: &Registry, token: Token) -> io::Result<()>;
+    /// Passes on all that has come; `false` when nobody takes it any more.
+    fn forward(&self, inputs: &Sender<Input>) -> bool;
+}
+
+struct Listening<T: DeserializeOwned + 'static, F> {
+    reader: SimpleDataReaderCdr<T>,
+    input: F,
+}
+
+impl<T, F> Ear for Listening<T, F>
+where
+    T: DeserializeOwned + Send + 'static,
+    F: Fn(Asker, T) -> Input + Send,
+{
+    fn register(&mut self, registry: &Registry, token: Token) -> io::Result<()> {
+        Source::register(&mut self.reader, registry, token, Interest::READABLE)
+    }
+
+    fn forward(&self, inputs: &Sender<Input>) -> bool {
+        self.reader.drain_read_notifications();
+        loop {
+            let input = match self.reader.try_take_one() {
+                Ok(Some(sample)) => {
+                    // Fast DDS names the reader of the answer, and leaves the number out: it is that of the request.
+                    let own = SampleIdentity {
+                        writer_guid: sample.writer_guid(),
+                        sequence_number: sample.sequence_number,
+                    };
+                    let mut asker = sample.related_sample_identity().unwrap_or(own);
+                    if asker.sequence_number == SequenceNumber::UNKNOWN {
+                        asker.sequence_number = own.sequence_number;
+                    }
+                    (self.input)(asker, sample.into_value())
+                }
+                Ok(None) => return true,
+                Err(error) => Input::Trouble(format!("a message was not understood: {error}")),
+            };
+            if inputs.send(input).is_err() {
+                return false;
+            }
+        }
+    }
+}

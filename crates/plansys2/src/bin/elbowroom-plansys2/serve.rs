@@ -1,0 +1,381 @@
+//! In place of `PlanSys2`'s planner and executor: plans for who asks, and executes one plan at a time.
+
+use std::io::Write as _;
+use std::os::unix::net::UnixStream;
+use std::sync::mpsc::{Receiver, Sender};
+use std::thread;
+use std::time::{Duration, Instant, SystemTime};
+
+use elbowroom_plansys2::interface::{
+    Feedback, GoalId, GoalRequest, GoalResponse, Plan, PlanRequest, PlanResponse, StateResponse,
+    Success,
+};
+use elbowroom_plansys2::message::Stamp;
+use elbowroom_plansys2::{
+    Command, Effect, Goals, Hub, Lifecycle, Progress, Ticket, World, plan_text,
+};
+
+use super::command::{self, Planned, Running};
+use super::network::Asker;
+use super::options::{ServeSettings, Settings};
+use super::services::{Asked, EXECUTOR, NODES, PLANNER, Services};
+use super::session::now;
+use super::topics::Topics;
+use super::{Input, remark};
+
+/// How often the hub looks whether somebody is lost.
+const TICK: Duration = Duration::from_millis(200);
+/// How often it is told how a plan stands, at least.
+const TELL_EVERY: Duration = Duration::from_secs(1);
+/// How long a run may take to end when it was asked to.
+const FAREWELL: Duration = Duration::from_secs(8);
+/// Tickets of one run differ from those of another in these bits: the hub may still wait for what an earlier run has
+/// cancelled.
+const RUN_BITS: u32 = 32;
+
+/// A plan that is being executed.
+struct Execution {
+    goal: GoalId,
+    run: Running,
+    number: u64,
+    world: World,
+    progress: Progress,
+    answers: Option<UnixStream>,
+    told: Option<Instant>,
+}
+
+/// The server.
+pub(super) struct Serving {
+    settings: ServeSettings,
+    speed: f64,
+    topics: Topics,
+    services: Services,
+    inputs: Sender<Input>,
+    hub: Hub,
+    nodes: [Lifecycle; NODES.len()],
+    goals: Goals<Asker>,
+    /// What was last planned for.
+    texts: Option<PlanRequest>,
+    planned: Option<Planned>,
+    execution: Option<Execution>,
+    runs: u64,
+    zero: Instant,
+}
+
+impl Serving {
+    pub(super) fn new(
+        settings: &Settings,
+        serving: ServeSettings,
+        topics: Topics,
+        services: Services,
+        inputs: Sender<Input>,
+    ) -> Self {
+        Self {
+            settings: serving,
+            speed: settings.speed,
+            topics,
+            services,
+            inputs,
+            hub: Hub::new("elbowroom"),
+            nodes: [Lifecycle::default(); NODES.len()],
+            goals: Goals::default(),
+            texts: None,
+            planned: None,
+            execution: None,
+            runs: 0,
+            zero: now(),
+        }
+    }
+
+    /// Until the user asks it to end.
+    pub(super) fn run(mut self, received: &Receiver<Input>) {
+        remark("serves planner/get_plan and execute_plan");
+        let mut leaves: Option<Duration> = None;
+        loop {
+            let due = self
+                .execution
+                .as_ref()
+                .and_then(|it| it.world.due_in(self.now()));
+            // The sender is kept, so that only time can run out.
+            if let Ok(input) = received.recv_timeout(due.map_or(TICK, |it| it.min(TICK))) {
+                if matches!(input, Input::End) {
+                    leaves.get_or_insert(self.now());
+                    self.interrupt();
+                } else {
+                    self.take(input);
+                }
+            }
+            self.hub.tick(self.now());
+            self.settle();
+            let patience = leaves.map(|at| self.now().saturating_sub(at) >= FAREWELL);
+            if patience.is_some_and(|is_over| is_over || self.execution.is_none()) {
+                // What was told to stop is to hear of it.
+                thread::sleep(TICK);
+                return;
+            }
+        }
+    }
+
+    fn take(&mut self, input: Input) {
+        let now = self.now();
+        match input {
+            Input::Hub(message) => self.hub.message(&message, now),
+            Input::Status(status) => self.hub.status(&status, now),
+            Input::Trouble(text) => remark(&text),
+            Input::Line(line) => self.hear(&line, now),
+            Input::Talks(stream) => {
+                if let Some(execution) = &mut self.execution {
+                    execution.answers = Some(stream);
+                }
+            }
+            Input::Asked(asked) => self.answer(*asked),
+            Input::Planned(who, texts, planned) => self.has_planned(who, texts, planned),
+            Input::Over(code) => self.over(code),
+            // That a run does not speak any more is said by its end.
+            Input::Closed | Input::End => {}
+        }
+    }
+
+    /// A line of the run.
+    fn hear(&mut self, line: &str, now: Duration) {
+        let Some(execution) = &mut self.execution else {
+            return;
+        };
+        let mut said = Vec::new();
+        let command = execution.world.hear(line, now, &mut said);
+        say(execution, &said);
+        match command {
+            Ok(Some(Command::Begin(mut action))) => {
+                execution.progress.begin(&action);
+                action.ticket |= execution.number << RUN_BITS;
+                self.hub.begin(action, now);
+            }
+            Ok(Some(Command::Cancel(ticket))) => {
+                self.hub.cancel(ticket | (execution.number << RUN_BITS));
+            }
+            Ok(Some(Command::Stop) | None) => {}
+            Err(error) => remark(&format!("not understood: {line}: {error}")),
+        }
+    }
+
+    fn answer(&mut self, asked: Asked) {
+        let sent = match asked {
+            Asked::Plan(who, texts) => return self.plan(who, texts),
+            Asked::Goal(who, request) => {
+                let stamp = stamp();
+                let accepted = match self.begin(&request, stamp) {
+                    Ok(()) => true,
+                    Err(why) => {
+                        remark(&format!("a plan is not executed: {why}"));
+                        false
+                    }
+                };
+                let sent = self
+                    .services
+                    .goal
+                    .answer(who, GoalResponse { accepted, stamp });
+                sent.and_then(|()| self.services.statuses.say(self.goals.statuses()))
+            }
+            Asked::Cancel(who, request) => {
+                let (is_given_up, response) = self.goals.cancel(&request);
+                if is_given_up {
+                    self.interrupt();
+                }
+                let sent = self.services.cancel.answer(who, response);
+                sent.and_then(|()| self.services.statuses.say(self.goals.statuses()))
+            }
+            Asked::Result(who, request) => match self.goals.ask(request.goal_id, who) {
+                Some((who, result)) => self.services.result.answer(who, result),
+                None => Ok(()),
+            },
+            Asked::State(node, who) => {
+                let current_state = self.nodes[node].state();
+                self.services.state[node].answer(who, StateResponse { current_state })
+            }
+            Asked::Change(node, who, request) => {
+                let success = self.nodes[node].change(&request.transition);
+                if !self.nodes[EXECUTOR].serves() {
+                    self.interrupt();
+                }
+                self.services.change[node].answer(who, Success { success })
+            }
+        };
+        told(sent);
+    }
+
+    fn plan(&self, who: Asker, texts: PlanRequest) {
+        let (inputs, elbowroom) = (self.inputs.clone(), self.settings.elbowroom.clone());
+        let within = self.settings.plan_within;
+        let serves = self.nodes[PLANNER].serves();
+        thread::spawn(move || {
+            let planned = if serves {
+                command::plan(&elbowroom, &texts, within)
+            } else {
+                Err("the planner is not active".to_owned())
+            };
+            // Whoever receives is gone when the program ends.
+            let _ = inputs.send(Input::Planned(who, texts, planned));
+        });
+    }
+
+    fn has_planned(&mut self, who: Asker, texts: PlanRequest, planned: Result<Planned, String>) {
+        let response = match planned {
+            Ok(planned) => {
+                let plan = planned.plan.clone();
+                (self.texts, self.planned) = (Some(texts), Some(planned));
+                PlanResponse {
+                    success: true,
+                    plan,
+                    error_info: String::new(),
+                }
+            }
+            Err(error_info) => PlanResponse {
+                success: false,
+                plan: Plan::default(),
+                error_info,
+            },
+        };
+        told(self.services.plan.answer(who, response));
+    }
+
+    /// Begins to execute a plan.
+    fn begin(&mut self, request: &GoalRequest, stamp: Stamp) -> Result<(), String> {
+        if !self.nodes[EXECUTOR].serves() {
+            return Err("the executor is not active".to_owned());
+        }
+        if self.goals.open().is_some() {
+            return Err("another one is being executed".to_owned());
+        }
+        let Some(texts) = &self.texts else {
+            return Err(
+                "its domain and problem are not known: ask planner/get_plan for a plan first"
+                    .to_owned(),
+            );
+        };
+        let known = self.planned.as_ref().filter(|it| it.plan == request.plan);
+        let text = known.map_or_else(|| plan_text(&request.plan), |it| it.text.clone());
+        let ServeSettings {
+            elbowroom,
+            executor,
+            ..
+        } = &self.settings;
+        let run = Running::start(elbowroom, executor, texts, &text, &self.inputs)?;
+        if !self.goals.accept(request.goal_id, stamp) {
+            run.interrupt();
+            return Err("there was a goal of that number".to_owned());
+        }
+        told(self.services.executing.say(request.plan.clone()));
+        self.runs += 1;
+        self.execution = Some(Execution {
+            goal: request.goal_id,
+            run,
+            number: self.runs,
+            world: World::new("plansys2", self.speed),
+            progress: Progress::new(&request.plan),
+            answers: None,
+            told: None,
+        });
+        Ok(())
+    }
+
+    /// The run is to end in order.
+    fn interrupt(&self) {
+        if let Some(execution) = &self.execution {
+            execution.run.interrupt();
+        }
+    }
+
+    fn over(&mut self, code: Option<i32>) {
+        let Some(execution) = self.execution.take() else {
+            return;
+        };
+        // What a run that has died has left running is to stop.
+        for ticket in execution.world.running() {
+            self.hub.cancel(ticket | (execution.number << RUN_BITS));
+        }
+        let infos = execution.progress.infos().to_vec();
+        for (who, result) in self.goals.end(code == Some(0), infos) {
+            told(self.services.result.answer(who, result));
+        }
+        told(self.services.statuses.say(self.goals.statuses()));
+    }
+
+    /// Does what the hub has decided, and answers the run if that is due.
+    fn settle(&mut self) {
+        let now = self.now();
+        for effect in self.hub.effects() {
+            match effect {
+                Effect::Send(message) => told(self.topics.send(message)),
+                Effect::Tell(ticket, what) => {
+                    // What comes of an earlier run counts no more.
+                    let (number, ticket): (u64, Ticket) =
+                        (ticket >> RUN_BITS, ticket & ((1 << RUN_BITS) - 1));
+                    if let Some(execution) =
+                        self.execution.as_mut().filter(|it| it.number == number)
+                    {
+                        execution.world.tell(ticket, &what, now);
+                        execution.progress.tell(ticket, &what, stamp());
+                        execution.told = None;
+                    }
+                }
+                Effect::Remark(text) => remark(&text),
+            }
+        }
+        let Some(execution) = &mut self.execution else {
+            return;
+        };
+        let lines = execution.world.answer(now);
+        say(execution, &lines);
+        let clock = super::session::now();
+        if execution
+            .told
+            .is_none_or(|at| clock.saturating_duration_since(at) >= TELL_EVERY)
+        {
+            execution.told = Some(clock);
+            let action_execution_status = execution.progress.infos().to_vec();
+            for info in &action_execution_status {
+                told(self.services.infos.say(info.clone()));
+            }
+            let goal_id = execution.goal;
+            told(self.services.feedback.say(Feedback {
+                goal_id,
+                action_execution_status,
+            }));
+        }
+    }
+
+    fn now(&self) -> Duration {
+        now().saturating_duration_since(self.zero)
+    }
+}
+
+/// Says it to the run.
+fn say(execution: &mut Execution, lines: &[String]) {
+    if let Some(stream) = &mut execution.answers {
+        for line in lines {
+            // That it is gone is said by its end.
+            let _ = writeln!(stream, "{line}");
+        }
+    }
+}
+
+fn told(sent: Result<(), String>) {
+    if let Err(why) = sent {
+        remark(&why);
+    }
+}
+
+/// What time it is, for people and other nodes.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "messages of ROS carry the time of day"
+)]
+fn stamp() -> Stamp {
+    let since = SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .unwrap_or_default();
+    Stamp {
+        sec: i32::try_from(since.as_secs()).unwrap_or(i32::MAX),
+        nanosec: since.subsec_nanos(),
+    }
+}

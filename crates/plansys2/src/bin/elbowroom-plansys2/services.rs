@@ -1,0 +1,110 @@
+//! The services and the action by which `PlanSys2`'s planner and executor are known.
+
+use elbowroom_plansys2::interface::{
+    ActionExecutionInfo, CancelRequest, CancelResponse, ChangeRequest, Empty, Feedback,
+    GoalRequest, GoalResponse, GoalStatuses, Plan, PlanRequest, PlanResponse, ResultRequest,
+    ResultResponse, StateResponse, Success,
+};
+
+use super::Input;
+use super::network::{Asker, Mouth, Network, latched, reliable};
+
+/// Those that are stood in for.
+pub(super) const NODES: [&str; 2] = ["planner", "executor"];
+/// Which of them has the plans, and which one executes them.
+pub(super) const PLANNER: usize = 0;
+pub(super) const EXECUTOR: usize = 1;
+
+/// What somebody has asked for.
+pub(super) enum Asked {
+    Plan(Asker, PlanRequest),
+    Goal(Asker, GoalRequest),
+    Cancel(Asker, CancelRequest),
+    Result(Asker, ResultRequest),
+    /// In which state a node is, one of [`NODES`].
+    State(usize, Asker),
+    Change(usize, Asker, ChangeRequest),
+}
+
+/// By what it is answered.
+pub(super) struct Services {
+    pub(super) plan: Mouth<PlanResponse>,
+    pub(super) goal: Mouth<GoalResponse>,
+    pub(super) cancel: Mouth<CancelResponse>,
+    pub(super) result: Mouth<ResultResponse>,
+    pub(super) feedback: Mouth<Feedback>,
+    pub(super) statuses: Mouth<GoalStatuses>,
+    /// What other tools follow: how each action stands, and the plan that is executed.
+    pub(super) infos: Mouth<ActionExecutionInfo>,
+    pub(super) executing: Mouth<Plan>,
+    pub(super) state: Vec<Mouth<StateResponse>>,
+    pub(super) change: Vec<Mouth<Success>>,
+}
+
+impl Services {
+    /// Offers all of them.
+    ///
+    /// # Errors
+    /// DDS refuses; the text says what.
+    pub(super) fn offer(network: &mut Network) -> Result<Self, String> {
+        let ask = |asked| Input::Asked(Box::new(asked));
+        let (mut state, mut change) = (Vec::new(), Vec::new());
+        for (number, node) in NODES.iter().enumerate() {
+            let kind = "lifecycle_msgs::srv::dds_::GetState";
+            let name = format!("{node}/get_state");
+            state.push(network.serve(&name, kind, move |asker, _: Empty| {
+                ask(Asked::State(number, asker))
+            })?);
+            let kind = "lifecycle_msgs::srv::dds_::ChangeState";
+            let name = format!("{node}/change_state");
+            change.push(network.serve(&name, kind, move |asker, it| {
+                ask(Asked::Change(number, asker, it))
+            })?);
+        }
+        let action = "plansys2_msgs::action::dds_::ExecutePlan";
+        let cancels = "action_msgs::srv::dds_::CancelGoal";
+        let own = |part: &str| format!("execute_plan/_action/{part}");
+        Ok(Self {
+            plan: network.serve(
+                "planner/get_plan",
+                "plansys2_msgs::srv::dds_::GetPlan",
+                move |asker, it| ask(Asked::Plan(asker, it)),
+            )?,
+            goal: network.serve(
+                &own("send_goal"),
+                &format!("{action}_SendGoal"),
+                move |asker, it| ask(Asked::Goal(asker, it)),
+            )?,
+            cancel: network.serve(&own("cancel_goal"), cancels, move |asker, it| {
+                ask(Asked::Cancel(asker, it))
+            })?,
+            result: network.serve(
+                &own("get_result"),
+                &format!("{action}_GetResult"),
+                move |asker, it| ask(Asked::Result(asker, it)),
+            )?,
+            feedback: network.publish(
+                &own("feedback"),
+                &format!("{action}_FeedbackMessage_"),
+                &reliable(10),
+            )?,
+            statuses: network.publish(
+                &own("status"),
+                "action_msgs::msg::dds_::GoalStatusArray_",
+                &latched(),
+            )?,
+            infos: network.publish(
+                "action_execution_info",
+                "plansys2_msgs::msg::dds_::ActionExecutionInfo_",
+                &reliable(100),
+            )?,
+            executing: network.publish(
+                "executing_plan",
+                "plansys2_msgs::msg::dds_::Plan_",
+                &latched(),
+            )?,
+            state,
+            change,
+        })
+    }
+}

@@ -1,0 +1,100 @@
+//! What a manager of nodes wants to hear of the planner and the executor.
+
+use crate::interface::Named;
+
+/// The states of a managed node. It serves from the beginning, in case nobody manages it; once it was managed, it
+/// serves while it is active.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lifecycle {
+    state: State,
+    is_managed: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Unconfigured,
+    Inactive,
+    Active,
+    Finalized,
+}
+
+/// From where, which number, by which name, to where.
+const TRANSITIONS: [(State, u8, &str, State); 7] = [
+    (State::Unconfigured, 1, "configure", State::Inactive),
+    (State::Inactive, 2, "cleanup", State::Unconfigured),
+    (State::Inactive, 3, "activate", State::Active),
+    (State::Active, 4, "deactivate", State::Inactive),
+    (State::Unconfigured, 5, "shutdown", State::Finalized),
+    (State::Inactive, 6, "shutdown", State::Finalized),
+    (State::Active, 7, "shutdown", State::Finalized),
+];
+
+impl Default for Lifecycle {
+    fn default() -> Self {
+        Self {
+            state: State::Unconfigured,
+            is_managed: false,
+        }
+    }
+}
+
+impl Lifecycle {
+    /// The state, as `lifecycle_msgs/msg/State` has it.
+    pub fn state(&self) -> Named {
+        let (id, label) = match self.state {
+            State::Unconfigured => (1, "unconfigured"),
+            State::Inactive => (2, "inactive"),
+            State::Active => (3, "active"),
+            State::Finalized => (4, "finalized"),
+        };
+        let label = label.to_owned();
+        Named { id, label }
+    }
+
+    /// Makes a transition of `lifecycle_msgs/msg/Transition`; `false` where there is none from this state.
+    pub fn change(&mut self, transition: &Named) -> bool {
+        let found = TRANSITIONS.iter().find(|(from, id, label, _)| {
+            *from == self.state
+                && (transition.id == *id || (transition.id == 0 && transition.label == *label))
+        });
+        let Some(&(_, _, _, next)) = found else {
+            return false;
+        };
+        self.state = next;
+        self.is_managed = true;
+        true
+    }
+
+    /// Whether it does what it is asked for.
+    pub fn serves(&self) -> bool {
+        !self.is_managed || self.state == State::Active
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn change(lifecycle: &mut Lifecycle, id: u8, label: &str) -> bool {
+        let label = label.to_owned();
+        lifecycle.change(&Named { id, label })
+    }
+
+    #[test]
+    fn who_is_managed_serves_while_active() {
+        let mut node = Lifecycle::default();
+        assert!(node.serves());
+        assert!(!change(&mut node, 3, ""), "not from unconfigured");
+        assert!(node.serves());
+        assert!(change(&mut node, 1, ""));
+        assert!(!node.serves());
+        assert!(change(&mut node, 0, "activate"));
+        assert_eq!(
+            (node.state().id, node.state().label.as_str()),
+            (3, "active")
+        );
+        assert!(node.serves());
+        assert!(change(&mut node, 7, "") && !node.serves());
+        assert!(!change(&mut node, 1, ""), "it is final");
+    }
+}

@@ -1,0 +1,195 @@
+//! How each action of a plan stands, as `PlanSys2`'s executor tells it.
+
+use std::collections::BTreeMap;
+
+use crate::interface::{ActionExecutionInfo, Plan, PlanItem, execution};
+use crate::message::Stamp;
+use crate::{Action, Ticket, Told};
+
+/// The actions of a plan, and what has become of them; actions of later plans come behind.
+#[derive(Clone, Debug, Default)]
+pub struct Progress {
+    infos: Vec<ActionExecutionInfo>,
+    /// Which entry a start is.
+    entries: BTreeMap<Ticket, usize>,
+}
+
+impl Progress {
+    /// Nothing has begun.
+    pub fn new(plan: &Plan) -> Self {
+        let infos = plan.items.iter().map(|item| {
+            let (name, arguments) = words(&item.action);
+            ActionExecutionInfo {
+                status: execution::NOT_EXECUTED,
+                action_full_name: format!("{}:{:.0}", item.action, f64::from(item.time) * 1000.0),
+                action: name,
+                arguments,
+                duration: stamp(item.duration),
+                ..ActionExecutionInfo::default()
+            }
+        });
+        Self {
+            infos: infos.collect(),
+            entries: BTreeMap::new(),
+        }
+    }
+
+    /// How each action stands.
+    pub fn infos(&self) -> &[ActionExecutionInfo] {
+        &self.infos
+    }
+
+    /// An action is asked for.
+    pub fn begin(&mut self, action: &Action) {
+        let is_its = |it: &ActionExecutionInfo| {
+            it.status == execution::NOT_EXECUTED
+                && it.action == action.name
+                && it.arguments == action.arguments
+        };
+        let open = |at: &usize| !self.entries.values().any(|it| it == at);
+        let found = (0..self.infos.len())
+            .filter(open)
+            .find(|&at| is_its(&self.infos[at]));
+        let entry = found.unwrap_or_else(|| {
+            let text = [std::slice::from_ref(&action.name), &action.arguments]
+                .concat()
+                .join(" ");
+            self.infos.push(ActionExecutionInfo {
+                status: execution::NOT_EXECUTED,
+                action_full_name: format!("({text}):"),
+                action: action.name.clone(),
+                arguments: action.arguments.clone(),
+                ..ActionExecutionInfo::default()
+            });
+            self.infos.len() - 1
+        });
+        self.entries.insert(action.ticket, entry);
+    }
+
+    /// Something has become of it.
+    pub fn tell(&mut self, ticket: Ticket, told: &Told, now: Stamp) {
+        let Some(&entry) = self.entries.get(&ticket) else {
+            return;
+        };
+        let info = &mut self.infos[entry];
+        info.status_stamp = now;
+        info.status = match told {
+            Told::Started => {
+                info.start_stamp = now;
+                execution::EXECUTING
+            }
+            Told::Feedback { completion, note } => {
+                info.completion = *completion;
+                info.message_status.clone_from(note);
+                execution::EXECUTING
+            }
+            Told::Succeeded => {
+                info.completion = 1.0;
+                execution::SUCCEEDED
+            }
+            Told::Failed(why) => {
+                info.message_status.clone_from(why);
+                execution::FAILED
+            }
+            Told::Cancelled => execution::CANCELLED,
+        };
+    }
+}
+
+/// A plan as `elbowroom` reads it: `0.000: (move r a b) [2.000]`, line by line. Times are 32-bit floats on the wire, and
+/// are written as the shortest decimals that mean the same.
+pub fn plan_text(plan: &Plan) -> String {
+    let line = |item: &PlanItem| {
+        let (name, arguments) = words(&item.action);
+        let action = [vec![name], arguments].concat().join(" ");
+        // What takes no time has no duration there.
+        let duration = (item.duration > 0.0).then(|| format!(" [{}]", item.duration));
+        format!(
+            "{}: ({action}){}\n",
+            item.time,
+            duration.unwrap_or_default()
+        )
+    };
+    plan.items.iter().map(line).collect()
+}
+
+fn words(text: &str) -> (String, Vec<String>) {
+    let inner = text.trim_matches(|it: char| it == '(' || it == ')' || it.is_whitespace());
+    let mut words = inner.split_whitespace().map(str::to_owned);
+    (words.next().unwrap_or_default(), words.collect())
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "`as` takes the nearest number that there is"
+)]
+fn stamp(seconds: f32) -> Stamp {
+    let seconds = f64::from(seconds.max(0.0));
+    Stamp {
+        sec: seconds.trunc() as i32,
+        nanosec: (seconds.fract() * 1e9) as u32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use execution::{EXECUTING, FAILED, NOT_EXECUTED, SUCCEEDED};
+
+    fn plan() -> Plan {
+        let item = |time, action: &str| PlanItem {
+            time,
+            action: action.into(),
+            duration: 2.5,
+        };
+        Plan {
+            items: vec![
+                item(0.0, "(move r a b)"),
+                item(2.501, "(move r b a)"),
+                item(5.002, "(move r a b)"),
+            ],
+        }
+    }
+
+    fn action(ticket: Ticket, text: &str) -> Action {
+        let (name, arguments) = words(text);
+        Action {
+            ticket,
+            name,
+            arguments,
+            is_instantaneous: false,
+        }
+    }
+
+    #[test]
+    fn each_start_is_the_first_open_entry_of_its_action_or_a_new_one() {
+        let mut progress = Progress::new(&plan());
+        assert_eq!(progress.infos()[1].action_full_name, "(move r b a):2501");
+        assert_eq!(
+            progress.infos()[0].duration,
+            Stamp {
+                sec: 2,
+                nanosec: 500_000_000
+            }
+        );
+        let now = Stamp { sec: 9, nanosec: 0 };
+        progress.begin(&action(1, "(move r a b)"));
+        progress.tell(1, &Told::Started, now);
+        progress.begin(&action(2, "(move r a b)"));
+        progress.tell(2, &Told::Failed("it slips".into()), now);
+        progress.begin(&action(3, "(jump r)"));
+        progress.tell(3, &Told::Succeeded, now);
+        progress.tell(99, &Told::Succeeded, now);
+        let statuses: Vec<_> = progress.infos().iter().map(|it| it.status).collect();
+        assert_eq!(statuses, [EXECUTING, NOT_EXECUTED, FAILED, SUCCEEDED]);
+        assert_eq!(progress.infos()[2].message_status, "it slips");
+        assert_eq!(progress.infos()[3].action_full_name, "(jump r):");
+    }
+
+    #[test]
+    fn a_plan_is_written_as_it_is_read() {
+        let lines = "0: (move r a b) [2.5]\n2.501: (move r b a) [2.5]\n5.002: (move r a b) [2.5]\n";
+        assert_eq!(plan_text(&plan()), lines);
+    }
+}

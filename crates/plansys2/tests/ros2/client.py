@@ -1,0 +1,96 @@
+"""A client of PlanSys2's planner and executor on real ROS 2, such as its terminal and its Python clients are.
+
+`client.py DOMAIN PROBLEM [CANCEL_AFTER]` has a plan made and executed, and prints what it was told as a document of JSON.
+"""
+
+import json
+import sys
+import time
+
+import rclpy
+from action_msgs.msg import GoalStatus
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from plansys2_msgs.action import ExecutePlan
+from plansys2_msgs.msg import ActionExecutionInfo, Plan
+from plansys2_msgs.srv import GetPlan
+from rclpy.action import ActionClient
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+STATUSES = {GoalStatus.STATUS_SUCCEEDED: "succeeded", GoalStatus.STATUS_CANCELED: "canceled",
+            GoalStatus.STATUS_ABORTED: "aborted"}  # fmt: skip
+
+
+class Client:
+    def __init__(self):
+        rclpy.init()
+        self.node = rclpy.create_node("client")
+        self.infos, self.plans = [], []
+        self.node.create_subscription(ActionExecutionInfo, "action_execution_info", self.infos.append, 100)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.node.create_subscription(Plan, "executing_plan", self.plans.append, latched)
+
+    def spin(self, future):
+        rclpy.spin_until_future_complete(self.node, future, timeout_sec=60)
+        assert future.done(), "no answer"
+        return future.result()
+
+    def call(self, kind, name, **request):
+        client = self.node.create_client(kind, name)
+        assert client.wait_for_service(timeout_sec=20), f"{name} is not there"
+        return self.spin(client.call_async(kind.Request(**request)))
+
+    def state(self, node):
+        return self.call(GetState, f"{node}/get_state").current_state.label
+
+    def change(self, node, transition):
+        return self.call(ChangeState, f"{node}/change_state", transition=Transition(id=transition)).success
+
+    def execute(self, plan, cancel_after=None):
+        """What became of it, and how often there was feedback."""
+        client = ActionClient(self.node, ExecutePlan, "execute_plan")
+        assert client.wait_for_server(timeout_sec=20), "execute_plan is not there"
+        feedback = []
+        goal = self.spin(client.send_goal_async(
+            ExecutePlan.Goal(plan=plan), lambda it: feedback.append(it.feedback.action_execution_status)
+        ))  # fmt: skip
+        if not goal.accepted:
+            return {"outcome": "rejected"}
+        result = goal.get_result_async()
+        if cancel_after is not None:
+            until = time.monotonic() + cancel_after
+            while time.monotonic() < until:
+                rclpy.spin_once(self.node, timeout_sec=0.1)
+            assert len(self.spin(goal.cancel_goal_async()).goals_canceling) == 1
+        answer = self.spin(result)
+        infos = answer.result.action_execution_status
+        return {
+            "outcome": STATUSES[answer.status],
+            "success": answer.result.success,
+            "feedback": len(feedback),
+            "was_executing": any(it.status == it.EXECUTING for told in feedback for it in told),
+            "actions": {it.action_full_name: [it.status, it.message_status] for it in infos},
+        }
+
+
+def main():
+    client = Client()
+    domain, problem = (open(it, encoding="utf-8").read() for it in sys.argv[1:3])
+    said = {"before": [client.state("planner"), client.state("executor"), client.execute(Plan())["outcome"]]}
+    said["made ready"] = [
+        client.change(node, it)
+        for node in ("planner", "executor")
+        for it in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE)
+    ]
+    said["then"] = [client.state("planner"), client.state("executor")]
+    broken = client.call(GetPlan, "planner/get_plan", domain="(define (domain", problem=problem)
+    said["broken"] = [broken.success, broken.error_info]
+    answer = client.call(GetPlan, "planner/get_plan", domain=domain, problem=problem)
+    said["planned"] = [answer.success, [it.action for it in answer.plan.items]]
+    said["executed"] = client.execute(answer.plan, float(sys.argv[3]) if len(sys.argv) > 3 else None)
+    said["followed"] = [client.plans == [answer.plan], sorted({it.action_full_name for it in client.infos})]
+    print(json.dumps(said), flush=True)
+
+
+if __name__ == "__main__":
+    main()
