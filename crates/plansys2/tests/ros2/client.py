@@ -89,6 +89,8 @@ def main():
     said["planned"] = [answer.success, [it.action for it in answer.plan.items]]
     said["executed"] = client.execute(answer.plan, float(sys.argv[3]) if len(sys.argv) > 3 else None)
     said["followed"] = [client.plans == [answer.plan], sorted({it.action_full_name for it in client.infos})]
+    there = client.node.get_publishers_info_by_topic("ros_discovery_info", no_mangle=True)
+    said["nodes"] = [len(there), client.node.get_node_names()]
     print(json.dumps(said), flush=True)
 
 

@@ -67,12 +67,14 @@ class Stage:
         return self
 
     def wait_for(self, holds):
-        until = time.monotonic() + 20
+        until = time.monotonic() + 30
         while not holds():
             assert time.monotonic() < until, "waited in vain"
             time.sleep(0.05)
 
     def log(self):
+        if not os.path.exists(self.log_file):
+            return []
         with open(self.log_file, encoding="utf-8") as file:
             return [json.loads(line) for line in file]
 
@@ -207,6 +209,9 @@ def a_plan_is_asked_for_and_executed(stage):
     assert set(executed["actions"]) == {"(move r1 shed gate):0", "(move r2 barn gate):0", "(signal r1 gate):2000"}
     assert all(status == 4 for status, _ in executed["actions"].values())
     assert said["followed"] == [True, sorted(executed["actions"])], "tools can follow"
+    # The performers' process and the client: the program does not say what nodes of another distribution cannot bear.
+    publishers, nodes = said["nodes"]
+    assert publishers == 2 and set(nodes) == {"client", *DRIVERS}
     assert [it["event"] for it in stage.log()].count("ends") == 3
 
 
@@ -215,6 +220,31 @@ def an_executed_plan_is_cancelled(stage):
     executed = serve(stage, crew, "2")["executed"]
     assert executed["outcome"] == "canceled" and not executed["success"]
     assert sorted(status for status, _ in executed["actions"].values()) == [1, 5, 5]
+    assert [it["event"] for it in stage.log()].count("told to cancel") == 2
+
+
+def a_run_dies_while_a_plan_is_executed(stage):
+    """What it has left running is told to stop, and the client hears of it."""
+    crew = {name: dict(spec, lasts=30) for name, spec in DRIVERS.items()}
+
+    def kill():
+        stage.wait_for(lambda: len([it for it in stage.log() if it["event"] == "begins"]) == 2)
+        for process in os.listdir("/proc"):
+            try:
+                with open(f"/proc/{process}/cmdline", "rb") as file:
+                    words = file.read().split(b"\0")
+                with open(f"/proc/{process}/environ", "rb") as file:
+                    is_ours = f"ROS_DOMAIN_ID={stage.environment['ROS_DOMAIN_ID']}".encode() in file.read().split(b"\0")
+            except OSError:
+                continue
+            if words[:2] == [ELBOWROOM.encode(), b"run"] and is_ours:
+                os.kill(int(process), signal.SIGKILL)
+
+    with ThreadPoolExecutor(1) as pool:
+        killed = pool.submit(kill)
+        executed = serve(stage, crew)["executed"]
+        killed.result()
+    assert executed["outcome"] == "aborted" and not executed["success"]
     assert [it["event"] for it in stage.log()].count("told to cancel") == 2
 
 
@@ -230,6 +260,7 @@ PROGRAM_ONLY = [
     a_plan_is_asked_for_and_executed,
     an_executed_plan_is_cancelled,
     an_executed_plan_fails_with_its_reason,
+    a_run_dies_while_a_plan_is_executed,
 ]
 BOTH = [
     two_robots_at_a_time,

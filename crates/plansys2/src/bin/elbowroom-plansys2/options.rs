@@ -191,3 +191,75 @@ fn namespace(text: &str) -> Result<String, String> {
         ))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(words: &[&str]) -> Result<Settings, String> {
+        Options::try_parse_from([&["elbowroom-plansys2"], words].concat())
+            .expect("options")
+            .settings()
+    }
+
+    #[test]
+    fn names_of_actions_are_separated_by_commas_and_read_without_case() {
+        let settings = settings(&["--needs", "Move,pick", "--within", "2.5"]).expect("settings");
+        assert_eq!(settings.needs, ["move", "pick"]);
+        assert_eq!(settings.within, Duration::from_millis(2500));
+    }
+
+    #[test]
+    fn namespaces_have_slashes_around() {
+        for (given, expected) in [("/", "/"), ("robot1", "/robot1/"), ("/a/b_2/", "/a/b_2/")] {
+            assert_eq!(namespace(given).as_deref(), Ok(expected));
+        }
+        for given in ["/2/", "a//b", "a b", "ä"] {
+            assert!(namespace(given).is_err(), "{given}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_refused() {
+        for words in [
+            ["--within", "-1"],
+            ["--within", "NaN"],
+            ["--speed", "0"],
+            ["--speed", "inf"],
+            ["--domain-id", "233"],
+        ] {
+            let line = format!("{}={}", words[0], words[1]);
+            assert!(settings(&[&line]).is_err(), "{line}");
+        }
+    }
+
+    #[test]
+    fn the_network_can_be_given_behind_serve() {
+        let words = [
+            "elbowroom-plansys2",
+            "serve",
+            "--domain-id",
+            "7",
+            "--namespace",
+            "robot1",
+            "--elbowroom",
+            "./here",
+        ];
+        let mut options = Options::try_parse_from(words).expect("options");
+        let Some(Mode::Serve(serving)) = options.command.take() else {
+            panic!("serve");
+        };
+        let serving = serving.checked().expect("settings");
+        assert!(serving.elbowroom.starts_with('/') && serving.elbowroom.ends_with("/here"));
+        let settings = options.settings().expect("settings");
+        assert_eq!(
+            (settings.domain_id, settings.namespace.as_str()),
+            (7, "/robot1/")
+        );
+        let both = ["elbowroom-plansys2", "--needs", "move", "serve"];
+        assert!(
+            Options::try_parse_from(both).is_err(),
+            "it waits for nobody"
+        );
+    }
+}
