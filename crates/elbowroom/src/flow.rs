@@ -134,7 +134,7 @@ pub fn repaired(task: &Task, time_triggered: &TimeTriggeredPlan) -> Option<TimeT
 pub fn open(task: &Task, freed: Freed, specs: &[VarySpec]) -> Result<ParametrizedPlan, FlowError> {
     let Deordered { plan, nominal, .. } = freed.deordered;
     let plan = parametrize(task, plan, &nominal, specs)?;
-    Ok(room::sound(task, &plan, &nominal))
+    Ok(room::of_deordered(task, plan, &nominal))
 }
 
 /// The plan with nothing left open. Where needed, differences of times are kept near the plan's own
@@ -142,7 +142,7 @@ pub fn open(task: &Task, freed: Freed, specs: &[VarySpec]) -> Result<Parametrize
 pub fn closed(task: &Task, freed: Freed) -> ParametrizedPlan {
     let Deordered { plan, nominal, .. } = freed.deordered;
     let plan = ParametrizedPlan::closed(task, plan);
-    room::sound(task, &plan, &nominal)
+    room::of_deordered(task, plan, &nominal)
 }
 
 /// An STN plan, which may have parameters already, with more left open.

@@ -7,6 +7,8 @@
 //! the durations that are left open, as long as every schedule works. So neither the pins nor the
 //! durations take all the room that there is.
 
+mod facts_alone;
+
 use elbowroom_envelope::linear::Factor;
 use elbowroom_envelope::obligations::Requirement;
 use elbowroom_envelope::soundness::{Broken, SoundBox, broken_in};
@@ -17,6 +19,18 @@ use elbowroom_plan::{
     Bound, BoxEnd, Constraint, DecoupledEnvelope, InstanceId, Node, NodeId, Parameter, ParameterId,
     ParameterKind, ParametrizedPlan, Reason, Schedule, Side, StnPlan,
 };
+
+/// [`sound`] of a plan that was deordered: where it is about facts alone, it is sound as it is.
+pub(crate) fn of_deordered(
+    task: &Task,
+    plan: ParametrizedPlan,
+    nominal: &Schedule,
+) -> ParametrizedPlan {
+    if facts_alone::are_enough(task, &plan) {
+        return plan;
+    }
+    sound(task, &plan, nominal)
+}
 
 /// The plan with as few differences fixed, and as loosely, as it takes for every nominal schedule
 /// to work. If even fixing all of them does not help, the plan as it is: the box check will say

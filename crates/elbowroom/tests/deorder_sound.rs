@@ -1,5 +1,5 @@
-//! Every schedule of a deordered plan is a valid plan: the judge says so of schedules drawn at
-//! random.
+//! Every schedule of a deordered plan is a valid plan: the soundness check says so, also of plans
+//! about facts alone, which are made ready without it; and the judge, of schedules drawn at random.
 
 #![allow(
     clippy::print_stdout,

@@ -153,6 +153,22 @@ pub struct StnPlan {
     pub constraints: Vec<Constraint>,
 }
 
+/// Where a node stands among the others in [`StnPlan::unconstrained`].
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Place {
+    Zero,
+    Instance(InstanceId),
+    Timed(usize),
+}
+
+fn place_of(node: Node) -> Place {
+    match node {
+        Node::Zero => Place::Zero,
+        Node::Start(id) | Node::End(id) | Node::Instant(id) => Place::Instance(id),
+        Node::Timed(index) => Place::Timed(index),
+    }
+}
+
 impl StnPlan {
     /// The plan of these instances without any constraint but those that fix the timed initials.
     ///
@@ -200,12 +216,14 @@ impl StnPlan {
 
     /// The node at which the instance starts, or happens.
     pub fn start(&self, id: InstanceId) -> NodeId {
-        self.node_where(|node| matches!(node, Node::Start(i) | Node::Instant(i) if i == id))
+        let is_it = |node| matches!(node, Node::Start(i) | Node::Instant(i) if i == id);
+        self.node_where(Place::Instance(id), is_it)
     }
 
     /// The node at which the instance ends, or happens.
     pub fn end(&self, id: InstanceId) -> NodeId {
-        self.node_where(|node| matches!(node, Node::End(i) | Node::Instant(i) if i == id))
+        let is_it = |node| matches!(node, Node::End(i) | Node::Instant(i) if i == id);
+        self.node_where(Place::Instance(id), is_it)
     }
 
     /// The instance whose duration a constraint bounds; `None` if it bounds something else.
@@ -219,11 +237,16 @@ impl StnPlan {
 
     /// The node of a group of timed initials.
     pub fn timed(&self, index: usize) -> NodeId {
-        self.node_where(|node| node == Node::Timed(index))
+        self.node_where(Place::Timed(index), |node| node == Node::Timed(index))
     }
 
-    fn node_where(&self, is_it: impl Fn(Node) -> bool) -> NodeId {
-        let index = self.nodes.iter().position(|&node| is_it(node));
+    /// Nodes mostly stand in the order of [`unconstrained`](Self::unconstrained), in which theirs is
+    /// found by halves; the field is open to others, in which all are looked at.
+    fn node_where(&self, place: Place, is_it: impl Fn(Node) -> bool) -> NodeId {
+        let first = self.nodes.partition_point(|&node| place_of(node) < place);
+        let mut near = (first..self.nodes.len()).take(2);
+        let near = near.find(|&index| is_it(self.nodes[index]));
+        let index = near.or_else(|| self.nodes.iter().position(|&node| is_it(node)));
         NodeId::from(index.expect("every instance and timed initial has its nodes"))
     }
 

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-use crate::{ConsistentNetwork, ConstraintId, NodeId, Weight};
+use crate::{ConsistentNetwork, ConstraintId, NodeId, Schedule, Weight};
 
 impl<W: Weight> ConsistentNetwork<W> {
     /// Constraints that can be left out all together without a new schedule becoming possible,
@@ -13,17 +13,31 @@ impl<W: Weight> ConsistentNetwork<W> {
     ///
     /// Where several constraints imply each other, the oldest stay in.
     ///
-    /// Lengths are slacks in the network's schedule, hence never negative. The nodes on a cycle
+    /// Lengths are slacks in a schedule, hence never negative. The nodes on a cycle
     /// of length zero form a *rigid* group and are contracted (Tsamardinos, Muscettola & Morris,
     /// AAAI 1998): between groups no cycle has length zero, so it is no matter of order which
     /// constraints have a detour, and one run of Dijkstra's algorithm per group finds them.
     pub fn implied(&self, keep: impl Fn(ConstraintId) -> bool) -> Vec<ConstraintId> {
+        self.implied_seen_from(self.schedule(), keep)
+    }
+
+    /// The same, by slacks in this schedule of the network.
+    ///
+    /// Any schedule leads to the same constraints, but not in the same time: a search goes as far as
+    /// the slack of what it is about. Where little happens at once in the schedule, that is near.
+    pub fn implied_seen_from(
+        &self,
+        schedule: &Schedule<W>,
+        keep: impl Fn(ConstraintId) -> bool,
+    ) -> Vec<ConstraintId> {
         let network = self.network();
+        debug_assert!(schedule.holds_in(network));
         let constraints = network.constraints().iter();
-        let slack: Vec<W> = constraints.map(|c| c.slack_in(self.schedule())).collect();
+        let slack: Vec<W> = constraints.map(|c| c.slack_in(schedule)).collect();
         let rigid = self.rigid_groups(&slack);
         let mut search = Search {
             network: self,
+            schedule,
             slack,
             can_go: network.constraint_ids().map(|id| !keep(id)).collect(),
             is_gone: vec![false; network.constraints().len()],
@@ -74,6 +88,7 @@ struct Rigid {
 
 struct Search<'a, W> {
     network: &'a ConsistentNetwork<W>,
+    schedule: &'a Schedule<W>,
     slack: Vec<W>,
     /// Whether the caller allows to leave a constraint out.
     can_go: Vec<bool>,
@@ -153,7 +168,7 @@ impl<W: Weight> Search<'_, W> {
         // Most edges lead back in time. Early sources first: then what a later source looks
         // through has been thinned out already.
         sources.sort_by(|&a, &b| {
-            let time = |group: usize| &self.network.schedule()[self.rigid.groups[group][0]];
+            let time = |group: usize| &self.schedule[self.rigid.groups[group][0]];
             time(a).cmp(time(b)).then(a.cmp(&b))
         });
         let mut reach = Reach::new(group_count);

@@ -218,6 +218,12 @@ fn thins_out_to_the_least<W: Weight>(
     let consistent = ConsistentNetwork::try_from(network.clone()).expect("consistent");
     let implied = consistent.implied(&keep);
     prop_assert!(implied.is_sorted());
+    // Whatever schedule it is looked at from.
+    for root in network.nodes() {
+        for schedule in [consistent.earliest_schedule(root), consistent.latest_schedule(root)] {
+            prop_assert_eq!(&implied, &consistent.implied_seen_from(&schedule, &keep));
+        }
+    }
     prop_assert!(!implied.iter().any(|&id| keep(id)));
     let rest = network.without(&implied);
     let distances = oracle::all_distances(network);

@@ -7,6 +7,7 @@ use elbowroom_stn::{ConsistentNetwork, ConstraintId, Network};
 
 use crate::network::network_node;
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
+use crate::valuation::Valuation;
 
 /// The plan without the bounds that its other constraints imply whatever its durations and
 /// timed initials are.
@@ -47,10 +48,14 @@ pub fn without_implied(mut plan: StnPlan) -> StnPlan {
     let Ok(network) = ConsistentNetwork::try_from(network) else {
         return plan;
     };
-    let implied: BTreeSet<ConstraintId> = network
-        .implied(|id| kept.contains(&id))
-        .into_iter()
-        .collect();
+    let keep = |id: ConstraintId| kept.contains(&id);
+    let implied = match spread_out(&plan) {
+        Some(schedule) if schedule.holds_in(network.network()) => {
+            network.implied_seen_from(&schedule, keep)
+        }
+        _ => network.implied(keep),
+    };
+    let implied: BTreeSet<ConstraintId> = implied.into_iter().collect();
     for (constraint, [lower, upper]) in plan.constraints.iter_mut().zip(bounds) {
         if lower.is_some_and(|id| implied.contains(&id)) {
             constraint.lower = Bound::Infinite;
@@ -64,6 +69,21 @@ pub fn without_implied(mut plan: StnPlan) -> StnPlan {
             || matches!(constraint.reason, Reason::Duration(_))
     });
     plan
+}
+
+/// The plan's earliest schedule, in which its actions take their time; `None` if it has none.
+///
+/// From there, what a constraint of a long plan may follow from is near it. In a schedule in which
+/// nothing takes time, all of the plan is, and each constraint would be looked for in all of it.
+fn spread_out(plan: &StnPlan) -> Option<elbowroom_stn::Schedule> {
+    let bounds = |own: &Constraint| [own.lower.parameter(), own.upper.parameter()];
+    let mut open = plan.constraints.iter().flat_map(bounds);
+    if open.any(|parameter| parameter.is_some()) {
+        return None;
+    }
+    let network = plan.network(&Valuation::default());
+    let network = ConsistentNetwork::try_from(network).ok()?;
+    Some(network.earliest_schedule(network_node(NodeId::ZERO)))
 }
 
 /// The plan with those of the sides that its other constraints do not imply.

@@ -1,0 +1,262 @@
+"""An executive under way for a long time: 20 simulated robots, goals that come and go.
+
+    python3 testing/soak.py target/release/elbowroom [--seconds 3600] [--seed 1] [--robots 20]
+
+starts `elbowroom serve` on a wall clock that is ten times as fast, with durations that deviate, actions that fail
+and jobs that come undone. Goals are given, some of them are cancelled, and there are pauses. Each minute it prints
+what the executive holds in memory, how long requests took, and how late actions were started. Each step is judged:
+a goal that is said to be reached is looked up in the facts. In the end the trace is judged: it is played back,
+which must lead to the same decisions, no robot has two jobs at once, and nothing is started twice. Exit code 0:
+all of it was right. Standard library only; memory is read from /proc.
+"""
+
+import argparse
+import http.client
+import json
+import pathlib
+import random
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+PACE = 10
+TOKEN = "a-token-of-some-length"
+DOMAIN = """(define (domain jobs)
+  (:requirements :typing :durative-actions)
+  (:types robot job)
+  (:predicates (idle ?r - robot) (done ?j - job))
+  (:durative-action work
+    :parameters (?r - robot ?j - job)
+    :duration (= ?duration 20)
+    :condition (at start (idle ?r))
+    :effect (and (at start (not (idle ?r))) (at end (idle ?r)) (at end (done ?j)))))
+"""
+WORLD = """format = "elbowroom-world"
+version = 1
+[[duration]]
+action = "work"
+normal = { mean = 20, deviation = 4, minimum = 8 }
+[[failure]]
+action = "work"
+probability = 0.02
+when = "end"
+undone = true
+[[hazard]]
+fact = "(done _)"
+becomes_false_per_second = 0.005
+"""
+
+
+def problem(robots, jobs):
+    """All robots idle, no job done, and nothing to do: `start` is a job that is done from the beginning."""
+    robots = [f"r{i}" for i in range(robots)]
+    jobs = [f"j{i}" for i in range(jobs)]
+    initial = [f"(idle {r})" for r in robots] + ["(done start)"]
+    objects = f"{' '.join(robots)} - robot {' '.join(jobs)} start - job"
+    return (
+        f"(define (problem soak) (:domain jobs) (:objects {objects})"
+        f" (:init {' '.join(initial)}) (:goal (done start)))"
+    )
+
+
+class Executive:
+    """The program, and what is asked of it."""
+
+    def __init__(self, program, folder, robots, jobs):
+        texts = {"domain.pddl": DOMAIN, "problem.pddl": problem(robots, jobs), "world.toml": WORLD}
+        texts["token"] = TOKEN
+        for name, text in texts.items():
+            (folder / name).write_text(text)
+        file = {name: str(folder / name) for name in [*texts, "trace.jsonl"]}
+        line = [program, "serve", file["domain.pddl"], file["problem.pddl"], "--world", file["world.toml"]]
+        line += ["--realtime", str(PACE), "--http", "0", "--token", file["token"]]
+        line += ["--trace", file["trace.jsonl"], "--max-replans", "1000000"]
+        self.trace = file["trace.jsonl"]
+        self.process = subprocess.Popen(
+            line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
+        said = ""
+        for said in self.process.stderr:
+            if "127.0.0.1:" in said:
+                break
+        self.port = int(said.split("127.0.0.1:")[1].split("/")[0])
+        # What else it says must not fill the pipe.
+        threading.Thread(target=self.process.stderr.read, daemon=True).start()
+        self.latencies = []
+
+    def ask(self, verb, path, body=None):
+        """Status and answer; how long it took is noted."""
+        begin = time.monotonic()
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        headers = {"Authorization": f"Bearer {TOKEN}"}
+        connection.request(verb, path, json.dumps(body) if body is not None else "", headers)
+        response = connection.getresponse()
+        answer = json.loads(response.read())
+        connection.close()
+        self.latencies.append(time.monotonic() - begin)
+        return response.status, answer
+
+    def memory(self):
+        """What it holds, in megabytes."""
+        text = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
+        (line,) = [line for line in text.splitlines() if line.startswith("VmRSS")]
+        return int(line.split()[1]) / 1024
+
+
+def milliseconds(times):
+    """Median, 99th percentile and worst."""
+    times = sorted(times) or [0.0]
+    at = [times[(len(times) - 1) * share // 100] * 1000 for share in (50, 99, 100)]
+    return " / ".join(f"{time:.1f}" for time in at)
+
+
+def decimal(number):
+    return number["decimal"] if isinstance(number, dict) else number
+
+
+class Trace:
+    """The lines of the trace so far, and what is wrong with them."""
+
+    def __init__(self, path):
+        self.file = open(path, encoding="utf-8")
+        self.part = ""
+        self.started = {}
+        self.busy = {}
+        self.reached = 0
+        self.starts = 0
+        self.late = []
+        self.wrong = []
+
+    def read_on(self):
+        self.part += self.file.read()
+        *lines, self.part = self.part.split("\n")
+        for line in lines:
+            self.take(json.loads(line))
+
+    def take(self, line):
+        if line["event"] == "command" and line["command"].get("type") == "start":
+            command = line["command"]
+            ticket, robot = command["ticket"], command["action"].strip("()").split()[1]
+            if ticket in self.started:
+                self.wrong.append(f"ticket {ticket} was started twice")
+            if robot in self.busy.values():
+                self.wrong.append(f"{robot} has two jobs at {line['now']}")
+            self.started[ticket] = robot
+            self.busy[ticket] = robot
+            self.starts += 1
+            earliest = (line.get("planned") or {}).get("earliest")
+            if earliest:
+                self.late.append((decimal(line["now"]) - decimal(earliest)) / PACE)
+        elif line["event"] == "observed":
+            what = line.get("observation", line)
+            if what.get("type") == "ended":
+                self.busy.pop(what["ticket"], None)
+
+
+def facts_of(state):
+    return set(state["facts"])
+
+
+def step(own, dice, jobs, tally):
+    """Something is asked of the executive, at random; what it says is judged."""
+    status, state = own.ask("GET", "/v1/state")
+    if status != 200:
+        tally["wrong"].append(f"state: {status}")
+    facts = facts_of(state)
+    goals = {goal["name"]: goal for goal in state["goals"]}
+    for name, wanted in list(tally["open"].items()):
+        if name in goals:
+            tally["taken"].add(name)
+        elif name in tally["taken"] or state["activity"] == "resting":
+            # It is closed, as it was reached: one that we cancelled is not in our list any more.
+            del tally["open"][name]
+            tally["reached"] += 1
+            if wanted not in facts:
+                tally["wrong"].append(f"{name} is said to be reached, but not {wanted}")
+    # Goals are closed when all of them are reached: so they come by the dozen, and then it has time.
+    if not tally["open"]:
+        tally["burst"] = dice.randrange(8, 24)
+    busy = {*tally["open"].values(), *facts}
+    free = [j for j in range(jobs) if f"(done j{j})" not in busy]
+    what = dice.random()
+    if what < 0.75:
+        if tally["burst"] == 0 or not free:
+            return
+        tally["burst"] -= 1
+        job = dice.choice(free)
+        tally["given"] += 1
+        name = f"g{tally['given']}"
+        status, answer = own.ask("POST", "/v1/goals", {"goal": f"(done j{job})", "name": name})
+        if status in (200, 202):
+            tally["open"][name] = f"(done j{job})"
+        else:
+            tally["wrong"].append(f"goal {name}: {status} {answer}")
+    elif what < 0.78 and tally["open"]:
+        name = dice.choice(sorted(tally["open"]))
+        del tally["open"][name]
+        status, answer = own.ask("DELETE", f"/v1/goals/{name}")
+        tally["cancelled"] += 1
+        # It may have been reached just now.
+        if status not in (200, 202, 404):
+            tally["wrong"].append(f"cancel {name}: {status} {answer}")
+    elif what < 0.80:
+        own.ask("POST", "/v1/pause")
+        time.sleep(0.2)
+        own.ask("POST", "/v1/resume")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("program")
+    parser.add_argument("--seconds", type=float, default=3600)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--robots", type=int, default=20)
+    chosen = parser.parse_args()
+    jobs = 2 * chosen.robots
+    dice = random.Random(chosen.seed)
+    tally = {"open": {}, "given": 0, "reached": 0, "cancelled": 0, "burst": 0, "taken": set(), "wrong": []}
+    with tempfile.TemporaryDirectory() as folder:
+        own = Executive(chosen.program, pathlib.Path(folder), chosen.robots, jobs)
+        trace = Trace(own.trace)
+        print("| minutes | memory | starts | goals reached | requests, ms | starts late, ms |", flush=True)
+        print("|---:|---:|---:|---:|---:|---:|", flush=True)
+        begin = time.monotonic()
+        shown = 0
+        while time.monotonic() - begin < chosen.seconds:
+            step(own, dice, jobs, tally)
+            time.sleep(dice.uniform(0.02, 0.15))
+            if time.monotonic() - begin >= (shown + 1) * 60:
+                shown += 1
+                trace.read_on()
+                print(
+                    f"| {shown} | {own.memory():.1f} MB | {trace.starts} | {tally['reached']} |"
+                    f" {milliseconds(own.latencies)} | {milliseconds(trace.late)} |",
+                    flush=True,
+                )
+                own.latencies.clear()
+                trace.late.clear()
+        own.ask("POST", "/v1/stop")
+        code = own.process.wait(timeout=120)
+        trace.read_on()
+        wrong = tally["wrong"] + trace.wrong
+        if code != 0:
+            wrong.append(f"the executive ended with exit code {code}")
+        if trace.starts == 0 or tally["reached"] == 0:
+            wrong.append("nothing was done")
+        replay = subprocess.run([chosen.program, "run", "--replay", own.trace], capture_output=True)
+        if replay.returncode != 0:
+            wrong.append(f"the trace is not played back: {replay.stdout[-500:]}")
+        size = pathlib.Path(own.trace).stat().st_size / 1e6
+        print(
+            f"{trace.starts} starts, {tally['given']} goals given, {tally['reached']} reached,"
+            f" {tally['cancelled']} cancelled; trace of {size:.1f} MB, played back; {len(wrong)} wrong"
+        )
+        for what in wrong[:20]:
+            print(what)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
