@@ -21,22 +21,9 @@ import sys
 import tempfile
 import time
 
-ROBOTS, PLACES, DOCKS = 100, 10, 20
-DOMAIN = """(define (domain rounds)
-  (:requirements :typing :durative-actions)
-  (:types robot place dock)
-  (:predicates (at ?r - robot ?p - place) (road ?a ?b - place) (free ?d - dock) (served ?r - robot))
-  (:durative-action drive
-    :parameters (?r - robot ?a ?b - place)
-    :duration (= ?duration 5)
-    :condition (and (at start (at ?r ?a)) (over all (road ?a ?b)))
-    :effect (and (at start (not (at ?r ?a))) (at end (at ?r ?b))))
-  (:durative-action serve
-    :parameters (?r - robot ?a - place ?d - dock)
-    :duration (= ?duration 2)
-    :condition (and (over all (at ?r ?a)) (at start (free ?d)))
-    :effect (and (at start (not (free ?d))) (at end (free ?d)) (at end (served ?r)))))
-"""
+import rounds
+
+ROBOTS, DOCKS = 100, 20
 
 
 def world(pace, log):
@@ -71,39 +58,6 @@ def world(pace, log):
         elif message["type"] == "stop":
             break
     pathlib.Path(log).write_text(json.dumps(arrivals))
-
-
-def problem():
-    """Robots at places that lie on a ring."""
-    robots = [f"r{i}" for i in range(ROBOTS)]
-    objects = f"{' '.join(robots)} - robot {' '.join(f'p{i}' for i in range(PLACES))} - place"
-    objects += f" {' '.join(f'd{i}' for i in range(DOCKS))} - dock"
-    facts = [f"(at r{i} p{i % PLACES})" for i in range(ROBOTS)]
-    facts += [f"(road p{i} p{(i + 1) % PLACES})" for i in range(PLACES)]
-    facts += [f"(free d{i})" for i in range(DOCKS)]
-    goal = " ".join(f"(served {robot})" for robot in robots)
-    return (
-        f"(define (problem all) (:domain rounds) (:objects {objects})"
-        f" (:init {' '.join(facts)}) (:goal (and {goal})))"
-    )
-
-
-def plan(actions):
-    """So many actions, each as early as it can be; times are whole milliseconds."""
-    free_at, place, docks = [0] * ROBOTS, [i % PLACES for i in range(ROBOTS)], [0] * DOCKS
-    steps = []
-    for number in range(actions):
-        robot, turn = number % ROBOTS, number // ROBOTS + 1
-        if turn % 10 == 0 or number >= actions - ROBOTS:
-            dock = (robot + turn // 10) % DOCKS
-            start = max(free_at[robot], docks[dock]) + 1
-            steps.append((start, f"(serve r{robot} p{place[robot]} d{dock})", 2))
-            free_at[robot] = docks[dock] = start + 2000
-        else:
-            start, after = free_at[robot] + 1, (place[robot] + 1) % PLACES
-            steps.append((start, f"(drive r{robot} p{place[robot]} p{after})", 5))
-            free_at[robot], place[robot] = start + 5000, after
-    return "".join(f"{start / 1000:.3f}: {action} [{length}.0]\n" for start, action, length in sorted(steps))
 
 
 def calculate():
@@ -143,7 +97,8 @@ def main():
     print("|---|---:|---:|---:|---:|---:|", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        texts = {"d.pddl": DOMAIN, "p.pddl": problem(), "plan": plan(chosen.actions)}
+        texts = {"d.pddl": rounds.DOMAIN, "p.pddl": rounds.problem(ROBOTS, DOCKS)}
+        texts["plan"] = rounds.plan(ROBOTS, DOCKS, chosen.actions)
         for name, text in texts.items():
             (folder / name).write_text(text)
         for executor in chosen.executors:

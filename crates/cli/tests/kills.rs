@@ -1,7 +1,7 @@
-//! Runs that are killed at any moment, executive and world, and go on with `--resume`.
+//! Runs that are killed at any moment, executive, world and planner, and go on with `--resume`.
 //!
 //! `ELBOWROOM_KILLS=1000 cargo test --workspace --test kills -- --nocapture` makes a thousand of
-//! them.
+//! them. The number of a run is the seed of the moments at which it is killed.
 
 #![allow(
     clippy::print_stdout,
@@ -9,6 +9,8 @@
 )]
 
 mod command;
+#[path = "kills/disks.rs"]
+mod disks;
 #[path = "../../../testing/skipped.rs"]
 mod skipped;
 
@@ -47,24 +49,26 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// The command that begins a run in this folder.
-fn beginning(folder: &Path, journal: &str) -> Vec<String> {
+/// The command that begins a run in this folder; with a planner of its own, it has no plan yet.
+fn beginning(folder: &Path, journal: &str, has_planner: bool) -> Vec<String> {
     let world = format!(
         "python3 crates/cli/tests/files/robot.py {}",
         folder.display()
     );
-    let line = [
-        "run",
-        ERRANDS[0],
-        ERRANDS[1],
-        ERRANDS[2],
-        "--world-process",
-        &world,
-    ];
-    let line = line
-        .into_iter()
-        .chain(["--max-replans", "100", "--journal", journal]);
-    line.map(str::to_owned).collect()
+    let planner = format!(
+        "sh crates/cli/tests/files/slow_planner.sh {} {} {{domain}} {{problem}}",
+        folder.display(),
+        env!("CARGO_BIN_EXE_elbowroom")
+    );
+    let mut line = vec!["run", ERRANDS[0], ERRANDS[1]];
+    if has_planner {
+        line.extend(["--planner", &planner]);
+    } else {
+        line.push(ERRANDS[2]);
+    }
+    line.extend(["--world-process", &world, "--max-replans", "100"]);
+    line.extend(["--journal", journal]);
+    line.into_iter().map(str::to_owned).collect()
 }
 
 fn started(line: &[String]) -> Child {
@@ -103,11 +107,72 @@ fn awaited(mut child: Child, what: &str) -> Output {
     panic!("{what}: the run is stuck");
 }
 
-fn kill_the_world(folder: &Path) {
-    let Ok(pid) = fs::read_to_string(folder.join("pid")) else {
-        return;
+/// Kills the process whose number is in this file, if it is still one that was told this folder.
+/// Returns whether it was.
+fn kill_by(folder: &Path, file: &str) -> bool {
+    let Ok(pid) = fs::read_to_string(folder.join(file)) else {
+        return false;
     };
-    let _ = Command::new("kill").args(["-9", pid.trim()]).output();
+    let pid = pid.trim();
+    let words = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+    let words = String::from_utf8_lossy(&words).into_owned();
+    let is_there = words.contains(&folder.display().to_string());
+    is_there && {
+        let killed = Command::new("kill").args(["-9", pid]).output();
+        killed.is_ok_and(|it| it.status.success())
+    }
+}
+
+/// Who is killed.
+#[derive(Clone, Copy, PartialEq)]
+enum Victim {
+    Executive,
+    ExecutiveAndWorld,
+    /// The executive says so, and ends.
+    World,
+    /// As soon as it runs, for at most two seconds.
+    Planner,
+}
+
+impl Victim {
+    fn drawn(dice: &mut Dice, has_planner: bool) -> Self {
+        if has_planner && dice.below(3) == 0 {
+            return Self::Planner;
+        }
+        match dice.below(4) {
+            0 => Self::World,
+            1 => Self::ExecutiveAndWorld,
+            _ => Self::Executive,
+        }
+    }
+
+    /// Kills it, unless it is the executive, whose process is at hand elsewhere.
+    fn kill(self, folder: &Path, dice: &mut Dice) {
+        match self {
+            Self::Executive => {}
+            Self::ExecutiveAndWorld | Self::World => {
+                kill_by(folder, "pid");
+            }
+            Self::Planner => {
+                for _ in 0..200 {
+                    if kill_by(folder, "planner") {
+                        break;
+                    }
+                    std::thread::sleep(Duration::from_millis(10));
+                }
+            }
+        }
+        if matches!(self, Self::World | Self::Planner) {
+            std::thread::sleep(Duration::from_millis(dice.below(500)));
+        }
+    }
+}
+
+/// Whether a run ended because its planner was killed, or had ended so before.
+fn has_lost_its_planner(output: &Output) -> bool {
+    let text = [&output.stdout[..], &output.stderr].concat();
+    let text = String::from_utf8_lossy(&text).into_owned();
+    text.contains("it crashed (SIGKILL") || text.contains("is over: no-plan")
 }
 
 fn lines(folder: &Path, file: &str) -> Vec<String> {
@@ -126,6 +191,18 @@ fn judge(folder: &Path, output: &Output, what: &str) {
 
 /// What the robot itself has written down.
 fn judge_what_was_done(folder: &Path, what: &str, text: &str) {
+    judge_what_was_begun(folder, what);
+    let done = lines(folder, "done").join("\n");
+    for errand in ["a1)", "a2)", "a3)", "b1)", "b2)", "b3)"] {
+        assert!(
+            done.contains(errand),
+            "{what}: {errand} was never done:\n{done}\n{text}"
+        );
+    }
+}
+
+/// Nothing was begun twice.
+fn judge_what_was_begun(folder: &Path, what: &str) {
     let begun = lines(folder, "begun");
     let tickets: BTreeSet<_> = begun
         .iter()
@@ -136,19 +213,14 @@ fn judge_what_was_done(folder: &Path, what: &str, text: &str) {
         begun.len(),
         "{what}: begun twice: {begun:#?}"
     );
-    let done = lines(folder, "done").join("\n");
-    for errand in ["a1)", "a2)", "a3)", "b1)", "b2)", "b3)"] {
-        assert!(
-            done.contains(errand),
-            "{what}: {errand} was never done:\n{done}\n{text}"
-        );
-    }
 }
 
-/// Kills a run up to three times, and has it go on each time.
+/// Kills a run up to three times, and has it go on each time. Every third run has a planner that can be
+/// killed, too.
 fn killed(number: u64) -> u64 {
     let (folder, mut dice) = (folder(&format!("kill-{number}")), Dice(number));
     dice.below(2);
+    let has_planner = number % 3 == 2;
     let journal = folder.join("journal").display().to_string();
     let resume = ["run".to_owned(), "--resume".to_owned(), journal.clone()];
     let (mut kills, most) = (0, 1 + dice.below(3));
@@ -159,54 +231,61 @@ fn killed(number: u64) -> u64 {
             resume.to_vec()
         } else {
             let _ = fs::remove_file(&journal);
-            beginning(&folder, &journal)
+            beginning(&folder, &journal, has_planner)
         };
         let what = format!("run {number} after {kills} kills");
         let mut child = started(&line);
         if kills == most {
             break awaited(child, &what);
         }
-        std::thread::sleep(Duration::from_millis(dice.below(2000)));
-        let world_too = dice.below(2) == 0;
-        if world_too && dice.below(2) == 0 {
-            // The world alone dies: the executive says so, and ends.
-            kill_the_world(&folder);
-            std::thread::sleep(Duration::from_millis(dice.below(50)));
+        let victim = Victim::drawn(&mut dice, has_planner);
+        if victim != Victim::Planner {
+            std::thread::sleep(Duration::from_millis(dice.below(2000)));
         }
-        if child.try_wait().expect("it can be asked").is_some() {
-            let output = child.wait_with_output().expect("its output");
-            if output.status.success() {
-                break output;
+        victim.kill(&folder, &mut dice);
+        kills += 1;
+        if child.try_wait().expect("it can be asked").is_none() {
+            if victim == Victim::Planner {
+                // Nobody misses a planner that has planned.
+                break awaited(child, &what);
             }
-            let text = String::from_utf8_lossy(&output.stderr).into_owned();
-            // It was killed after its last record.
-            if text.contains("is over: goal-reached") {
-                break output;
-            }
-            assert!(
-                text.contains("world failed") || text.contains("cannot start"),
-                "{what}: {text}"
-            );
-            kills += 1;
+            let _ = child.kill();
+            let _ = child.wait();
             continue;
         }
-        let _ = child.kill();
-        let _ = child.wait();
-        kills += 1;
-        if world_too {
-            kill_the_world(&folder);
+        let output = child.wait_with_output().expect("its output");
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        // It was killed after its last record, or with its planner.
+        if output.status.success()
+            || text.contains("is over: goal-reached")
+            || has_lost_its_planner(&output)
+        {
+            break output;
         }
+        assert!(
+            text.contains("world failed") || text.contains("cannot start"),
+            "{what}: {text}"
+        );
     };
     let what = format!("run {number} after {kills} kills");
-    if String::from_utf8_lossy(&output.stderr).contains("is over: goal-reached") {
-        judge_what_was_done(&folder, &what, "it was over when it was killed");
-    } else {
-        judge(&folder, &output, &what);
-    }
+    judge_the_end(&folder, &output, &what);
     let replayed = elbowroom(&["run", "--replay", &journal]);
     assert!(replayed.status.success(), "run {number}: {replayed:?}");
     fs::remove_dir_all(&folder).expect("the folder is there");
     kills
+}
+
+/// A run ends with its goal, or, if its planner was killed, in order and without it.
+fn judge_the_end(folder: &Path, output: &Output, what: &str) {
+    if has_lost_its_planner(output) {
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(!text.contains("goal reached"), "{what}: {text}");
+        judge_what_was_begun(folder, what);
+    } else if String::from_utf8_lossy(&output.stderr).contains("is over: goal-reached") {
+        judge_what_was_done(folder, what, "it was over when it was killed");
+    } else {
+        judge(folder, output, what);
+    }
 }
 
 #[test]
@@ -232,66 +311,6 @@ fn whenever_a_run_is_killed_it_goes_on_and_nothing_is_started_twice() {
     println!("{runs} runs, killed {kills} times");
 }
 
-/// What was on the disk before the disk was full can be gone on with; nothing else was started.
-#[test]
-fn a_journal_that_cannot_be_written_starts_nothing() {
-    if !Path::new("/dev/full").exists() {
-        skipped("there is no /dev/full");
-        return;
-    }
-    let folder = folder("full");
-    let output = started(&beginning(&folder, "/dev/full"))
-        .wait_with_output()
-        .expect("its output");
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(
-        text.contains("cannot write the journal /dev/full"),
-        "{text}"
-    );
-    assert!(text.contains("nothing was started"), "{text}");
-    assert!(lines(&folder, "begun").is_empty());
-    fs::remove_dir_all(&folder).expect("the folder is there");
-}
-
-/// A limit on the size of files stands for a disk that fills up while the run is under way.
-#[test]
-fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
-    if !python_is_there() {
-        return;
-    }
-    let folder = folder("fills");
-    let journal = folder.join("journal").display().to_string();
-    let program = env!("CARGO_BIN_EXE_elbowroom");
-    // In the shell's units, so that the first record fits and not all of them do. The signal that
-    // would end the program is ignored, and writing fails.
-    let line = beginning(&folder, &journal)
-        .iter()
-        .map(|word| format!("'{word}'"))
-        .collect::<Vec<_>>();
-    let script = format!(
-        "trap '' XFSZ; ulimit -f 8; exec '{program}' {}",
-        line.join(" ")
-    );
-    let output = Command::new("bash")
-        .args(["-c", &script])
-        .current_dir(root())
-        .output();
-    let Ok(output) = output else {
-        skipped("there is no bash");
-        return;
-    };
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{output:?}");
-    assert!(text.contains("the run was ended in order"), "{text}");
-    let begun = lines(&folder, "begun").len();
-    assert!((1..6).contains(&begun), "in the middle: {begun} begun");
-    let resume = ["run".to_owned(), "--resume".to_owned(), journal];
-    let output = awaited(started(&resume), "after the disk was full");
-    judge(&folder, &output, "after the disk was full");
-    fs::remove_dir_all(&folder).expect("the folder is there");
-}
-
 /// Two that write one journal would start everything twice.
 #[cfg(unix)]
 #[test]
@@ -301,7 +320,7 @@ fn a_run_that_is_under_way_is_not_gone_on_with_beside_it() {
     }
     let folder = folder("twice");
     let journal = folder.join("journal").display().to_string();
-    let line = beginning(&folder, &journal);
+    let line = beginning(&folder, &journal, false);
     let first = started(&line);
     for _ in 0..600 {
         if !lines(&folder, "begun").is_empty() {
@@ -327,7 +346,7 @@ fn a_journal_is_neither_overwritten_nor_gone_on_with_after_its_end() {
     }
     let folder = folder("over");
     let journal = folder.join("journal").display().to_string();
-    let line = beginning(&folder, &journal);
+    let line = beginning(&folder, &journal, false);
     judge(&folder, &awaited(started(&line), "the run"), "the run");
     let again = awaited(started(&line), "the same again");
     let text = String::from_utf8_lossy(&again.stderr).into_owned();

@@ -220,7 +220,10 @@ fn thins_out_to_the_least<W: Weight>(
     prop_assert!(implied.is_sorted());
     // Whatever schedule it is looked at from.
     for root in network.nodes() {
-        for schedule in [consistent.earliest_schedule(root), consistent.latest_schedule(root)] {
+        for schedule in [
+            consistent.earliest_schedule(root),
+            consistent.latest_schedule(root),
+        ] {
             prop_assert_eq!(&implied, &consistent.implied_seen_from(&schedule, &keep));
         }
     }

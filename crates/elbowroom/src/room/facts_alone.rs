@@ -13,9 +13,8 @@ use elbowroom_plan::{ParameterKind, ParametrizedPlan, Reason};
 
 /// Whether nothing in the plan depends on a number that its schedule, or a parameter, may change.
 pub(super) fn are_enough(task: &Task, plan: &ParametrizedPlan) -> bool {
-    let is_time = |kind: ParameterKind| {
-        matches!(kind, ParameterKind::Duration(_) | ParameterKind::Timed(_))
-    };
+    let is_time =
+        |kind: ParameterKind| matches!(kind, ParameterKind::Duration(_) | ParameterKind::Timed(_));
     let constraints = &plan.plan.constraints;
     let actions = || plan.plan.instances.iter().map(|instance| &instance.action);
     if !plan.parameters.iter().all(|own| is_time(own.kind))
@@ -76,7 +75,11 @@ fn changed(change: &Change) -> Option<FluentId> {
 /// Whether the bounds of the action's duration are the same whenever they are read.
 fn has_steady_duration(action: &Action, changing: &BTreeSet<FluentId>) -> bool {
     let mut is_steady = true;
-    for constraint in action.durative().into_iter().flat_map(|body| &body.duration) {
+    for constraint in action
+        .durative()
+        .into_iter()
+        .flat_map(|body| &body.duration)
+    {
         let bound = &constraint.bound;
         bound.visit_fluents(&mut |fluent| is_steady &= !changing.contains(&fluent));
     }

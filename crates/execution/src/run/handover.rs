@@ -132,10 +132,7 @@ impl Run<'_> {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             PlanningTime::Measured => planned.seconds.unwrap_or_default(),
         };
-        if took > self.allowance {
-            // The next plan is made for a later start.
-            self.allowance.clone_from(&took);
-        }
+        self.expect(&took);
         let ready = &self.now + &took;
         let (plan, why_not) = match &planned.answer {
             PlanAnswer::Plan(plan) => (Some(plan), None),
@@ -157,6 +154,14 @@ impl Run<'_> {
             running,
             ready,
         })
+    }
+
+    /// Learns from what a plan took what the next one will take: as much, if that is more than was
+    /// expected; else less, but only by half at a time. If one long search delayed all plans after it,
+    /// a run whose goals come faster than that would not start anything any more.
+    fn expect(&mut self, took: &Rational) {
+        let half = &self.allowance / &Rational::from(2);
+        self.allowance = half.max(took.clone());
     }
 
     /// Takes up a plan, as soon as the time is over that it took to make it.

@@ -183,52 +183,68 @@ fn whatever_is_asked_the_run_stays_in_order() {
     }
 }
 
-/// The planner of a test answers this, too.
+/// What the embedded planner answers, after so many seconds of the world's time, at this time.
+struct Slow(fn(&Rational) -> i64);
 
-#[test]
-fn a_plan_that_was_made_for_goals_that_have_changed_since_is_not_begun() {
-    /// Takes five seconds of the world's time.
-    struct Slow;
-    impl Planner for Slow {
-        fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-            let answer = Embedded::default().plan(task, situation).answer;
-            assert!(matches!(answer, PlanAnswer::Plan(_)));
-            PlannerAnswer {
-                answer,
-                seconds: Some(Rational::from(5)),
-                remark: None,
-            }
+impl Planner for Slow {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        let answer = Embedded::default().plan(task, situation).answer;
+        assert!(matches!(answer, PlanAnswer::Plan(_)));
+        PlannerAnswer {
+            answer,
+            seconds: Some(Rational::from((self.0)(&situation.time))),
+            remark: None,
         }
     }
+}
+
+/// The starts of a run of which the goals are asked for at these times.
+fn starts(planner: Slow, goals: &[(i64, &str, &str)], end: i64) -> Vec<(String, Rational)> {
     let task = task("", "(and)");
     let is_to_end = Arc::new(AtomicBool::new(false));
-    let script = [
-        (10, pursue("it", "(have cup)")),
-        (12, pursue("it", "(have key)")),
-    ];
-    let coming = script.map(|(time, event)| Observation {
-        time: Rational::from(time),
-        event,
+    let coming = goals.iter().map(|(time, name, goal)| Observation {
+        time: Rational::from(*time),
+        event: pursue(name, goal),
     });
     let mut world = Scripted {
         now: Rational::ZERO,
-        coming: coming.into(),
-        end: Rational::from(60),
+        coming: coming.collect(),
+        end: Rational::from(end),
         is_to_end: Arc::clone(&is_to_end),
         slow: None,
         on_cancel: None,
     };
-    let notes = Notes::default();
     let report = Execution::of(&task)
-        .planned_by(Slow)
-        .recorded_by(notes.clone())
+        .planned_by(planner)
+        .recorded_by(Notes::default())
         .ending_when(move || is_to_end.load(Ordering::SeqCst))
         .lasting(true)
         .run_in(&mut world);
-    let names: Vec<_> = report
-        .executed
-        .iter()
-        .map(|it| it.step.action.name.as_str())
-        .collect();
+    let executed = report.executed.iter();
+    executed
+        .map(|it| (it.step.action.name.clone(), it.step.start.clone()))
+        .collect()
+}
+
+#[test]
+fn a_plan_that_was_made_for_goals_that_have_changed_since_is_not_begun() {
+    let goals = [(10, "it", "(have cup)"), (12, "it", "(have key)")];
+    let starts = starts(Slow(|_| 5), &goals, 60);
+    let names: Vec<_> = starts.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["(fetch r key)"]);
+}
+
+/// One search took a hundred seconds. The plan after it is made for as late a start, but not all
+/// that follow.
+#[test]
+fn one_long_search_does_not_delay_all_plans_that_come_after_it() {
+    let goals = [
+        (10, "one", "(have cup)"),
+        (200, "two", "(have key)"),
+        (400, "three", "(have book)"),
+    ];
+    let only_at_first = |now: &Rational| if *now < Rational::from(100) { 100 } else { 1 };
+    let starts = starts(Slow(only_at_first), &goals, 600);
+    let whole: Vec<_> = starts.iter().map(|(_, time)| time.to_decimal(0)).collect();
+    assert_eq!(whole, ["110", "300", "450"], "{starts:?}");
 }

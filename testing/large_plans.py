@@ -1,0 +1,84 @@
+"""How soon a plan is begun, and with how much memory, by the number of its time points.
+
+    python3 testing/large_plans.py target/release/elbowroom [--executor stn] [TIME POINTS…]
+
+*Begun* is when the trace has its first command, everything before that included: reading, judging, relaxing the
+plan, and making the network ready. *Run* is the whole process. Standard library only; memory is read from /proc.
+"""
+
+import argparse
+import os
+import pathlib
+import subprocess
+import tempfile
+import time
+
+import rounds
+
+ROBOTS, DOCKS = 20, 4
+
+
+def begun(trace):
+    """Whether a command is in the trace."""
+    return trace.exists() and b'"event":"command"' in trace.read_bytes()[:50_000_000]
+
+
+def peak(process):
+    """What the process has held at most, in megabytes; `None` when it is over."""
+    try:
+        text = pathlib.Path(f"/proc/{process.pid}/status").read_text()
+        (line,) = [line for line in text.splitlines() if line.startswith("VmHWM")]
+        return int(line.split()[1]) / 1024
+    except (OSError, ValueError):
+        return None
+
+
+def processor(process):
+    """The seconds of processor time so far, in the program's own code."""
+    words = pathlib.Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def row(program, executor, points, patience):
+    """Measures one plan."""
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        texts = {"d.pddl": rounds.DOMAIN, "p.pddl": rounds.problem(ROBOTS, DOCKS)}
+        texts["plan"] = rounds.plan(ROBOTS, DOCKS, points // 2)
+        for name, text in texts.items():
+            (folder / name).write_text(text)
+        line = [pathlib.Path(program).resolve(), "run", "d.pddl", "p.pddl", "plan", "--executor", executor]
+        line += ["--planner", "none", "--trace", "trace.jsonl"]
+        begin = time.monotonic()
+        process = subprocess.Popen(line, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        memory = at_first = None
+        while process.poll() is None and memory is None:
+            time.sleep(0.005)
+            if begun(folder / "trace.jsonl"):
+                memory, at_first = peak(process), processor(process)
+            if time.monotonic() - begin > patience:
+                process.kill()
+                process.wait()
+                print(f"| {points:,} | `{executor}` | more than {patience:.0f} s | | | |", flush=True)
+                return
+        _, _, usage = os.wait4(process.pid, 0) if process.returncode is None else (0, 0, None)
+        whole = f"{usage.ru_utime:.2f} s | {usage.ru_maxrss / 1024:.0f} MB" if usage else "|"
+        first = f"{at_first:.2f} s | {memory:.0f} MB" if memory else "|"
+        print(f"| {points:,} | `{executor}` | {first} | {whole} |", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("program")
+    parser.add_argument("points", nargs="*", type=int, default=[1_000, 10_000, 40_000, 100_000])
+    parser.add_argument("--executor", default="stn")
+    parser.add_argument("--patience", type=float, default=300)
+    chosen = parser.parse_intermixed_args()
+    print("| time points | executor | begun | memory | run | memory |")
+    print("|---:|---|---:|---:|---:|---:|", flush=True)
+    for points in chosen.points:
+        row(chosen.program, chosen.executor, points, chosen.patience)
+
+
+if __name__ == "__main__":
+    main()
