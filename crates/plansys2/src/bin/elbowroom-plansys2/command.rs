@@ -5,6 +5,7 @@ use std::io::{self, BufRead as _, BufReader, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::thread;
 use std::time::Duration;
@@ -26,7 +27,7 @@ pub(super) struct Planned {
     pub(super) text: String,
 }
 
-/// Has the command plan.
+/// Has the command plan; `is_over` ends that, as the end of the time does.
 ///
 /// # Errors
 /// There is no plan, or none within that time; the text says why.
@@ -34,6 +35,7 @@ pub(super) fn plan(
     elbowroom: &str,
     request: &PlanRequest,
     within: Duration,
+    is_over: &AtomicBool,
 ) -> Result<Planned, String> {
     let folder = folder_with(request)?;
     let [out, errors] = ["out", "errors"].map(|name| folder.path().join(name));
@@ -47,7 +49,8 @@ pub(super) fn plan(
         .stderr(create(&errors)?)
         .spawn()
         .map_err(|e| not_started(elbowroom, &e))?;
-    let ended = wait(&mut child, within).map_err(|e| format!("{elbowroom} was lost: {e}"))?;
+    let ended =
+        wait(&mut child, within, is_over).map_err(|e| format!("{elbowroom} was lost: {e}"))?;
     let Some(status) = ended else {
         return Err(format!(
             "no plan was found within {} s",
@@ -68,13 +71,17 @@ pub(super) fn plan(
 }
 
 /// `None` where it had to be ended.
-fn wait(child: &mut Child, within: Duration) -> io::Result<Option<ExitStatus>> {
+fn wait(
+    child: &mut Child,
+    within: Duration,
+    is_over: &AtomicBool,
+) -> io::Result<Option<ExitStatus>> {
     let mut waited = Duration::ZERO;
     loop {
         if let Some(status) = child.try_wait()? {
             return Ok(Some(status));
         }
-        if waited >= within {
+        if waited >= within || is_over.load(Ordering::Relaxed) {
             child.kill()?;
             child.wait()?;
             return Ok(None);

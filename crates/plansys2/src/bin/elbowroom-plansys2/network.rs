@@ -4,9 +4,11 @@
 //! changed between Humble and Iron, and nodes of one side abort when they read that of the other. Who does not
 //! speak of nodes can do no harm to either; topics, services and actions need no nodes.
 
+use std::collections::BTreeSet;
 use std::io;
 use std::sync::mpsc::Sender;
 use std::thread;
+use std::time::Instant;
 
 use rustdds::mio1::event::Source;
 use rustdds::mio1::{Events, Interest, Poll, Registry, Token};
@@ -14,14 +16,16 @@ use rustdds::no_key::{DataWriterCdr, SimpleDataReaderCdr};
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::rpc::SampleIdentity;
 use rustdds::{
-    DomainParticipant, DomainParticipantBuilder, Duration, Publisher, QosPolicies,
-    QosPolicyBuilder, SequenceNumber, Subscriber, Timestamp, Topic, TopicKind, WriteOptionsBuilder,
+    DataWriterStatus, DomainParticipant, DomainParticipantBuilder, Duration, GUID, Publisher,
+    QosPolicies, QosPolicyBuilder, SequenceNumber, StatusEvented as _, Subscriber, Timestamp,
+    Topic, TopicKind, WriteOptionsBuilder,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::Input;
 use super::options::Settings;
+use super::session::now;
 
 /// Which request an answer belongs to.
 pub(super) type Asker = SampleIdentity;
@@ -141,7 +145,7 @@ impl Network {
         name: &str,
         kind: &str,
         input: impl Fn(Asker, Request) -> Input + Send + 'static,
-    ) -> Result<Mouth<Response>, String>
+    ) -> Result<Answers<Response>, String>
     where
         Request: DeserializeOwned + Send + 'static,
         Response: Serialize,
@@ -161,9 +165,11 @@ impl Network {
             &qos,
         )?;
         let writer = self.publisher.create_datawriter_no_key_cdr(&replies, None);
-        Ok(Mouth(
-            writer.map_err(|e| format!("cannot serve {name}: {e}"))?,
-        ))
+        Ok(Answers {
+            writer: writer.map_err(|e| format!("cannot serve {name}: {e}"))?,
+            found: BTreeSet::new(),
+            waiting: Vec::new(),
+        })
     }
 
     /// Begins to listen, in a thread of its own; what is heard goes to `inputs`.
@@ -227,19 +233,62 @@ impl<T: Serialize> Mouth<T> {
             .write(message, None)
             .map_err(|e| format!("a message was not sent: {e}"))
     }
+}
 
-    /// Answers a request.
+/// An answer to somebody who may not have been found yet is kept for so long, and then sent all the same.
+const FOUND_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
+
+/// By what a service is answered.
+pub(super) struct Answers<T: Serialize> {
+    writer: DataWriterCdr<T>,
+    /// Who can hear an answer: a request may come before its sender is found, and what is said then is lost.
+    found: BTreeSet<GUID>,
+    waiting: Vec<(Asker, T, Instant)>,
+}
+
+impl<T: Serialize> Answers<T> {
+    /// Answers a request, now or when whoever has asked can hear it.
     ///
     /// # Errors
     /// It could not be sent.
-    pub(super) fn answer(&self, asker: Asker, response: T) -> Result<(), String> {
-        let options = WriteOptionsBuilder::new()
-            .source_timestamp(Timestamp::now())
-            .related_sample_identity(asker);
-        let written = self.0.write_with_options(response, options.build());
-        written
-            .map(|_| ())
-            .map_err(|e| format!("an answer was not sent: {e}"))
+    pub(super) fn answer(&mut self, asker: Asker, response: T) -> Result<(), String> {
+        self.waiting.push((asker, response, now()));
+        self.flush()
+    }
+
+    /// Sends the answers that are due. To be called a few times a second.
+    ///
+    /// # Errors
+    /// One could not be sent.
+    pub(super) fn flush(&mut self) -> Result<(), String> {
+        while let Some(status) = self.writer.try_recv_status() {
+            if let DataWriterStatus::PublicationMatched {
+                current, reader, ..
+            } = status
+            {
+                if current.count_change() < 0 {
+                    self.found.remove(&reader);
+                } else {
+                    self.found.insert(reader);
+                }
+            }
+        }
+        let clock = now();
+        let is_due = |(asker, _, since): &mut (Asker, T, Instant)| {
+            let reader = asker.writer_guid;
+            // Whoever names no reader cannot be waited for.
+            !reader.entity_id.entity_kind.is_reader()
+                || self.found.contains(&reader)
+                || clock.saturating_duration_since(*since) >= FOUND_WITHIN
+        };
+        for (asker, response, _) in self.waiting.extract_if(.., is_due) {
+            let options = WriteOptionsBuilder::new()
+                .source_timestamp(Timestamp::now())
+                .related_sample_identity(asker);
+            let written = self.writer.write_with_options(response, options.build());
+            written.map_err(|e| format!("an answer was not sent: {e}"))?;
+        }
+        Ok(())
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime};
@@ -27,6 +29,8 @@ use super::{Input, remark};
 const TICK: Duration = Duration::from_millis(200);
 /// How often it is told how a plan stands, at least.
 const TELL_EVERY: Duration = Duration::from_secs(1);
+/// How many plans are made at a time.
+const MOST_PLANNERS: usize = 4;
 /// How long a run may take to end when it was asked to.
 const FAREWELL: Duration = Duration::from_secs(8);
 /// Tickets of one run differ from those of another in these bits: the hub may still wait for what an earlier run has
@@ -59,6 +63,9 @@ pub(super) struct Serving {
     planned: Option<Planned>,
     execution: Option<Execution>,
     runs: u64,
+    /// How many plans are being made.
+    planning: usize,
+    is_over: Arc<AtomicBool>,
     zero: Instant,
 }
 
@@ -83,6 +90,8 @@ impl Serving {
             planned: None,
             execution: None,
             runs: 0,
+            planning: 0,
+            is_over: Arc::default(),
             zero: now(),
         }
     }
@@ -106,10 +115,12 @@ impl Serving {
                 }
             }
             self.hub.tick(self.now());
+            told(self.services.flush());
             self.settle();
             let patience = leaves.map(|at| self.now().saturating_sub(at) >= FAREWELL);
             if patience.is_some_and(|is_over| is_over || self.execution.is_none()) {
-                // What was told to stop is to hear of it.
+                // What was told to stop is to hear of it, planners too.
+                self.is_over.store(true, Ordering::Relaxed);
                 thread::sleep(TICK);
                 return;
             }
@@ -203,15 +214,21 @@ impl Serving {
         told(sent);
     }
 
-    fn plan(&self, who: Asker, texts: PlanRequest) {
+    fn plan(&mut self, who: Asker, texts: PlanRequest) {
+        let refused = if !self.nodes[PLANNER].serves() {
+            Some("the planner is not active".to_owned())
+        } else if self.planning >= MOST_PLANNERS {
+            Some(format!("{MOST_PLANNERS} plans are being made already"))
+        } else {
+            None
+        };
+        self.planning += 1;
         let (inputs, elbowroom) = (self.inputs.clone(), self.settings.elbowroom.clone());
-        let within = self.settings.plan_within;
-        let serves = self.nodes[PLANNER].serves();
+        let (within, is_over) = (self.settings.plan_within, Arc::clone(&self.is_over));
         thread::spawn(move || {
-            let planned = if serves {
-                command::plan(&elbowroom, &texts, within)
-            } else {
-                Err("the planner is not active".to_owned())
+            let planned = match refused {
+                Some(why) => Err(why),
+                None => command::plan(&elbowroom, &texts, within, &is_over),
             };
             // Whoever receives is gone when the program ends.
             let _ = inputs.send(Input::Planned(who, texts, planned));
@@ -219,6 +236,7 @@ impl Serving {
     }
 
     fn has_planned(&mut self, who: Asker, texts: PlanRequest, planned: Result<Planned, String>) {
+        self.planning -= 1;
         let response = match planned {
             Ok(planned) => {
                 let plan = planned.plan.clone();

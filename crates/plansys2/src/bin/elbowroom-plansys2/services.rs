@@ -7,7 +7,7 @@ use elbowroom_plansys2::interface::{
 };
 
 use super::Input;
-use super::network::{Asker, Mouth, Network, latched, reliable};
+use super::network::{Answers, Asker, Mouth, Network, latched, reliable};
 
 /// Those that are stood in for.
 pub(super) const NODES: [&str; 2] = ["planner", "executor"];
@@ -28,17 +28,17 @@ pub(super) enum Asked {
 
 /// By what it is answered.
 pub(super) struct Services {
-    pub(super) plan: Mouth<PlanResponse>,
-    pub(super) goal: Mouth<GoalResponse>,
-    pub(super) cancel: Mouth<CancelResponse>,
-    pub(super) result: Mouth<ResultResponse>,
+    pub(super) plan: Answers<PlanResponse>,
+    pub(super) goal: Answers<GoalResponse>,
+    pub(super) cancel: Answers<CancelResponse>,
+    pub(super) result: Answers<ResultResponse>,
     pub(super) feedback: Mouth<Feedback>,
     pub(super) statuses: Mouth<GoalStatuses>,
     /// What other tools follow: how each action stands, and the plan that is executed.
     pub(super) infos: Mouth<ActionExecutionInfo>,
     pub(super) executing: Mouth<Plan>,
-    pub(super) state: Vec<Mouth<StateResponse>>,
-    pub(super) change: Vec<Mouth<Success>>,
+    pub(super) state: Vec<Answers<StateResponse>>,
+    pub(super) change: Vec<Answers<Success>>,
 }
 
 impl Services {
@@ -106,5 +106,17 @@ impl Services {
             state,
             change,
         })
+    }
+    /// Sends the answers that are due. To be called a few times a second.
+    ///
+    /// # Errors
+    /// One could not be sent.
+    pub(super) fn flush(&mut self) -> Result<(), String> {
+        self.plan.flush()?;
+        self.goal.flush()?;
+        self.cancel.flush()?;
+        self.result.flush()?;
+        self.state.iter_mut().try_for_each(Answers::flush)?;
+        self.change.iter_mut().try_for_each(Answers::flush)
     }
 }
