@@ -87,6 +87,22 @@ pub struct PlanResponse {
     pub error_info: String,
 }
 
+/// The request of `plansys2_msgs/srv/ValidateDomain`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ValidateRequest {
+    /// The domain, in PDDL.
+    pub domain: String,
+}
+
+/// The answer of `plansys2_msgs/srv/ValidateDomain`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ValidateResponse {
+    /// Whether it can be read.
+    pub success: bool,
+    /// What is wrong with it.
+    pub error_info: String,
+}
+
 /// The number of a goal; zeros stand for all of them.
 pub type GoalId = [u8; 16];
 

@@ -13,7 +13,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from plansys2_msgs.action import ExecutePlan
 from plansys2_msgs.msg import ActionExecutionInfo, Plan
-from plansys2_msgs.srv import GetPlan
+from plansys2_msgs.srv import GetPlan, ValidateDomain
 from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
@@ -85,6 +85,8 @@ def main():
     said["then"] = [client.state("planner"), client.state("executor")]
     broken = client.call(GetPlan, "planner/get_plan", domain="(define (domain", problem=problem)
     said["broken"] = [broken.success, broken.error_info]
+    validated = [client.call(ValidateDomain, "planner/validate_domain", domain=it) for it in (domain, domain[:-9])]
+    said["validated"] = [[it.success, it.error_info] for it in validated]
     answer = client.call(GetPlan, "planner/get_plan", domain=domain, problem=problem)
     said["planned"] = [answer.success, [it.action for it in answer.plan.items]]
     said["executed"] = client.execute(answer.plan, float(sys.argv[3]) if len(sys.argv) > 3 else None)

@@ -202,6 +202,9 @@ def a_plan_is_asked_for_and_executed(stage):
     assert said["made ready"] == 4 * [True] and said["then"] == ["active", "active"]
     is_planned, why = said["broken"]
     assert not is_planned and "domain.pddl:1:9" in why
+    assert said["validated"][0] == [True, ""]
+    is_valid, why = said["validated"][1]
+    assert not is_valid and "domain.pddl:" in why
     is_planned, actions = said["planned"]
     assert is_planned and len(actions) == 3
     executed = said["executed"]

@@ -5,6 +5,7 @@ use std::io::{self, BufRead as _, BufReader, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::thread;
@@ -27,61 +28,125 @@ pub(super) struct Planned {
     pub(super) text: String,
 }
 
-/// Has the command plan; `is_over` ends that, as the end of the time does.
+/// For how long the command may work, and what ends that early.
+pub(super) struct Patience {
+    pub(super) within: Duration,
+    pub(super) is_over: Arc<AtomicBool>,
+}
+
+/// Has the command plan.
 ///
 /// # Errors
 /// There is no plan, or none within that time; the text says why.
 pub(super) fn plan(
     elbowroom: &str,
     request: &PlanRequest,
-    within: Duration,
-    is_over: &AtomicBool,
+    patience: &Patience,
 ) -> Result<Planned, String> {
-    let folder = folder_with(request)?;
+    let said = ask(
+        elbowroom,
+        &["plan", "domain.pddl", "problem.pddl", "--json"],
+        request,
+        patience,
+    )?;
+    match said.status.code() {
+        Some(0) => steps_of(&said.out).ok_or_else(|| format!("{elbowroom} has not printed a plan")),
+        Some(1) => Err("no plan reaches the goal".to_owned()),
+        _ => Err(format!(
+            "the planner gave up ({}): {}",
+            said.status,
+            said.errors.trim()
+        )),
+    }
+}
+
+/// Has the command read a domain.
+///
+/// # Errors
+/// What is wrong with it.
+pub(super) fn validate(elbowroom: &str, domain: String, patience: &Patience) -> Result<(), String> {
+    // Nothing is asked of it but that the domain can be read.
+    let problem = format!(
+        "(define (problem any) (:domain {}) (:init) (:goal (and)))",
+        name_of(&domain)
+    );
+    let texts = PlanRequest { domain, problem };
+    let said = ask(
+        elbowroom,
+        &["check", "domain.pddl", "problem.pddl"],
+        &texts,
+        patience,
+    )?;
+    if said.status.success() {
+        Ok(())
+    } else {
+        Err(said.errors.trim().to_owned())
+    }
+}
+
+/// The name of a domain, as far as it has one.
+fn name_of(domain: &str) -> String {
+    let code = domain
+        .lines()
+        .map(|line| line.split(';').next().unwrap_or_default());
+    let text = code.collect::<Vec<_>>().join(" ").to_lowercase();
+    let after = text
+        .split_once("(domain")
+        .map_or("", |(_, after)| after)
+        .trim_start();
+    let is_end = |it: char| it == '(' || it == ')' || it.is_whitespace();
+    let name = after.split(is_end).next().unwrap_or_default();
+    if name.is_empty() {
+        "any".to_owned()
+    } else {
+        name.to_owned()
+    }
+}
+
+/// What the command has said.
+struct Said {
+    status: ExitStatus,
+    out: String,
+    errors: String,
+}
+
+/// Runs the command in a folder with these texts as `domain.pddl` and `problem.pddl`.
+fn ask(
+    elbowroom: &str,
+    line: &[&str],
+    texts: &PlanRequest,
+    patience: &Patience,
+) -> Result<Said, String> {
+    let folder = folder_with(texts)?;
     let [out, errors] = ["out", "errors"].map(|name| folder.path().join(name));
     let create = |path: &Path| File::create(path).map_err(|e| unusable(path, &e));
     let mut child = Command::new(elbowroom)
-        .arg("plan")
-        .args(["domain.pddl", "problem.pddl", "--json"])
+        .args(line)
         .current_dir(folder.path())
         .stdin(Stdio::null())
         .stdout(create(&out)?)
         .stderr(create(&errors)?)
         .spawn()
         .map_err(|e| not_started(elbowroom, &e))?;
-    let ended =
-        wait(&mut child, within, is_over).map_err(|e| format!("{elbowroom} was lost: {e}"))?;
-    let Some(status) = ended else {
-        return Err(format!(
-            "no plan was found within {} s",
-            within.as_secs_f64()
-        ));
-    };
+    let ended = wait(&mut child, patience).map_err(|e| format!("{elbowroom} was lost: {e}"))?;
+    let status =
+        ended.ok_or_else(|| format!("it took longer than {} s", patience.within.as_secs_f64()))?;
     let read = |path: &Path| fs::read_to_string(path).unwrap_or_default();
-    match status.code() {
-        Some(0) => {
-            steps_of(&read(&out)).ok_or_else(|| format!("{elbowroom} has not printed a plan"))
-        }
-        Some(1) => Err("no plan reaches the goal".to_owned()),
-        _ => Err(format!(
-            "the planner gave up ({status}): {}",
-            read(&errors).trim()
-        )),
-    }
+    Ok(Said {
+        status,
+        out: read(&out),
+        errors: read(&errors),
+    })
 }
 
 /// `None` where it had to be ended.
-fn wait(
-    child: &mut Child,
-    within: Duration,
-    is_over: &AtomicBool,
-) -> io::Result<Option<ExitStatus>> {
+fn wait(child: &mut Child, patience: &Patience) -> io::Result<Option<ExitStatus>> {
     let mut waited = Duration::ZERO;
     loop {
         if let Some(status) = child.try_wait()? {
             return Ok(Some(status));
         }
-        if waited >= within || is_over.load(Ordering::Relaxed) {
+        if waited >= patience.within || patience.is_over.load(Ordering::Relaxed) {
             child.kill()?;
             child.wait()?;
             return Ok(None);
@@ -253,4 +318,38 @@ fn unusable(path: &Path, error: &io::Error) -> String {
 
 fn not_started(elbowroom: &str, error: &io::Error) -> String {
     format!("{elbowroom} cannot be started: {error}; --elbowroom says where it is")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_domain_has_the_name_behind_its_first_word() {
+        for (text, name) in [
+            (
+                "; (domain no)\n(define (domain Yard)\n (:requirements))",
+                "yard",
+            ),
+            ("(DEFINE (DOMAIN\n yard))", "yard"),
+            ("(define (domain", "any"),
+            ("", "any"),
+        ] {
+            assert_eq!(name_of(text), name, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_plan_is_read_with_actions_that_take_no_time() {
+        let document = r#"{"steps":[{"start":{"exact":"1/3","decimal":0.3333},"action":"(beep)","duration":null}],"plan":"0.333: (beep)\n"}"#;
+        let planned = steps_of(document).expect("a plan");
+        let item = PlanItem {
+            time: 0.3333,
+            action: "(beep)".into(),
+            duration: 0.0,
+        };
+        assert_eq!(planned.plan.items, [item]);
+        assert_eq!(planned.text, "0.333: (beep)\n");
+        assert!(steps_of("{}").is_none() && steps_of("nonsense").is_none());
+    }
 }

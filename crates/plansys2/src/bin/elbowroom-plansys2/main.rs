@@ -40,6 +40,8 @@ pub(crate) enum Input {
     Asked(Box<Asked>),
     /// A planner has ended: for whom, for what, and with what.
     Planned(Asker, PlanRequest, Result<Planned, String>),
+    /// A domain was read: for whom, and what is wrong with it.
+    Validated(Asker, Result<(), String>),
     /// A run has begun to talk; it is answered there.
     Talks(UnixStream),
     /// A run is over, with that exit code.

@@ -10,14 +10,14 @@ use std::time::{Duration, Instant, SystemTime};
 
 use elbowroom_plansys2::interface::{
     Feedback, GoalId, GoalRequest, GoalResponse, Plan, PlanRequest, PlanResponse, StateResponse,
-    Success,
+    Success, ValidateResponse,
 };
 use elbowroom_plansys2::message::Stamp;
 use elbowroom_plansys2::{
     Command, Effect, Goals, Hub, Lifecycle, Progress, Ticket, World, plan_text,
 };
 
-use super::command::{self, Planned, Running};
+use super::command::{self, Patience, Planned, Running};
 use super::network::Asker;
 use super::options::{ServeSettings, Settings};
 use super::services::{Asked, EXECUTOR, NODES, PLANNER, Services};
@@ -141,6 +141,17 @@ impl Serving {
             }
             Input::Asked(asked) => self.answer(*asked),
             Input::Planned(who, texts, planned) => self.has_planned(who, texts, planned),
+            Input::Validated(who, outcome) => {
+                self.planning -= 1;
+                let (success, error_info) = (outcome.is_ok(), outcome.err().unwrap_or_default());
+                told(self.services.validate.answer(
+                    who,
+                    ValidateResponse {
+                        success,
+                        error_info,
+                    },
+                ));
+            }
             Input::Over(code) => self.over(code),
             // That a run does not speak any more is said by its end.
             Input::Closed | Input::End => {}
@@ -172,6 +183,7 @@ impl Serving {
     fn answer(&mut self, asked: Asked) {
         let sent = match asked {
             Asked::Plan(who, texts) => return self.plan(who, texts),
+            Asked::Validate(who, request) => return self.validate(who, request.domain),
             Asked::Goal(who, request) => {
                 let stamp = stamp();
                 let accepted = match self.begin(&request, stamp) {
@@ -214,24 +226,40 @@ impl Serving {
         told(sent);
     }
 
+    /// Has a process of the command work on it, unless that is refused; what comes of it is an input.
     fn plan(&mut self, who: Asker, texts: PlanRequest) {
+        self.work(move |elbowroom, refused, patience| {
+            let planned = refused.and_then(|()| command::plan(elbowroom, &texts, patience));
+            Input::Planned(who, texts, planned)
+        });
+    }
+
+    fn validate(&mut self, who: Asker, domain: String) {
+        self.work(move |elbowroom, refused, patience| {
+            Input::Validated(
+                who,
+                refused.and_then(|()| command::validate(elbowroom, domain, patience)),
+            )
+        });
+    }
+
+    fn work(
+        &mut self,
+        work: impl FnOnce(&str, Result<(), String>, &Patience) -> Input + Send + 'static,
+    ) {
         let refused = if !self.nodes[PLANNER].serves() {
-            Some("the planner is not active".to_owned())
+            Err("the planner is not active".to_owned())
         } else if self.planning >= MOST_PLANNERS {
-            Some(format!("{MOST_PLANNERS} plans are being made already"))
+            Err(format!("{MOST_PLANNERS} plans are being made already"))
         } else {
-            None
+            Ok(())
         };
         self.planning += 1;
         let (inputs, elbowroom) = (self.inputs.clone(), self.settings.elbowroom.clone());
         let (within, is_over) = (self.settings.plan_within, Arc::clone(&self.is_over));
         thread::spawn(move || {
-            let planned = match refused {
-                Some(why) => Err(why),
-                None => command::plan(&elbowroom, &texts, within, &is_over),
-            };
             // Whoever receives is gone when the program ends.
-            let _ = inputs.send(Input::Planned(who, texts, planned));
+            let _ = inputs.send(work(&elbowroom, refused, &Patience { within, is_over }));
         });
     }
 

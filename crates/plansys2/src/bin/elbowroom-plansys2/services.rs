@@ -3,7 +3,7 @@
 use elbowroom_plansys2::interface::{
     ActionExecutionInfo, CancelRequest, CancelResponse, ChangeRequest, Empty, Feedback,
     GoalRequest, GoalResponse, GoalStatuses, Plan, PlanRequest, PlanResponse, ResultRequest,
-    ResultResponse, StateResponse, Success,
+    ResultResponse, StateResponse, Success, ValidateRequest, ValidateResponse,
 };
 
 use super::Input;
@@ -18,6 +18,7 @@ pub(super) const EXECUTOR: usize = 1;
 /// What somebody has asked for.
 pub(super) enum Asked {
     Plan(Asker, PlanRequest),
+    Validate(Asker, ValidateRequest),
     Goal(Asker, GoalRequest),
     Cancel(Asker, CancelRequest),
     Result(Asker, ResultRequest),
@@ -29,6 +30,7 @@ pub(super) enum Asked {
 /// By what it is answered.
 pub(super) struct Services {
     pub(super) plan: Answers<PlanResponse>,
+    pub(super) validate: Answers<ValidateResponse>,
     pub(super) goal: Answers<GoalResponse>,
     pub(super) cancel: Answers<CancelResponse>,
     pub(super) result: Answers<ResultResponse>,
@@ -69,6 +71,11 @@ impl Services {
                 "planner/get_plan",
                 "plansys2_msgs::srv::dds_::GetPlan",
                 move |asker, it| ask(Asked::Plan(asker, it)),
+            )?,
+            validate: network.serve(
+                "planner/validate_domain",
+                "plansys2_msgs::srv::dds_::ValidateDomain",
+                move |asker, it| ask(Asked::Validate(asker, it)),
             )?,
             goal: network.serve(
                 &own("send_goal"),
@@ -113,6 +120,7 @@ impl Services {
     /// One could not be sent.
     pub(super) fn flush(&mut self) -> Result<(), String> {
         self.plan.flush()?;
+        self.validate.flush()?;
         self.goal.flush()?;
         self.cancel.flush()?;
         self.result.flush()?;
