@@ -29,15 +29,18 @@ ROBOTS, DOCKS = 100, 20
 def world(pace, log):
     """The world: what it is told to start lasts about as long as planned. Arrivals are noted in a file."""
     dice = random.Random(1)
-    begin = time.monotonic()
+    begin = None
     running, news, arrivals = [], [], []
 
     def now():
         return (time.monotonic() - begin) * pace
 
     for text in sys.stdin:
-        arrival = now()
         message = json.loads(text)
+        if begin is None and message["type"] != "hello":
+            # Until the plan is ready, nothing is late.
+            begin = time.monotonic()
+        arrival = now() if begin else 0
         if message["type"] == "start":
             ticket, planned = message["ticket"], message["duration"]["decimal"]
             arrivals.append((ticket, arrival))
