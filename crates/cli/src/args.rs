@@ -118,7 +118,8 @@ pub(crate) enum Command {
     Network(NetworkArgs),
     /// Write a plan's network, or its envelope, for other programs to check
     Export(Box<ExportArgs>),
-    /// Check, without any search, that an answer's box is inside the envelope and the largest there
+    /// Check, without any search, that an answer's box is inside the envelope and the largest there, or
+    /// that there is no plan
     Verify(VerifyArgs),
     /// Validate plans and answer in VAL's words, for editors and scripts that know VAL
     Val(ValArgs),
@@ -198,11 +199,18 @@ pub(crate) struct ReportArgs {
 #[derive(Args, Debug)]
 #[command(after_help = "\
 What is checked, and what is not: docs/largest-box.md; what a certificate is:
-docs/formats/certificate.md.")]
+docs/formats/certificate.md; that a problem has no plan: docs/formats/no-plan.md.")]
 pub(crate) struct VerifyArgs {
-    /// What `elbowroom envelope --method best --json` has printed
+    /// What `elbowroom envelope --method best --json` has printed, or `elbowroom plan --json` where no
+    /// plan exists
     #[arg(value_name = "ANSWER.json")]
     pub(crate) answer: PathBuf,
+    /// For an answer that no plan exists: the domain file, if it is not where the answer says
+    #[arg(value_name = "DOMAIN", requires = "problem")]
+    pub(crate) domain: Option<PathBuf>,
+    /// And the problem file
+    #[arg(value_name = "PROBLEM")]
+    pub(crate) problem: Option<PathBuf>,
     /// Print the verdict as one JSON document
     #[arg(long)]
     pub(crate) json: bool,

@@ -21,6 +21,7 @@ use elbowroom::num::{Interval, Rational};
 use elbowroom::pddl::{self, Source};
 use elbowroom::plan::{Node, Valuation};
 use elbowroom::stn::{ConsistentNetwork, NodeId};
+use elbowroom::verify::no_plan::{NoPlanAnswerError, certificate_of, verify_no_plan};
 use elbowroom::{AnyPlan, flow, plan};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -196,6 +197,51 @@ fn a_plan_is_an_answer_and_so_is_that_there_is_none() {
     assert!(none.plan.is_none() && none.answer.stop == PlanStop::Proved);
     assert!(matches!(none.answer.finding, PlanFinding::NoPlan { .. }));
     assert_stored(&none.answer);
+}
+
+#[test]
+fn an_answer_without_a_plan_carries_a_proof_or_says_why_not() {
+    let fuses = |goal: &str| {
+        let domain = "(define (domain d) (:requirements :durative-actions)
+            (:predicates (whole) (light) (free) (mended) (wet) (painted))
+            (:durative-action burn :parameters () :duration (= ?duration 5)
+              :condition (at start (whole))
+              :effect (and (at start (not (whole))) (at start (light)) (at end (not (light)))))
+            (:durative-action mend :parameters () :duration (= ?duration 3)
+              :condition (and (at start (free)) (over all (light)))
+              :effect (and (at start (not (free))) (at end (free)) (at end (mended))))
+            (:durative-action paint :parameters () :duration (= ?duration 3)
+              :condition (and (at start (free)) (over all (light)))
+              :effect (and (at start (not (free))) (at end (free)) (at end (painted)))))";
+        let problem =
+            format!("(define (problem p) (:domain d) (:init (whole) (free)) (:goal (and {goal})))");
+        let sources = (
+            Source::new("domain", domain),
+            Source::new("problem", problem),
+        );
+        Task::new(
+            pddl::read_problem(&sources.0, &sources.1)
+                .expect("no mistakes")
+                .0,
+        )
+    };
+    let asked = |goal: &str| {
+        let task = fuses(goal);
+        let mut found = planned(&task, &mut Unwatched).answer;
+        planning::certify(&mut found, &task, ["d", "p"], &mut Unwatched);
+        let written = assert_stored(&found);
+        (task, certificate_of(&written))
+    };
+    let (task, certificate) = asked("(mended) (wet)");
+    let certificate = certificate.expect("nothing gets wet");
+    assert_eq!(certificate.files, ["d", "p"]);
+    assert_eq!(verify_no_plan(&task, &certificate), Ok(()));
+    assert!(verify_no_plan(&fuses("(mended)"), &certificate).is_err());
+    // One match is not enough for both, which takes more than earliest times to see.
+    let (_, both) = asked("(mended) (painted)");
+    assert!(matches!(both, Err(NoPlanAnswerError::Uncertified(why)) if why.contains("by search")));
+    let (_, one) = asked("(mended)");
+    assert!(matches!(one, Err(NoPlanAnswerError::NotDenied)));
 }
 
 #[test]

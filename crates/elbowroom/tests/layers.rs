@@ -18,9 +18,9 @@ use toml::{Table, Value};
 const LAYERS: &[(&str, &[&str])] = &[
     ("text", &[]),
     ("num", &[]),
-    // The checker of certificates knows neither search nor what has searched.
-    ("verify", &["num"]),
     ("model", &["num"]),
+    // The checker of certificates knows neither search nor what has searched.
+    ("verify", &["num", "model"]),
     ("stn", &["num"]),
     ("network", &["text", "num", "stn"]),
     ("pddl", &["text", "num", "model"]),

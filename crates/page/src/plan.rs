@@ -146,7 +146,7 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
                 nearest(makespan)
             ))
         }
-        PlanFinding::NoPlan { reason } => bad(&format!("There is no plan: {reason}")),
+        PlanFinding::NoPlan { reason, .. } => bad(&format!("There is no plan: {reason}")),
         PlanFinding::None { reason } => Verdict {
             tone: Tone::Plain,
             words: format!("It is not known whether there is a plan: {reason}"),

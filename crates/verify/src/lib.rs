@@ -1,4 +1,5 @@
-//! Checks, without any search, that a box is inside a robustness envelope, and that none is better.
+//! Checks, without any search, that a box is inside a robustness envelope, and that none is better; and
+//! that a problem has no plan ([`no_plan`]).
 //!
 //! In: an answer of `elbowroom envelope --method best --json` ([`verify_answer`]), or its
 //! [`Certificate`] alone ([`verify`]). Out: what it proves ([`Verified`]), or the first thing in it
@@ -19,7 +20,8 @@
 //! What the network does not show, such as cuts by conditions on numbers, is in it as an assumption with
 //! its reason in words; how many there are is part of the verdict.
 //!
-//! This crate knows exact numbers, and nothing of planning, networks or search.
+//! This crate knows exact numbers, for [`no_plan`] what a planning problem means, and nothing of networks
+//! or search.
 //!
 //! Work of 10 seconds has to end while a light burns, for 5. How far may both deviate if nobody
 //! knows in advance how long they take? By 20 %, and the certificate has the cycle of bounds that
@@ -50,6 +52,7 @@ mod control;
 mod flaw;
 mod intervals;
 mod network;
+pub mod no_plan;
 mod number;
 mod probability;
 pub mod row;

@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use elbowroom::answers::RequestError;
 use elbowroom::answers::plan::{
-    BestPlanRequest, PlanAim, PlanFinding, PlanOutcome, PlanRequest, best_plan, plan, plan_with,
+    BestPlanRequest, PlanAim, PlanFinding, PlanOutcome, PlanRequest, best_plan, certify, plan,
+    plan_with,
 };
 use elbowroom::execute::SpecError;
 use elbowroom::external::Planner;
@@ -49,7 +50,7 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
         first_plan_only: arguments.first || watch.limit().is_none(),
         most_memory: arguments.memory.map(|megabytes| megabytes << 20),
     };
-    let outcome = match &planner {
+    let mut outcome = match &planner {
         None => plan(&mut request, &mut watch).map_err(unsupported)?,
         Some(planner) => {
             let limit = watch.limit();
@@ -57,6 +58,10 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
             plan_with(planner, &mut request, sources, limit, &mut watch).map_err(text::failure)?
         }
     };
+    if arguments.json {
+        let files = [domain.name(), problem.name()];
+        certify(&mut outcome.answer, &task, files, &mut watch);
+    }
     // The line on the terminal goes before the answer comes.
     drop(watch);
     print(arguments, &outcome, output)
@@ -142,7 +147,9 @@ fn print(arguments: &PlanArgs, outcome: &PlanOutcome, output: &mut Output) -> An
     }
     if arguments.json {
         output.document(answer)?;
-    } else if let PlanFinding::NoPlan { reason } | PlanFinding::None { reason } = &answer.finding {
+    } else if let PlanFinding::NoPlan { reason, .. } | PlanFinding::None { reason } =
+        &answer.finding
+    {
         output::print(&format!("{reason}\n"))?;
     } else if let (Some(plan), None) = (&plan, &arguments.output) {
         output::print(plan)?;

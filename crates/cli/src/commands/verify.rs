@@ -1,4 +1,7 @@
-//! `elbowroom verify`: is that box really inside the envelope, and the largest there?
+//! `elbowroom verify`: is that box really inside the envelope, and the largest there? Is there really
+//! no plan?
+
+mod no_plan;
 
 use elbowroom::verify::{AnswerError, Inside, Verified, verify_answer};
 use serde_json::{Value, json};
@@ -14,6 +17,15 @@ use crate::{input, number};
 pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
     let source = input::source(&arguments.answer, "answer")?;
     let name = source.name();
+    if no_plan::is_meant(source.text()) {
+        return no_plan::run(arguments, &source, output);
+    }
+    if arguments.domain.is_some() {
+        return Err(Failure::new(
+            "DOMAIN and PROBLEM are for answers of `elbowroom plan`, and this is none",
+            "leave them out: the certificate of a box has its network in it",
+        ));
+    }
     match verify_answer(source.text()) {
         Ok(verified) => {
             if arguments.json {

@@ -1,5 +1,7 @@
 //! Is there a plan?
 
+#[cfg(not(target_family = "wasm"))]
+mod certificate;
 mod external;
 mod objective;
 
@@ -14,6 +16,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Event, Exact, Halt, PlanProgress, RequestError, Version, Watcher, exact};
 
+#[cfg(not(target_family = "wasm"))]
+pub use certificate::certify;
 pub use external::{PlannerFailure, plan_with};
 pub use objective::{
     BestPlanRequest, PlanAim, PlanChoice, PlanObjective, PlanWorth, UnknownPlanObjective, best_plan,
@@ -105,6 +109,14 @@ pub enum PlanFinding {
     NoPlan {
         /// The reason.
         reason: String,
+        /// The proof for [`elbowroom_verify::no_plan`], if one was asked for ([`certify`]) and found.
+        #[cfg(not(target_family = "wasm"))]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        certificate: Option<Box<elbowroom_verify::no_plan::NoPlan>>,
+        /// Why there is no certificate, if one was asked for.
+        #[cfg(not(target_family = "wasm"))]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        uncertified: Option<String>,
     },
     /// Nothing is known.
     #[serde(rename = "none")]
@@ -218,11 +230,7 @@ pub fn plan(
         } => (Ok(found), course.stop(stopped), counts),
         Answer::Unsolvable { proof, counts } => {
             let reason = proof.to_string();
-            (
-                Err(PlanFinding::NoPlan { reason }),
-                PlanStop::Proved,
-                counts,
-            )
+            (Err(PlanFinding::no_plan(reason)), PlanStop::Proved, counts)
         }
         Answer::NoneFound { stopped, counts } => {
             let stop = course.stop(stopped);
@@ -276,6 +284,17 @@ impl Course<'_> {
 }
 
 impl PlanFinding {
+    /// No plan, and no certificate so far.
+    fn no_plan(reason: String) -> Self {
+        Self::NoPlan {
+            reason,
+            #[cfg(not(target_family = "wasm"))]
+            certificate: None,
+            #[cfg(not(target_family = "wasm"))]
+            uncertified: None,
+        }
+    }
+
     fn of(
         task: &Task,
         plan: &TimeTriggeredPlan,

@@ -120,7 +120,7 @@ fn conclude(
             );
             (Some(found.plan), finding)
         }
-        Outcome::Unsolvable { .. } => (None, PlanFinding::NoPlan { reason }),
+        Outcome::Unsolvable { .. } => (None, PlanFinding::no_plan(reason)),
         Outcome::NoneInTime
         | Outcome::Stopped
         | Outcome::GaveUp { .. }

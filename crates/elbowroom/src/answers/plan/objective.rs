@@ -202,7 +202,7 @@ pub fn best_plan(
             }
             Some(Answer::Unsolvable { proof, .. }) => {
                 let reason = proof.to_string();
-                (None, PlanFinding::NoPlan { reason }, None)
+                (None, PlanFinding::no_plan(reason), None)
             }
             _ => {
                 let reason = none_found(stop, counts, max_memory);

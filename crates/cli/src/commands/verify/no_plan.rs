@@ -1,0 +1,94 @@
+//! `elbowroom verify` of an answer that no plan exists.
+
+use std::path::PathBuf;
+
+use elbowroom::model::Task;
+use elbowroom::text::Source;
+use elbowroom::verify::no_plan::{
+    NoPlan, NoPlanAnswerError, PROVES, certificate_of, verify_no_plan,
+};
+use serde_json::{Value, json};
+
+use crate::args::{ProblemArgs, VerifyArgs};
+use crate::exit::{Answer, Exit, Failure};
+use crate::input;
+use crate::limits::push_wrapped;
+use crate::look::{BAD, GOOD, Look, styled};
+use crate::output::{self, Output};
+
+/// Whether the text is an answer of `elbowroom plan`.
+pub(super) fn is_meant(text: &str) -> bool {
+    let document: Result<Value, _> = serde_json::from_str(text);
+    document.is_ok_and(|document| document["format"] == "elbowroom-plan")
+}
+
+/// Checks the answer against its problem, and says what that proves.
+pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) -> Answer {
+    let certificate = certificate_of(source.text()).map_err(|error| {
+        let advice = match error {
+            NoPlanAnswerError::NotDenied => {
+                "only that no plan exists has to be proved; `elbowroom check` judges a plan"
+            }
+            NoPlanAnswerError::Uncertified(_) => {
+                "docs/formats/no-plan.md says for which proofs there are certificates"
+            }
+            _ => "`elbowroom plan DOMAIN PROBLEM --json` makes one",
+        };
+        Failure::new(error, advice)
+    })?;
+    let files = files(arguments, &certificate)?;
+    let task: Task = input::task(&files, &Task::default_epsilon(), output)?;
+    let verdict = verify_no_plan(&task, &certificate);
+    let problem = files.problem.display().to_string();
+    if arguments.json {
+        let mut document = json!({
+            "format": "elbowroom-verified",
+            "version": 1,
+            "proved": verdict.is_ok(),
+            "domain": files.domain.display().to_string(),
+            "problem": problem,
+        });
+        match &verdict {
+            Ok(()) => document["proves"] = json!(PROVES),
+            Err(flaw) => document["reason"] = json!(flaw.to_string()),
+        }
+        output.json(&document)?;
+    } else {
+        let (style, word) = match verdict {
+            Ok(()) => (GOOD, "proved"),
+            Err(_) => (BAD, "not proved"),
+        };
+        let mut text = format!("{}: {}\n", styled(style, word), source.name());
+        let sentence = match &verdict {
+            Ok(()) => {
+                let facts: usize = certificate.reached.iter().map(|own| own.facts.len()).sum();
+                format!(
+                    "{problem} has no plan: even if nothing that has become true were ever lost, only \
+                     {facts} facts could become true, and the goal is not among what they allow."
+                )
+            }
+            Err(flaw) => format!("{flaw}."),
+        };
+        push_wrapped(&mut text, &sentence, 2, Look::of_stdout().width);
+        output::print(&text)?;
+    }
+    Ok(if verdict.is_ok() { Exit::Yes } else { Exit::No })
+}
+
+/// The files of the problem: those that were given, or those that the answer names.
+fn files(arguments: &VerifyArgs, certificate: &NoPlan) -> Result<ProblemArgs, Failure> {
+    if let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) {
+        let (domain, problem) = (domain.clone(), problem.clone());
+        return Ok(ProblemArgs { domain, problem });
+    }
+    let [domain, problem] = &certificate.files[..] else {
+        return Err(Failure::new(
+            "the answer does not say from which files its problem was read",
+            "give them: `elbowroom verify ANSWER.json DOMAIN PROBLEM`",
+        ));
+    };
+    Ok(ProblemArgs {
+        domain: PathBuf::from(domain),
+        problem: PathBuf::from(problem),
+    })
+}

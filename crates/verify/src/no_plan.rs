@@ -1,0 +1,228 @@
+//! That a problem has no plan: facts with the times before which they cannot be true.
+//!
+//! The certificate ([`NoPlan`]) is an inductive invariant of the delete relaxation, as Bäckström, Jonsson
+//! & Ståhlberg (SoCS 2013) and Eriksson, Röger & Helmert (ICAPS 2017) use such invariants to certify that
+//! planning tasks are unsolvable, here with times. It lists facts, each with a time before which it is
+//! not true in any course of events; what it does not list is never true. The checker
+//! ([`verify_no_plan`]) confirms that
+//!
+//! - what is true at time 0, and what timed initials make true, is listed, and no later than that;
+//! - each instance of an action brings about only what is listed, and none of it too early, if its
+//!   conditions are true no earlier than listed;
+//! - the goal needs something that is not listed, or that timed initials take away for good.
+//!
+//! So the first fact that breaks the list in a course of events would have to be brought about by
+//! something of which none of this is so. The start of an action is only held to what it reads when it
+//! starts, and to what nobody but timed initials makes true: its later conditions may come true by others
+//! that start at the same time. Its end is held to all.
+//!
+//! Instances are found by trying objects for parameters one after the other; there is no search for a
+//! list, nor any for plans. Whoever makes a certificate can use the same [`Instances`].
+
+mod instances;
+mod lasting;
+mod moments;
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Task;
+use elbowroom_model::problem::{ObjectId, PredicateId};
+use elbowroom_num::Rational;
+use serde::{Deserialize, Serialize};
+
+use crate::Exact;
+pub use instances::{Breach, Instances};
+use moments::Moments;
+
+/// A predicate and its objects.
+pub type Fact = (PredicateId, Vec<ObjectId>);
+
+/// Facts, each with a time before which it is not true. What is not listed is never true.
+pub type Reached = BTreeMap<Fact, Rational>;
+
+/// The certificate that a problem has no plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NoPlan {
+    /// What it proves, in words.
+    pub proves: String,
+    /// The files that the problem was read from, as they were named: domain and problem.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub files: Vec<String>,
+    /// The facts that can become true, by time. Facts that only timed initials change are not among
+    /// them: the problem says when these hold.
+    pub reached: Vec<Group>,
+}
+
+/// Facts that are not true before some time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Group {
+    /// The time.
+    pub from: Exact,
+    /// The facts, as PDDL writes them.
+    pub facts: Vec<String>,
+}
+
+/// What every certificate of this kind proves.
+pub const PROVES: &str = "no plan exists: even if nothing that has become true were ever lost, the \
+                          goal would not be reached";
+
+/// The most instances of actions and tried objects that are looked at.
+pub const MOST_STEPS: u64 = 20_000_000;
+
+/// Why a certificate does not prove that there is no plan.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoPlanFlaw {
+    /// It says something else than it proves.
+    #[error("`proves` is not what the certificate proves")]
+    Claim,
+    /// The problem has something that the checker does not know.
+    #[error("the checker does not know {0}")]
+    Unknown(&'static str),
+    /// The problem has no such fact.
+    #[error("the problem has no fact `{0}`")]
+    NoSuchFact(String),
+    /// A fact is listed twice.
+    #[error("`{0}` is listed twice")]
+    Twice(String),
+    /// A fact can become true that is not listed, or is listed for later.
+    #[error("`{fact}` can be true at {time}, by {by}; the certificate says {said}")]
+    Breach {
+        /// The fact.
+        fact: String,
+        /// How early.
+        time: String,
+        /// What brings it about.
+        by: String,
+        /// What is listed.
+        said: String,
+    },
+    /// The goal is not out of reach.
+    #[error("by what is listed, the goal could be reached")]
+    GoalInReach,
+    /// There are too many instances of actions.
+    #[error("the problem has too many instances of actions to be checked")]
+    TooMany,
+}
+
+/// Why an answer has nothing to be checked.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoPlanAnswerError {
+    /// It is no answer of `elbowroom plan`.
+    #[error("this is no answer of `elbowroom plan --json`: {0}")]
+    Unreadable(#[from] serde_json::Error),
+    /// It does not say that there is no plan.
+    #[error("the answer does not say that no plan exists")]
+    NotDenied,
+    /// It has no certificate.
+    #[error("the answer has no certificate: {0}")]
+    Uncertified(String),
+}
+
+/// The part of an answer of `elbowroom plan` that is read.
+#[derive(Deserialize)]
+struct Answer {
+    #[allow(dead_code, reason = "read so that nothing else is taken for an answer")]
+    format: Format,
+    answer: String,
+    certificate: Option<NoPlan>,
+    uncertified: Option<String>,
+}
+
+#[derive(Deserialize)]
+enum Format {
+    #[serde(rename = "elbowroom-plan")]
+    Plan,
+}
+
+/// The certificate of an answer of `elbowroom plan --json`.
+///
+/// # Errors
+/// When it has none.
+pub fn certificate_of(answer: &str) -> Result<NoPlan, NoPlanAnswerError> {
+    let answer: Answer = serde_json::from_str(answer)?;
+    if answer.answer != "no plan" {
+        return Err(NoPlanAnswerError::NotDenied);
+    }
+    answer.certificate.ok_or_else(|| {
+        let why = answer.uncertified;
+        NoPlanAnswerError::Uncertified(why.unwrap_or_else(|| "it says not why".to_owned()))
+    })
+}
+
+/// Checks that the certificate proves that the task has no plan.
+///
+/// # Errors
+/// The first thing that is not so.
+pub fn verify_no_plan(task: &Task, certificate: &NoPlan) -> Result<(), NoPlanFlaw> {
+    if certificate.proves != PROVES {
+        return Err(NoPlanFlaw::Claim);
+    }
+    let mut instances = Instances::of(task)?;
+    let reached = listed(task, certificate)?;
+    instances.extend(&reached, MOST_STEPS)?;
+    if let Some(breach) = instances.breaches(&reached).into_iter().next() {
+        let said = reached.get(&breach.fact);
+        return Err(NoPlanFlaw::Breach {
+            fact: task
+                .problem()
+                .apply_predicate(breach.fact.0, &breach.fact.1),
+            time: breach.time.to_string(),
+            by: breach.by,
+            said: said.map_or_else(|| "never".to_owned(), |from| format!("not before {from}")),
+        });
+    }
+    if instances.is_goal_in_reach(&reached) {
+        return Err(NoPlanFlaw::GoalInReach);
+    }
+    Ok(())
+}
+
+/// The certificate of a list of facts; whether it proves anything is another question.
+pub fn no_plan_certificate(task: &Task, reached: &Reached) -> NoPlan {
+    let mut by_time: BTreeMap<&Rational, Vec<String>> = BTreeMap::new();
+    for ((predicate, objects), from) in reached {
+        let name = task.problem().apply_predicate(*predicate, objects);
+        by_time.entry(from).or_default().push(name);
+    }
+    let reached = by_time.into_iter().map(|(from, facts)| Group {
+        from: Exact(from.clone()),
+        facts,
+    });
+    NoPlan {
+        proves: PROVES.to_owned(),
+        files: Vec::new(),
+        reached: reached.collect(),
+    }
+}
+
+/// The facts that the certificate lists.
+fn listed(task: &Task, certificate: &NoPlan) -> Result<Reached, NoPlanFlaw> {
+    let mut reached = Reached::new();
+    for group in &certificate.reached {
+        for name in &group.facts {
+            let fact = fact(task, name).ok_or_else(|| NoPlanFlaw::NoSuchFact(name.clone()))?;
+            if reached.insert(fact, group.from.0.clone()).is_some() {
+                return Err(NoPlanFlaw::Twice(name.clone()));
+            }
+        }
+    }
+    Ok(reached)
+}
+
+/// The fact of that name: `(name arg …)`, or `(= (name arg …) value)` of an object function.
+fn fact(task: &Task, name: &str) -> Option<Fact> {
+    let problem = task.problem();
+    let is_bracket = |c: char| c == '(' || c == ')' || c.is_whitespace();
+    let mut words = name.split(is_bracket).filter(|word| !word.is_empty());
+    let mut first = words.next()?;
+    if first == "=" {
+        first = words.next()?;
+    }
+    let predicate = problem.predicate(first)?;
+    let objects: Option<Vec<ObjectId>> = words.map(|word| problem.object(word)).collect();
+    let objects = objects?;
+    (objects.len() == problem.predicates[predicate.index()].parameters.len())
+        .then_some((predicate, objects))
+}

@@ -1,0 +1,286 @@
+//! The instances of actions, found by trying objects for parameters, and what they bring about.
+
+use std::collections::BTreeSet;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, Body, Change, Effect};
+use elbowroom_model::problem::{self, Condition, ObjectId, SchemaId, Term};
+use elbowroom_num::Rational;
+
+use super::lasting::Lasting;
+use super::moments::HeldTo;
+use super::{Fact, Moments, NoPlanFlaw, Reached};
+
+/// A fact that can become true though it is not listed, or earlier than listed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Breach {
+    /// The fact.
+    pub fact: Fact,
+    /// How early it can become true, if what was listed is so.
+    pub time: Rational,
+    /// What brings it about, in words.
+    pub by: String,
+}
+
+/// The instances of a task's actions whose conditions can be true by some list of facts.
+#[derive(Debug)]
+pub struct Instances {
+    task: Task,
+    lasting: Lasting,
+    actions: Vec<Action>,
+    known: BTreeSet<(SchemaId, Vec<ObjectId>)>,
+    /// For each schema the atoms that its instances need when they start, or that nobody but timed
+    /// initials makes true, and pairs of terms that have to be the same object, or different ones.
+    needs: Vec<(Vec<problem::Atom>, Vec<(Term, Term, bool)>)>,
+}
+
+impl Instances {
+    /// None so far.
+    ///
+    /// # Errors
+    /// When the task has what this checker does not know.
+    pub fn of(task: &Task) -> Result<Self, NoPlanFlaw> {
+        if let Some(feature) = task.left_to_the_judge() {
+            return Err(NoPlanFlaw::Unknown(feature));
+        }
+        // Numbers of facts that only the checker mentions are its own.
+        let task = task.with_own_table();
+        let lasting = Lasting::of(&task);
+        let schemas = task.problem().schemas.iter();
+        let needs = schemas.map(|schema| needs(schema, &lasting)).collect();
+        Ok(Self {
+            lasting,
+            actions: Vec::new(),
+            known: BTreeSet::new(),
+            needs,
+            task,
+        })
+    }
+
+    /// Adds those that become possible by the list.
+    ///
+    /// # Errors
+    /// [`NoPlanFlaw::TooMany`] after so many tries.
+    pub fn extend(&mut self, reached: &Reached, most_steps: u64) -> Result<(), NoPlanFlaw> {
+        let mut steps = most_steps;
+        for number in 0..self.needs.len() {
+            let mut binding = Vec::new();
+            self.bind(SchemaId::from(number), reached, &mut binding, &mut steps)?;
+        }
+        Ok(())
+    }
+
+    /// Tries the objects of the next parameter.
+    fn bind(
+        &mut self,
+        schema: SchemaId,
+        reached: &Reached,
+        binding: &mut Vec<ObjectId>,
+        steps: &mut u64,
+    ) -> Result<(), NoPlanFlaw> {
+        *steps = steps.checked_sub(1).ok_or(NoPlanFlaw::TooMany)?;
+        if !self.may_be_bound(schema, reached, binding) {
+            return Ok(());
+        }
+        let parameters = &self.task.problem().schemas[schema.index()].parameters;
+        let Some(parameter) = parameters.get(binding.len()) else {
+            if self.known.insert((schema, binding.clone()))
+                && let Ok(action) = self.task.instantiate(schema, binding)
+            {
+                self.actions.push(action);
+            }
+            return Ok(());
+        };
+        let objects: Vec<ObjectId> = self.task.problem().objects_of(&parameter.types).collect();
+        for object in objects {
+            binding.push(object);
+            self.bind(schema, reached, binding, steps)?;
+            binding.pop();
+        }
+        Ok(())
+    }
+
+    /// Whether no need that the last bound parameter completes is out of reach.
+    fn may_be_bound(&self, schema: SchemaId, reached: &Reached, binding: &[ObjectId]) -> bool {
+        let (atoms, pairs) = &self.needs[schema.index()];
+        let object = |term: &Term| match term {
+            Term::Variable(variable) => binding.get(*variable).copied(),
+            Term::Object(object) => Some(*object),
+        };
+        let are_bound = pairs.iter().all(|(left, right, is_same)| {
+            let both = object(left).zip(object(right));
+            both.is_none_or(|(left, right)| (left == right) == *is_same)
+        });
+        are_bound
+            && atoms.iter().all(|atom| {
+                let objects: Option<Vec<ObjectId>> = atom.arguments.iter().map(object).collect();
+                let Some(objects) = objects else { return true };
+                let fact = (atom.predicate, objects);
+                match self.lasting.spans(&fact) {
+                    Some(spans) => !spans.is_empty(),
+                    None => reached.contains_key(&fact),
+                }
+            })
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.actions.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.actions.is_empty()
+    }
+
+    /// All that breaks the list, the earliest time of each fact. A list without any that has all
+    /// instances is an invariant.
+    pub fn breaches(&self, reached: &Reached) -> Vec<Breach> {
+        let mut breaches = Vec::new();
+        let mut note = |fact: Fact, time: &Rational, by: &dyn Fn() -> String| {
+            let is_listed = reached.get(&fact).is_some_and(|from| from <= time);
+            if !is_listed && self.lasting.spans(&fact).is_none() {
+                let (time, by) = (time.clone(), by());
+                breaches.push(Breach { fact, time, by });
+            }
+        };
+        for &fact in &self.task.initial().facts {
+            let by = || "the initial state".to_owned();
+            note(self.task.atom(fact), &Rational::ZERO, &by);
+        }
+        for happening in self.task.timed() {
+            for change in &happening.changes {
+                if let Change::Add(fact) = change {
+                    let by = || "a timed initial".to_owned();
+                    note(self.task.atom(*fact), &happening.time, &by);
+                }
+            }
+        }
+        let moments = self.moments(reached);
+        for action in &self.actions {
+            for (fact, time) in brought_about(&moments, action) {
+                note(fact, &time, &|| format!("`{}`", action.name));
+            }
+        }
+        for rule in self.task.rules().iter() {
+            if let Some(time) = moments.next(&rule.body, &Rational::ZERO, HeldTo::All) {
+                note(self.task.atom(rule.head), &time, &|| "a rule".to_owned());
+            }
+        }
+        breaches
+    }
+
+    /// Whether the list leaves the goal within reach.
+    pub fn is_goal_in_reach(&self, reached: &Reached) -> bool {
+        self.moments(reached).can_hold_in_the_end(self.task.goal())
+    }
+
+    fn moments<'a>(&'a self, reached: &'a Reached) -> Moments<'a> {
+        Moments {
+            task: &self.task,
+            lasting: &self.lasting,
+            reached,
+        }
+    }
+}
+
+/// What an action makes true, and when at the earliest.
+fn brought_about(moments: &Moments<'_>, action: &Action) -> Vec<(Fact, Rational)> {
+    let mut facts = Vec::new();
+    let mut add = |effects: &[Effect], start: &Rational, time: &Rational| {
+        for effect in effects {
+            let Change::Add(fact) = effect.change else {
+                continue;
+            };
+            let guard = &effect.guard;
+            let reads = moments.next(&guard.at_start, start, HeldTo::All);
+            let happens = moments.next(&guard.now, time, HeldTo::All);
+            if let (Some(_), Some(time)) = (reads, happens) {
+                facts.push((moments.task.atom(fact), time));
+            }
+        }
+    };
+    match &action.body {
+        Body::Instantaneous(snap) => {
+            if let Some(time) = moments.instant(snap) {
+                add(&snap.effects, &time, &time);
+            }
+        }
+        Body::Durative(body) => {
+            if let Some((start, _)) = moments.ends(body, HeldTo::Lasting) {
+                add(&body.start.effects, &start, &start);
+            }
+            if let Some((start, end)) = moments.ends(body, HeldTo::All) {
+                add(&body.end.effects, &start, &end);
+            }
+        }
+    }
+    facts
+}
+
+/// See [`Instances::needs`].
+fn needs(
+    schema: &problem::Schema,
+    lasting: &Lasting,
+) -> (Vec<problem::Atom>, Vec<(Term, Term, bool)>) {
+    let (mut atoms, mut pairs) = (Vec::new(), Vec::new());
+    match &schema.body {
+        problem::Body::Instantaneous { condition, .. } => {
+            collect(condition, &|_| true, &mut atoms, &mut pairs);
+        }
+        problem::Body::Durative {
+            at_start,
+            over_all,
+            at_end,
+            ..
+        } => {
+            collect(at_start, &|_| true, &mut atoms, &mut pairs);
+            // Over an action that may take no time, nothing is needed; so that is left to the instances.
+            let is_fixed = |atom: &problem::Atom| lasting.is_fixed(atom.predicate);
+            collect(at_end, &is_fixed, &mut atoms, &mut pairs);
+            if takes_time(schema) {
+                collect(over_all, &is_fixed, &mut atoms, &mut pairs);
+            }
+        }
+    }
+    (atoms, pairs)
+}
+
+/// Whether a constant bound says that all instances take time.
+fn takes_time(schema: &problem::Schema) -> bool {
+    let problem::Body::Durative { duration, .. } = &schema.body else {
+        return false;
+    };
+    duration.iter().any(|constraint| {
+        let is_lower = !matches!(
+            constraint.comparison,
+            problem::Comparison::AtMost | problem::Comparison::Less
+        );
+        matches!(&constraint.bound, problem::Expression::Constant(bound)
+            if is_lower && *bound > Rational::ZERO)
+    })
+}
+
+/// The conjuncts that are atoms of some kind, or compare objects.
+fn collect(
+    condition: &Condition,
+    counts: &dyn Fn(&problem::Atom) -> bool,
+    atoms: &mut Vec<problem::Atom>,
+    pairs: &mut Vec<(Term, Term, bool)>,
+) {
+    match condition {
+        Condition::And(parts) => {
+            for part in parts {
+                collect(part, counts, atoms, pairs);
+            }
+        }
+        Condition::Atom(atom) if counts(atom) => atoms.push(atom.clone()),
+        Condition::Equal(left, right) => pairs.push((*left, *right, true)),
+        Condition::Not(part) => {
+            if let Condition::Equal(left, right) = &**part {
+                pairs.push((*left, *right, false));
+            }
+        }
+        _ => {}
+    }
+}

@@ -1,0 +1,161 @@
+//! What the problem itself says for good: facts that only timed initials change, and numbers that
+//! nothing changes.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Change, Expression};
+use elbowroom_model::problem::{self, Body, FunctionId, PredicateId};
+use elbowroom_num::Rational;
+
+use super::Fact;
+
+/// From when until when a fact may be true; `None`: for ever.
+pub(super) type Span = (Rational, Option<Rational>);
+
+/// See the module.
+#[derive(Debug)]
+pub(super) struct Lasting {
+    /// The predicates that some action or rule can make true.
+    made: BTreeSet<PredicateId>,
+    /// The predicates that some action or timed initial can make false, and those of rules.
+    lost: BTreeSet<PredicateId>,
+    /// The functions whose values change.
+    changing: BTreeSet<FunctionId>,
+    /// For facts that only timed initials make true, when they may hold. No other such facts do.
+    spans: BTreeMap<Fact, Vec<Span>>,
+}
+
+impl Lasting {
+    pub(super) fn of(task: &Task) -> Self {
+        let mut lasting = Self {
+            made: BTreeSet::new(),
+            lost: BTreeSet::new(),
+            changing: BTreeSet::new(),
+            spans: BTreeMap::new(),
+        };
+        let problem = task.problem();
+        for schema in &problem.schemas {
+            match &schema.body {
+                Body::Instantaneous { effects, .. } => lasting.note(effects),
+                Body::Durative {
+                    start_effects,
+                    end_effects,
+                    continuous,
+                    ..
+                } => {
+                    lasting.note(start_effects);
+                    lasting.note(end_effects);
+                    let functions = continuous.iter().map(|effect| effect.fluent.function);
+                    lasting.changing.extend(functions);
+                }
+            }
+        }
+        for rule in &problem.rules {
+            lasting.made.insert(rule.predicate);
+            lasting.lost.insert(rule.predicate);
+        }
+        lasting.follow_timed(task);
+        lasting
+    }
+
+    fn note(&mut self, effects: &[problem::Effect]) {
+        for effect in effects {
+            match &effect.change {
+                problem::Change::Add(atom) => self.made.insert(atom.predicate),
+                problem::Change::Delete(atom) => self.lost.insert(atom.predicate),
+                problem::Change::Update { fluent, .. } => self.changing.insert(fluent.function),
+            };
+        }
+    }
+
+    fn follow_timed(&mut self, task: &Task) {
+        for &fact in &task.initial().facts {
+            self.begin(task.atom(fact), &Rational::ZERO);
+        }
+        for happening in task.timed() {
+            // What is deleted and added at one time is true.
+            for change in &happening.changes {
+                if let Change::Delete(fact) = change {
+                    let fact = task.atom(*fact);
+                    self.lost.insert(fact.0);
+                    if let Some((_, until)) = self.spans.get_mut(&fact).and_then(|s| s.last_mut()) {
+                        until.get_or_insert_with(|| happening.time.clone());
+                    }
+                }
+            }
+            for change in &happening.changes {
+                match change {
+                    Change::Add(fact) => self.begin(task.atom(*fact), &happening.time),
+                    Change::Update { fluent, .. } => {
+                        self.changing.insert(task.function_of(*fluent));
+                    }
+                    Change::Delete(_) => {}
+                }
+            }
+        }
+    }
+
+    fn begin(&mut self, fact: Fact, time: &Rational) {
+        if self.made.contains(&fact.0) {
+            return;
+        }
+        let spans = self.spans.entry(fact).or_default();
+        match spans.last_mut() {
+            // Of a deletion and an addition at one time, the addition wins.
+            Some((_, until)) if until.as_ref() == Some(time) => *until = None,
+            Some((_, None)) => {}
+            _ => spans.push((time.clone(), None)),
+        }
+    }
+
+    /// When a fact may hold, if only timed initials make facts of its kind true.
+    pub(super) fn spans(&self, fact: &Fact) -> Option<&[Span]> {
+        if self.made.contains(&fact.0) {
+            return None;
+        }
+        Some(self.spans.get(fact).map_or(&[], Vec::as_slice))
+    }
+
+    /// Whether only timed initials make facts of the predicate true.
+    pub(super) fn is_fixed(&self, predicate: PredicateId) -> bool {
+        !self.made.contains(&predicate)
+    }
+
+    /// Whether the fact is true at all times.
+    pub(super) fn is_always_true(&self, task: &Task, fact: &Fact) -> bool {
+        let found = task.find_fact(fact.0, &fact.1);
+        let is_true = found.is_some_and(|found| task.initial().facts.contains(&found));
+        is_true && !self.lost.contains(&fact.0)
+    }
+
+    /// What is known of the value of an expression.
+    pub(super) fn value(&self, task: &Task, expression: &Expression) -> Value {
+        let mut is_open = false;
+        let value = expression.evaluate(&mut |leaf| match leaf {
+            Expression::Fluent(fluent) if !self.changing.contains(&task.function_of(*fluent)) => {
+                task.initial().values.get(fluent).cloned()
+            }
+            _ => {
+                is_open = true;
+                None
+            }
+        });
+        match value {
+            Some(value) => Value::Known(value),
+            None if is_open => Value::Open,
+            None => Value::Undefined,
+        }
+    }
+}
+
+/// What the problem says of the value of an expression.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Value {
+    /// It is this at all times.
+    Known(Rational),
+    /// It has none at any time; nothing that reads it holds.
+    Undefined,
+    /// It may be any.
+    Open,
+}

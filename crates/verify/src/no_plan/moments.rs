@@ -1,0 +1,201 @@
+//! The earliest times at which conditions can hold, by a list of facts.
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Condition, DurativeBody, SnapAction};
+use elbowroom_model::problem::Comparison;
+use elbowroom_num::Rational;
+
+use super::lasting::{Lasting, Span, Value};
+use super::{Fact, Reached};
+
+/// What a condition is held to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum HeldTo {
+    /// The list, and what the problem says.
+    All,
+    /// What the problem says for good.
+    Lasting,
+}
+
+/// See the module.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moments<'a> {
+    pub(super) task: &'a Task,
+    pub(super) lasting: &'a Lasting,
+    pub(super) reached: &'a Reached,
+}
+
+impl Moments<'_> {
+    /// The earliest time, not before `time`, at which a condition can hold; `None` if it never can.
+    pub(super) fn next(
+        &self,
+        condition: &Condition,
+        time: &Rational,
+        held_to: HeldTo,
+    ) -> Option<Rational> {
+        self.next_while(condition, time, &Rational::ZERO, held_to)
+    }
+
+    /// The earliest time, not before `time`, from which a condition can hold for so long.
+    fn next_while(
+        &self,
+        condition: &Condition,
+        time: &Rational,
+        length: &Rational,
+        held_to: HeldTo,
+    ) -> Option<Rational> {
+        match condition {
+            Condition::Fact(fact) => {
+                let fact = self.task.atom(*fact);
+                self.next_of_fact(&fact, time, length, held_to)
+            }
+            Condition::And(parts) => {
+                let mut least = time.clone();
+                loop {
+                    let before = least.clone();
+                    for part in parts {
+                        least = self.next_while(part, &least, length, held_to)?;
+                    }
+                    // Each round but the last goes on to the beginning of some span.
+                    if least == before {
+                        return Some(least);
+                    }
+                }
+            }
+            // It may hold by one part after the other.
+            Condition::Or(parts) => {
+                let times = parts
+                    .iter()
+                    .filter_map(|part| self.next(part, time, held_to));
+                times.min()
+            }
+            Condition::Compare(comparison, left, right) => {
+                let sides = [left, right].map(|side| self.lasting.value(self.task, side));
+                let can_hold = match sides {
+                    [Value::Known(left), Value::Known(right)] => comparison.holds(&left, &right),
+                    [Value::Undefined, _] | [_, Value::Undefined] => false,
+                    _ => true,
+                };
+                can_hold.then(|| time.clone())
+            }
+            Condition::Not(part) => (!self.is_always_true(part)).then(|| time.clone()),
+        }
+    }
+
+    fn next_of_fact(
+        &self,
+        fact: &Fact,
+        time: &Rational,
+        length: &Rational,
+        held_to: HeldTo,
+    ) -> Option<Rational> {
+        if let Some(spans) = self.lasting.spans(fact) {
+            return spans.iter().find_map(|(from, until)| {
+                let least = Rational::max(from.clone(), time.clone());
+                let end = &least + length;
+                until
+                    .as_ref()
+                    .is_none_or(|until| end <= *until)
+                    .then_some(least)
+            });
+        }
+        match held_to {
+            HeldTo::Lasting => Some(time.clone()),
+            HeldTo::All => {
+                let from = self.reached.get(fact)?;
+                Some(Rational::max(from.clone(), time.clone()))
+            }
+        }
+    }
+
+    /// Whether the problem itself says that a condition holds at all times.
+    fn is_always_true(&self, condition: &Condition) -> bool {
+        match condition {
+            Condition::Fact(fact) => self
+                .lasting
+                .is_always_true(self.task, &self.task.atom(*fact)),
+            Condition::And(parts) => parts.iter().all(|part| self.is_always_true(part)),
+            Condition::Or(parts) => parts.iter().any(|part| self.is_always_true(part)),
+            Condition::Compare(comparison, left, right) => {
+                let sides = [left, right].map(|side| self.lasting.value(self.task, side));
+                matches!(sides, [Value::Known(left), Value::Known(right)] if comparison.holds(&left, &right))
+            }
+            Condition::Not(part) => self.never_holds(part),
+        }
+    }
+
+    /// Whether the problem itself says that a condition holds at no time.
+    fn never_holds(&self, condition: &Condition) -> bool {
+        self.next(condition, &Rational::ZERO, HeldTo::Lasting)
+            .is_none()
+    }
+
+    /// Whether a condition can hold when all timed initials have happened.
+    pub(super) fn can_hold_in_the_end(&self, condition: &Condition) -> bool {
+        match condition {
+            Condition::Fact(fact) => {
+                let fact = self.task.atom(*fact);
+                let lasts = |spans: &[Span]| spans.last().is_some_and(|span| span.1.is_none());
+                let spans = self.lasting.spans(&fact);
+                spans.map_or_else(|| self.reached.contains_key(&fact), lasts)
+            }
+            Condition::And(parts) => parts.iter().all(|part| self.can_hold_in_the_end(part)),
+            Condition::Or(parts) => parts.iter().any(|part| self.can_hold_in_the_end(part)),
+            Condition::Compare(..) | Condition::Not(_) => {
+                self.next(condition, &Rational::ZERO, HeldTo::All).is_some()
+            }
+        }
+    }
+
+    /// The earliest time of an instant.
+    pub(super) fn instant(&self, snap: &SnapAction) -> Option<Rational> {
+        self.next(&snap.condition, &Rational::ZERO, HeldTo::All)
+    }
+
+    /// The earliest start and end of a durative action, its later conditions being held to that.
+    pub(super) fn ends(&self, body: &DurativeBody, later: HeldTo) -> Option<(Rational, Rational)> {
+        let (least, most) = self.duration(body)?;
+        let mut start = Rational::ZERO;
+        loop {
+            let before = start.clone();
+            start = self.next(&body.start.condition, &start, HeldTo::All)?;
+            // An action that may take no time has no moment in between.
+            if least > Rational::ZERO {
+                start = self.next_while(&body.over_all, &start, &least, later)?;
+            }
+            let end = self.next(&body.end.condition, &(&start + &least), later)?;
+            if let Some(most) = &most {
+                start = Rational::max(start, &end - most);
+            }
+            if start == before {
+                return Some((start, end));
+            }
+        }
+    }
+
+    /// The least and the greatest duration, as far as they do not change; `None` if there is none.
+    fn duration(&self, body: &DurativeBody) -> Option<(Rational, Option<Rational>)> {
+        let (mut least, mut most) = (Rational::ZERO, None::<Rational>);
+        for constraint in &body.duration {
+            let bound = match self.lasting.value(self.task, &constraint.bound) {
+                Value::Known(bound) => bound,
+                Value::Undefined => return None,
+                Value::Open => continue,
+            };
+            if !matches!(constraint.comparison, Comparison::AtMost | Comparison::Less) {
+                least = Rational::max(least, bound.clone());
+            }
+            if !matches!(
+                constraint.comparison,
+                Comparison::AtLeast | Comparison::Greater
+            ) {
+                most = Some(match most {
+                    Some(most) => Rational::min(most, bound),
+                    None => bound,
+                });
+            }
+        }
+        let is_possible = most.as_ref().is_none_or(|most| least <= *most);
+        is_possible.then_some((least, most))
+    }
+}
