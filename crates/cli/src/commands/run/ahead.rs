@@ -139,3 +139,6 @@ fn renumbered(
     let steps = steps.collect::<Option<Vec<_>>>()?;
     Some(TimeTriggeredPlan { steps })
 }
+
+#[cfg(test)]
+mod tests;
