@@ -1,5 +1,5 @@
 //! Whole envelopes as the authors published them: formulas over the parameters, true exactly where
-//! the plan works. Our box check must agree with them, point by point.
+//! the plan works. Our box check and our exact region must agree with them, point by point.
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
@@ -7,8 +7,11 @@ mod shared;
 
 use std::path::Path;
 
+use elbowroom::AnyPlan;
+use elbowroom::answers::region::{RegionSettings, region};
+use elbowroom::answers::{EnvelopeRequest, Unwatched};
 use elbowroom_num::Rational;
-use elbowroom_plan::DecoupledEnvelope;
+use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan};
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -196,13 +199,21 @@ fn every_published_region_is_ours_point_by_point() {
     assert!(regions >= 20);
 }
 
-/// Asks both about points near the borders. How many are inside, and how many outside.
+/// Asks all three about points near the borders, as many as `ELBOWROOM_POINTS` says. How many are inside, and how
+/// many outside.
 fn compared(case: &Case, formula: &Formula<'_>) -> [usize; 2] {
-    const POINTS: usize = 200;
+    let points = std::env::var("ELBOWROOM_POINTS");
+    let points = points.map_or(200, |count| count.parse().expect("a number"));
+    let plan: AnyPlan = ParametrizedPlan::clone(&case.plan).into();
+    let request = EnvelopeRequest::new(&case.task, plan);
+    let outcome = region(&request, &RegionSettings::default(), &mut Unwatched);
+    let outcome = outcome.expect("within exact reasoning");
+    let own = outcome.plan.expect("a plan");
+    let whole = outcome.region.expect("a region");
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut oracle = case.oracle();
     let mut counts = [0, 0];
-    for _ in 0..POINTS {
+    for _ in 0..points {
         let point = near_borders(case, formula, &mut rng);
         let expected = formula.holds(&|name| {
             let id = case.plan.find(name).expect("a parameter of the plan");
@@ -211,6 +222,11 @@ fn compared(case: &Case, formula: &Formula<'_>) -> [usize; 2] {
         let envelope = DecoupledEnvelope::point(&point.iter().cloned().collect());
         let objection = oracle.objection(&envelope).expect("within reach");
         assert_eq!(objection.is_none(), expected, "{point:?}: {objection:?}");
+        let value = |id: ParameterId| {
+            let of = case.plan.find(&own.parameters[id.index()].name);
+            point[of.expect("the same parameters").index()].clone()
+        };
+        assert_eq!(whole.contains(&value), expected, "{point:?}: {whole:#?}");
         counts[usize::from(!expected)] += 1;
     }
     counts
