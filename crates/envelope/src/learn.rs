@@ -113,7 +113,7 @@ pub(crate) fn without_strategy(plan: &ParametrizedPlan, envelope: &DecoupledEnve
         let Some(lengths) = reader.lengths(way, &mut rows) else {
             return Learnt::Unknown;
         };
-        total = sums(&total, &lengths);
+        total = sums(total, &lengths);
         if total.len() + rows.len() > MOST_ROWS {
             return Learnt::Unknown;
         }
@@ -157,7 +157,7 @@ pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledE
                 ProofPart::Late(network.links[link.index()]),
             ),
         };
-        total = total.plus(&ends);
+        total.add(&ends);
         parts.push(part);
     }
     learnt(vec![total], Ground::Fixed(parts), envelope)
@@ -181,7 +181,14 @@ fn learnt(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope)
 }
 
 /// All sums of one of these and one of those.
-fn sums(some: &[Ends], others: &[Ends]) -> Vec<Ends> {
+fn sums(mut some: Vec<Ends>, others: &[Ends]) -> Vec<Ends> {
+    if let [other] = others {
+        // So it is nearly always, and a way may have thousands of parts.
+        for one in &mut some {
+            one.add(other);
+        }
+        return some;
+    }
     let sums = some
         .iter()
         .flat_map(|one| others.iter().map(move |other| one.plus(other)));
@@ -291,7 +298,7 @@ impl Reader<'_> {
                 Part::Late(link) => vec![self.link(*link, Side::Upper)],
                 Part::Way(way) => self.lengths(way, legal)?,
             };
-            lengths = sums(&lengths, &own);
+            lengths = sums(lengths, &own);
             if lengths.len() + legal.len() > MOST_ROWS {
                 return None;
             }

@@ -31,15 +31,12 @@ impl Ends {
         }
     }
 
-    /// The sum.
-    #[must_use]
-    pub fn plus(&self, other: &Self) -> Self {
-        let mut sum = self.clone();
-        sum.constant += &other.constant;
+    /// Adds a sum to this one.
+    pub fn add_sum(&mut self, other: &Self) {
+        self.constant += &other.constant;
         for (end, factor) in &other.factors {
-            sum.add(*end, factor);
+            self.add(*end, factor);
         }
-        sum
     }
 
     /// Lets an end count so many times more.

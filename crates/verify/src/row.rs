@@ -164,7 +164,7 @@ impl Reader<'_> {
                 1.. => 2 * parameter,
                 _ => 2 * parameter + 1,
             };
-            sum = sum.plus(&Ends::end(end, count));
+            sum.add_sum(&Ends::end(end, count));
         }
         Ok(sum)
     }
@@ -219,7 +219,7 @@ impl Reader<'_> {
         let mut sum = Ends::default();
         let mut way: Option<(usize, usize)> = None;
         for part in parts {
-            sum = sum.plus(&self.requirement(part)?);
+            sum.add_sum(&self.requirement(part)?);
             let (from, to) = self.points(part)?;
             let (to_root, to_links) = self.chain(to)?;
             let (from_root, from_links) = self.chain(from)?;
@@ -229,10 +229,10 @@ impl Reader<'_> {
                 .take_while(|(one, other)| one == other)
                 .count();
             for &link in &from_links[shared..] {
-                sum = sum.plus(&Ends::end(2 * self.observed(link)?.1, 1));
+                sum.add_sum(&Ends::end(2 * self.observed(link)?.1, 1));
             }
             for &link in &to_links[shared..] {
-                sum = sum.plus(&Ends::end(2 * self.observed(link)?.1 + 1, -1));
+                sum.add_sum(&Ends::end(2 * self.observed(link)?.1 + 1, -1));
             }
             way = match way {
                 None => Some((from_root, to_root)),
@@ -261,8 +261,8 @@ impl Reader<'_> {
                 return Err(Flaw::Rule);
             }
             let lengths = self.lengths(way, &mut legal)?;
-            total = all_sums(&total, &lengths)?;
-            flat = flat.plus(&self.flat(way)?);
+            total = all_sums(total, &lengths)?;
+            flat.add_sum(&self.flat(way)?);
         }
         if !flat.tears() {
             // At these ends, one for each parameter, the network has no schedule at all.
@@ -276,7 +276,7 @@ impl Reader<'_> {
     fn flat(&self, way: &Way) -> Result<Ends, Flaw> {
         let mut sum = Ends::default();
         for part in &way.parts {
-            sum = sum.plus(&match part {
+            sum.add_sum(&match part {
                 Part::Early(index) => Ends::end(2 * self.observed(*index)?.1, 1),
                 Part::Late(index) => Ends::end(2 * self.observed(*index)?.1 + 1, -1),
                 Part::Way(way) => self.flat(self.way(*way)?)?,
@@ -317,7 +317,7 @@ impl Reader<'_> {
                 }
                 requirement => vec![self.requirement(requirement)?],
             };
-            lengths = all_sums(&lengths, &own)?;
+            lengths = all_sums(lengths, &own)?;
             if legal.len() > MOST_SUMS {
                 return Err(Flaw::TooLong);
             }
@@ -333,12 +333,23 @@ impl Reader<'_> {
 }
 
 /// All sums of one of these and one of those.
-fn all_sums(some: &[Ends], others: &[Ends]) -> Result<Vec<Ends>, Flaw> {
+fn all_sums(mut some: Vec<Ends>, others: &[Ends]) -> Result<Vec<Ends>, Flaw> {
     if some.len() * others.len() > MOST_SUMS {
         return Err(Flaw::TooLong);
     }
-    let sums = some
-        .iter()
-        .flat_map(|one| others.iter().map(move |other| one.plus(other)));
+    if let [other] = others {
+        // So it is nearly always, and a way may have thousands of parts.
+        for one in &mut some {
+            one.add_sum(other);
+        }
+        return Ok(some);
+    }
+    let sums = some.iter().flat_map(|one| {
+        others.iter().map(move |other| {
+            let mut sum = one.clone();
+            sum.add_sum(other);
+            sum
+        })
+    });
     Ok(sums.collect())
 }
