@@ -30,7 +30,10 @@
 //! Neither takes for granted that being earlier never hurts. Where it does not (no condition asks
 //! for something to be false), fewer cases are looked at.
 //!
-//! The cells are halved until the bounds are close enough, or there are too many states.
+//! The cells are halved until the bounds are close enough, or there are too many states. Where more
+//! facts are never worse, the bound from above is then taken on finer grids of a *kinder* world
+//! ([`kinder`]): one in which what may happen at one time or another, and does nothing but harm,
+//! never happens. It has fewer states, and whoever succeeds in the real world does so in it.
 //! Probabilities are floating-point numbers; the bounds are widened by 1e-9, far more than rounding
 //! adds up to.
 
@@ -40,6 +43,7 @@ mod chances;
 mod compile;
 mod failures;
 mod graph;
+mod kinder;
 mod policy;
 mod world;
 
@@ -154,6 +158,24 @@ pub fn optimum(
     goes_on: &dyn Fn() -> bool,
 ) -> Result<TimedOptimum, NotTabulated> {
     let world = TimedWorld::new(task, model, settings)?;
+    let mut found = refined(&world, settings, &|_| true, goes_on)?;
+    if found.stop == Stop::TooManyStates
+        && let Some(kinder) = world.without_chances_of_harm()
+    {
+        let cells = settings.first_cells.max(1) << found.grids.len();
+        let upper = kinder::bound_from(&kinder, cells, found.lower, settings, goes_on)?;
+        found.upper = found.upper.min(upper);
+    }
+    Ok(found)
+}
+
+/// Finer and finer grids of a world. `is_promising` is asked after each whether to go on.
+fn refined(
+    world: &TimedWorld,
+    settings: &Settings,
+    is_promising: &dyn Fn(&[Grid]) -> bool,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<TimedOptimum, NotTabulated> {
     let mut answer = TimedOptimum {
         lower: 0.0,
         upper: 1.0,
@@ -162,7 +184,7 @@ pub fn optimum(
     };
     let mut cells = settings.first_cells.max(1);
     loop {
-        match grid(&world, cells, settings, goes_on)? {
+        match grid(world, cells, settings, goes_on)? {
             Ok(grid) => {
                 answer.lower = answer.lower.max(grid.lower);
                 answer.upper = answer.upper.min(grid.upper);
@@ -174,6 +196,10 @@ pub fn optimum(
             }
         }
         if answer.upper - answer.lower <= settings.gap {
+            return Ok(answer);
+        }
+        if !is_promising(&answer.grids) {
+            answer.stop = Stop::TooManyStates;
             return Ok(answer);
         }
         cells *= 2;
@@ -210,28 +236,39 @@ fn grid(
     if cells >= usize::from(u16::MAX) {
         return Ok(Err(Stop::TooManyStates));
     }
-    let step = step(world, cells);
     let mut left = settings.most_states;
-    let mut bound = |side| -> Result<Result<f64, Stop>, NotTabulated> {
-        let chances = chances(world, cells, side)?;
-        let value = match side {
-            Side::Above => graph::value(&above::Above::new(world, &chances), &mut left, goes_on),
-            Side::Below => graph::value(&below::Below::new(world, &chances), &mut left, goes_on),
-        };
-        Ok(value)
-    };
-    let upper = match bound(Side::Above)? {
-        Ok(value) => (value + SLACK).min(1.0),
+    let upper = match bound(world, (cells, Side::Above), &mut left, goes_on)? {
+        Ok(value) => value,
         Err(why) => return Ok(Err(why)),
     };
-    let lower = match bound(Side::Below)? {
-        Ok(value) => (value - SLACK).max(0.0),
+    let lower = match bound(world, (cells, Side::Below), &mut left, goes_on)? {
+        Ok(value) => value,
         Err(why) => return Ok(Err(why)),
     };
     Ok(Ok(Grid {
-        step,
+        step: step(world, cells),
         lower,
         upper,
         states: settings.most_states - left,
     }))
+}
+
+/// A bound on one grid. `left` is how many states there may still be.
+fn bound(
+    world: &TimedWorld,
+    (cells, side): (usize, Side),
+    left: &mut usize,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Result<f64, Stop>, NotTabulated> {
+    let chances = chances(world, cells, side)?;
+    Ok(match side {
+        Side::Above => {
+            let value = graph::value(&above::Above::new(world, &chances), left, goes_on);
+            value.map(|value| (value + SLACK).min(1.0))
+        }
+        Side::Below => {
+            let value = graph::value(&below::Below::new(world, &chances), left, goes_on);
+            value.map(|value| (value - SLACK).max(0.0))
+        }
+    })
 }

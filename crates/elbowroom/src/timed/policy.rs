@@ -10,7 +10,7 @@ use super::below::{Below, Move, moves};
 use super::chances::Chances;
 use super::graph::{Expansion, Hopes, Phase, Running, State, Tolls, explored, settled, worth};
 use super::world::{Facts, TimedWorld};
-use super::{NotTabulated, Settings, Side, TimedOptimum, optimum};
+use super::{Grid, NotTabulated, Settings, Side, TimedOptimum, refined};
 
 /// The values of all states on the grid of the bound from below, by which each move can be weighed.
 ///
@@ -34,9 +34,36 @@ const CLOSE: f64 = 0.02;
 /// How much of a probability is given at most for being earlier.
 const HASTE: f64 = 1e-4;
 
+/// Whether the bounds are close enough to go by the policy: on a coarse grid, whoever decides only at
+/// the boundaries of cells loses much that others do not.
+fn is_close(optimum: &TimedOptimum) -> bool {
+    optimum.upper - optimum.lower <= CLOSE
+}
+
+/// Whether the bounds may get close before there are too many states, if each further grid halves what
+/// is between them, and has as many times the states of the one before as the last one has.
+fn may_get_close(grids: &[Grid], most_states: usize) -> bool {
+    #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
+    let states = |grid: &Grid| grid.states.max(1) as f64;
+    let Some(last) = grids.last() else {
+        return true;
+    };
+    let before = grids.len().checked_sub(2).map(|place| &grids[place]);
+    let growth = before.map_or(2.0, |before| (states(last) / states(before)).max(2.0));
+    #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
+    let most = most_states as f64;
+    let (mut next, mut gap) = (states(last) * growth, last.upper - last.lower);
+    while next <= most && gap > CLOSE {
+        next *= growth;
+        gap /= 2.0;
+    }
+    gap <= CLOSE
+}
+
 impl Policy {
-    /// The policy on the finest grid that [`optimum`] finishes; `None` if that is none, or
-    /// `goes_on` says so.
+    /// The policy on the finest grid that [`optimum`](super::optimum) finishes; `None` if that is none,
+    /// if its bounds are more than two points apart, or if `goes_on` says so. It gives up early where finer grids
+    /// will hardly bring the bounds so close.
     ///
     /// # Errors
     /// When there is something in the task or in the world that the process does not know.
@@ -46,12 +73,16 @@ impl Policy {
         settings: &Settings,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
-        let optimum = optimum(task, model, settings, goes_on)?;
+        let world = TimedWorld::new(task, model, settings)?;
+        let is_promising = |grids: &[Grid]| may_get_close(grids, settings.most_states);
+        let optimum = refined(&world, settings, &is_promising, goes_on)?;
         let finest = optimum.grids.len().checked_sub(1);
         let Some(cells) = finest.map(|halvings| settings.first_cells.max(1) << halvings) else {
             return Ok(None);
         };
-        let world = TimedWorld::new(task, model, settings)?;
+        if !is_close(&optimum) {
+            return Ok(None);
+        }
         #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
         let (step, count) = (world.horizon / cells as f64, cells as f64);
         let chances = Chances::new(&world, step, cells, Side::Below)?;
@@ -75,12 +106,6 @@ impl Policy {
         };
         policy.values = values;
         Ok(Some(policy))
-    }
-
-    /// Whether its bounds are close enough to go by it: on a coarse grid, whoever decides only at
-    /// the boundaries of cells loses much that others do not.
-    pub fn is_close(&self) -> bool {
-        self.optimum.upper - self.optimum.lower <= CLOSE
     }
 
     /// The bounds between which the best of all executors lies, and the grids that were tried for

@@ -70,7 +70,7 @@ pub(crate) enum Occurs {
 }
 
 /// See [`timed`](super).
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct TimedWorld {
     pub(crate) model: WorldModel,
     /// The facts that matter; the place of each is its bit.
@@ -148,29 +148,38 @@ impl TimedWorld {
             facts: compiler.facts,
             horizon: latest(&events, model)?,
             is_monotone: !goal.has_negation() && !acts.iter().any(Act::has_negation),
-            deletable: acts.iter().fold(0, |all, act| all | act.deletes())
-                | events.iter().fold(0, |all, event| all | event.deletes),
-            addable: acts.iter().fold(0, |all, act| all | act.adds())
-                | events.iter().fold(0, |all, event| all | event.adds),
+            deletable: 0,
+            addable: 0,
             model: model.clone(),
             acts,
             events,
             initial,
             goal,
         };
+        world.see_what_changes();
         world.horizon = world.end_of_runs(settings)?;
-        if world.is_monotone {
-            for act in &mut world.acts {
-                act.may_be_cancelled = act.may_gain_by_cancelling(model);
+        Ok(world)
+    }
+
+    /// Enters what follows from the actions and events that there are.
+    pub(super) fn see_what_changes(&mut self) {
+        let acts = &self.acts;
+        let events = &self.events;
+        self.deletable = acts.iter().fold(0, |all, act| all | act.deletes())
+            | events.iter().fold(0, |all, event| all | event.deletes);
+        self.addable = acts.iter().fold(0, |all, act| all | act.adds())
+            | events.iter().fold(0, |all, event| all | event.adds);
+        if self.is_monotone {
+            for act in &mut self.acts {
+                act.may_be_cancelled = act.may_gain_by_cancelling(&self.model);
                 // It takes nothing away, and what it gives stays. Whoever starts it later could as
                 // well have it over earlier.
                 act.is_eager = act.ends_safely()
                     && !act.may_hold_up()
                     && act.deletes() == 0
-                    && act.adds() & world.deletable == 0;
+                    && act.adds() & self.deletable == 0;
             }
         }
-        Ok(world)
     }
 
     /// Whether the goal can be reached if deletions do nothing, from these facts, with what may

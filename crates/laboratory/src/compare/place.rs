@@ -79,7 +79,7 @@ impl Setting<'_> {
                 ..Settings::default()
             };
             let policy = Policy::new(task, &world, &settings, goes_on);
-            let policy = policy.ok()?.filter(Policy::is_close)?;
+            let policy = policy.ok()??;
             Some(Arc::new(policy) as Arc<dyn Outlook>)
         });
         let outlook = outlook.flatten();

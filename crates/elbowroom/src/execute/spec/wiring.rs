@@ -362,7 +362,7 @@ impl RunSpec {
         let outlook = model.as_ref().filter(|_| self.executor.asks_outlook());
         let outlook = outlook.and_then(|model| {
             let policy = Policy::new(task, model, &Settings::default(), &|| true);
-            let policy = policy.ok()?.filter(Policy::is_close)?;
+            let policy = policy.ok()??;
             Some(Arc::new(policy) as Arc<dyn Outlook>)
         });
         let is_embedded = matches!(self.whom()?, Whom::Embedded);
