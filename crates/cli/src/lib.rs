@@ -13,6 +13,7 @@ mod conversation;
 mod desk;
 mod exit;
 mod http;
+mod in_time;
 mod input;
 mod interrupt;
 mod journal;

@@ -2,6 +2,9 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
 
+#[path = "../../elbowroom/tests/shared/chains.rs"]
+#[allow(dead_code, reason = "other tests have batteries in them")]
+mod chains;
 #[path = "../../elbowroom/tests/shared/rounds.rs"]
 mod rounds;
 #[path = "../../../testing/skipped.rs"]
@@ -133,4 +136,27 @@ fn a_terminal_shows_how_the_search_is_getting_on() {
     let shown = String::from_utf8_lossy(&output.stdout);
     assert!(shown.contains(" widenings"), "{shown}");
     assert!(output.status.success(), "{shown}");
+}
+
+/// The steps of the library that are over when time is up take minutes here: nothing but the end of the
+/// program ends them.
+#[test]
+fn the_region_of_a_long_plan_ends_at_its_time_limit() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("region");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let (domain, problem, plan) = chains::chains(4, 400, chains::Needs::Time);
+    let names = ["domain.pddl", "problem.pddl", "long.plan"];
+    for (name, text) in names.iter().zip([domain, problem, plan]) {
+        std::fs::write(folder.join(name), text).expect("a file");
+    }
+    let output = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .arg("envelope")
+        .args(names.map(|name| folder.join(name)))
+        .args(["--method", "exact", "--time-limit", "0.2", "--json"])
+        .output()
+        .expect("the command");
+    let document: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("one JSON document");
+    assert_eq!(document["answer"], "none", "{document}");
+    assert_eq!(output.status.code(), Some(3), "{document}");
 }

@@ -159,19 +159,7 @@ pub fn region(
     watcher: &mut dyn Watcher,
 ) -> Result<RegionOutcome, RequestError> {
     let task = &request.task;
-    let outcome = |finding, plan, region| RegionOutcome {
-        answer: RegionAnswer {
-            format: RegionFormat::Region,
-            version: Version,
-            domain: task.problem().domain.clone(),
-            problem: task.problem().name.clone(),
-            plan: request.name.clone(),
-            epsilon: task.epsilon().clone(),
-            finding,
-        },
-        plan,
-        region,
-    };
+    let outcome = |finding, plan, region| outcome(request, finding, plan, region);
     let plan = match envelope::opened(request, watcher) {
         Ok((plan, _)) => plan,
         Err(FlowError::Invalid(violation)) => {
@@ -238,6 +226,35 @@ pub fn region(
         },
     };
     Ok(outcome(finding, Some(plan), found.ok()))
+}
+
+/// What is known when somebody could wait no longer for a single step: nothing.
+pub fn so_far(request: &EnvelopeRequest) -> RegionOutcome {
+    let reason = ExactError::Ended.to_string();
+    outcome(request, RegionFinding::None { reason }, None, None)
+}
+
+fn outcome(
+    request: &EnvelopeRequest,
+    finding: RegionFinding,
+    plan: Option<ParametrizedPlan>,
+    region: Option<elbowroom_envelope::Region>,
+) -> RegionOutcome {
+    let task = &request.task;
+    let answer = RegionAnswer {
+        format: RegionFormat::Region,
+        version: Version,
+        domain: task.problem().domain.clone(),
+        problem: task.problem().name.clone(),
+        plan: request.name.clone(),
+        epsilon: task.epsilon().clone(),
+        finding,
+    };
+    RegionOutcome {
+        answer,
+        plan,
+        region,
+    }
 }
 
 fn answered(explainer: &Explainer<'_>, form: &LinearForm, row: &RegionRow) -> RowAnswer {

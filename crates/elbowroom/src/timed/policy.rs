@@ -40,6 +40,10 @@ fn is_close(optimum: &TimedOptimum) -> bool {
     optimum.upper - optimum.lower <= CLOSE
 }
 
+/// How many times the states of a grid one of half as long cells has, where nothing else is known: what
+/// is under way may have begun in twice as many cells, in each of twice as many.
+const GROWTH: f64 = 4.0;
+
 /// Whether the bounds may get close before there are too many states, if each further grid halves what
 /// is between them, and has as many times the states of the one before as the last one has.
 fn may_get_close(grids: &[Grid], most_states: usize) -> bool {
@@ -49,7 +53,7 @@ fn may_get_close(grids: &[Grid], most_states: usize) -> bool {
         return true;
     };
     let before = grids.len().checked_sub(2).map(|place| &grids[place]);
-    let growth = before.map_or(2.0, |before| (states(last) / states(before)).max(2.0));
+    let growth = before.map_or(GROWTH, |before| (states(last) / states(before)).max(2.0));
     #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
     let most = most_states as f64;
     let (mut next, mut gap) = (states(last) * growth, last.upper - last.lower);

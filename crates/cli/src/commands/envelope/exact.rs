@@ -2,19 +2,20 @@
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom::answers::region::{
     BoxAnswer, Measure, Others, PictureError, PieceAnswer, Plane, RegionFinding, RegionOutcome,
-    RegionSettings, picture, region,
+    RegionSettings, picture, region, so_far,
 };
 use elbowroom::answers::{EnvelopeRequest, Event, Halt, Watcher};
 
 use super::{failure, specifications};
 use crate::args::{self, EnvelopeArgs};
 use crate::exit::{Answer, Exit, Failure};
+use crate::in_time::in_time;
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::limits::push_wrapped;
@@ -52,10 +53,17 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         seed: arguments.seed,
     };
     let mut watch = Watch {
-        stopwatch,
-        plan: &arguments.plan,
+        stopwatch: stopwatch.clone(),
+        plan: arguments.plan.clone(),
     };
-    let outcome = region(&request, &settings, &mut watch).map_err(failure)?;
+    let request = Arc::new(request);
+    let (theirs, mut listener) = (Arc::clone(&request), watch.clone());
+    let outcome = in_time(
+        stopwatch,
+        move || region(&theirs, &settings, &mut listener),
+        |_| Ok(so_far(&request)),
+    )
+    .map_err(failure)?;
     let drawn = draw(arguments, plane.as_ref(), &outcome, &mut watch);
     // What was computed is shown, whatever becomes of the picture.
     if arguments.json {
@@ -92,7 +100,7 @@ fn draw(
     arguments: &EnvelopeArgs,
     plane: Option<&Plane>,
     outcome: &RegionOutcome,
-    watch: &mut Watch<'_>,
+    watch: &mut Watch,
 ) -> Result<(), Failure> {
     let (Some(path), Some(plane)) = (&arguments.picture, plane) else {
         return Ok(());
@@ -112,12 +120,13 @@ fn draw(
 
 /// Obeys the clock and Ctrl-C, and tells of plans whose times are taken otherwise than they stand
 /// there.
-struct Watch<'a> {
+#[derive(Clone)]
+struct Watch {
     stopwatch: Stopwatch,
-    plan: &'a Path,
+    plan: PathBuf,
 }
 
-impl Watcher for Watch<'_> {
+impl Watcher for Watch {
     fn elapsed(&mut self) -> Duration {
         self.stopwatch.elapsed()
     }
@@ -128,7 +137,7 @@ impl Watcher for Watch<'_> {
 
     fn notice(&mut self, event: &Event<'_>) {
         if let Event::Repaired(violation) = event {
-            input::tell_repair(self.plan, violation);
+            input::tell_repair(&self.plan, violation);
         }
     }
 }

@@ -1,22 +1,19 @@
 //! `elbowroom envelope --repair`: what is the least that has to change for the plan to work?
 
 use std::fmt::Write as _;
-use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::thread;
-use std::time::Duration;
 
+use elbowroom::answers::RequestError;
 use elbowroom::answers::repair::{
     Change, RepairFinding, RepairOutcome, RepairRequest, repair, so_far,
 };
-use elbowroom::answers::{RequestError, Watcher};
 use elbowroom::num::Rational;
 use elbowroom::pddl::write_plan;
 
 use super::failure;
 use crate::args::EnvelopeArgs;
 use crate::exit::{Answer, Exit, Failure};
+use crate::in_time::in_time;
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::limits::push_wrapped;
@@ -24,12 +21,6 @@ use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::{Stopwatch, duration};
 
-/// How often the clock is looked at.
-const TICK: Duration = Duration::from_millis(10);
-/// How long the library has for an answer when its time is up.
-const GRACE: Duration = Duration::from_millis(50);
-/// As much as the main thread has.
-const STACK: usize = 64 << 20;
 /// So many digits of numbers are printed; `--json` has all.
 const DIGITS: u32 = 6;
 /// So many of the reasons are printed; `--json` has all.
@@ -57,7 +48,14 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
             input::any_plan(&task, &arguments.plan, output)?,
         )
     };
-    let outcome = answer(&Arc::new(request), stopwatch).map_err(refused)?;
+    let (request, mut watch) = (Arc::new(request), stopwatch.clone());
+    let theirs = Arc::clone(&request);
+    let outcome = in_time(
+        stopwatch,
+        move || repair(&theirs, &mut watch),
+        |halt| Ok(so_far(&request, halt)),
+    )
+    .map_err(refused)?;
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {
@@ -89,36 +87,6 @@ fn refused(error: RequestError) -> Failure {
             Failure::new(message.replace("`--vary ", "`--change/--keep "), "")
         }
         error => failure(error),
-    }
-}
-
-/// The answer, or that there is none, when its time is up. A single step of the library can take
-/// long, so it works on a thread of its own.
-fn answer(
-    request: &Arc<RepairRequest>,
-    mut stopwatch: Stopwatch,
-) -> Result<RepairOutcome, RequestError> {
-    let (sender, receiver) = mpsc::channel();
-    let (theirs, mut listener) = (Arc::clone(request), stopwatch.clone());
-    let worker = thread::Builder::new().stack_size(STACK).spawn(move || {
-        // Nobody listens any more when there was no time left.
-        let _ = sender.send(repair(&theirs, &mut listener));
-    });
-    if worker.is_err() {
-        // A system without threads to spare: the limit is kept between the steps.
-        return repair(request, &mut stopwatch);
-    }
-    loop {
-        match receiver.recv_timeout(TICK) {
-            Ok(answer) => return answer,
-            // A thread that is gone without an answer has panicked, which has ended the program.
-            Err(RecvTimeoutError::Disconnected) => return repair(request, &mut stopwatch),
-            Err(RecvTimeoutError::Timeout) => {}
-        }
-        if let ControlFlow::Break(halt) = stopwatch.flow() {
-            let last = receiver.recv_timeout(GRACE);
-            return last.unwrap_or_else(|_| Ok(so_far(request, halt)));
-        }
     }
 }
 
