@@ -104,6 +104,42 @@ fn bounds_enclose_what_a_plain_recursion_finds() {
     );
 }
 
+/// A vase is to be carried home before dark, and may be knocked over on the way, if it is not carried with
+/// care. Where there are too many states, the bound from above is that of a world in which nobody does so.
+#[test]
+fn with_too_many_states_the_bound_from_above_is_that_of_a_kinder_world() {
+    let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
+        (:predicates (day) (whole) (home))
+        (:durative-action carry :parameters () :duration (= ?duration 6)
+          :condition (and (over all (day)) (at end (whole))) :effect (at end (home))))";
+    let problem = "(define (problem p) (:domain d) (:init (day) (whole) (at 8 (not (day))))
+        (:goal (home)))";
+    let world = "format = \"elbowroom-world\"\nversion = 1\n
+        [[duration]]\naction = \"(carry)\"\nuniform = { from = 2, to = 10 }\n
+        [[event]]\nfact = \"(whole)\"\nbecomes = false\nuniform = { from = 0, to = 16 }\nprobability = 0.5\n";
+    let of = |most_states| {
+        let settings = Settings {
+            most_states,
+            ..Settings::default()
+        };
+        bounds(domain, problem, world, &settings)
+    };
+    let known = of(2_000_000);
+    assert_eq!(known.stop, Stop::Close);
+    // In time with three quarters, and whole with 1 - t / 32 at t, which is 5 on average.
+    let by_hand = 0.75 * (1.0 - 5.0 / 32.0);
+    assert!(
+        known.lower <= by_hand && by_hand <= known.upper,
+        "{known:?}"
+    );
+    let found = (1..10_000)
+        .map(of)
+        .find(|found| found.grids.is_empty() && found.upper < 1.0);
+    let found = found.expect("the kinder world has fewer states");
+    assert_eq!(found.stop, Stop::TooManyStates);
+    assert!(found.upper >= 0.75 && found.upper < 0.9, "{found:?}");
+}
+
 #[test]
 fn bounds_enclose_what_a_plain_recursion_finds_where_failures_leave_something_behind() {
     let (mut close, mut matters) = (0, 0);

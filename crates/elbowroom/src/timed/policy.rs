@@ -10,7 +10,7 @@ use super::below::{Below, Move, moves};
 use super::chances::Chances;
 use super::graph::{Expansion, Hopes, Phase, Running, State, Tolls, explored, settled, worth};
 use super::world::{Facts, TimedWorld};
-use super::{Grid, NotTabulated, Settings, Side, TimedOptimum, refined};
+use super::{Grid, NotTabulated, Settings, Side, TimedOptimum, grid, refined};
 
 /// The values of all states on the grid of the bound from below, by which each move can be weighed.
 ///
@@ -34,15 +34,13 @@ const CLOSE: f64 = 0.02;
 /// How much of a probability is given at most for being earlier.
 const HASTE: f64 = 1e-4;
 
-/// Whether the bounds are close enough to go by the policy: on a coarse grid, whoever decides only at
-/// the boundaries of cells loses much that others do not.
-fn is_close(optimum: &TimedOptimum) -> bool {
-    optimum.upper - optimum.lower <= CLOSE
-}
-
 /// How many times the states of a grid one of half as long cells has, where nothing else is known: what
 /// is under way may have begun in twice as many cells, in each of twice as many.
 const GROWTH: f64 = 4.0;
+
+/// Of the states that there may be, the first grid may have one in so many. It hardly ever is the last,
+/// and to find that one does not get far takes the longer the more states it has.
+const FIRST_SHARE: usize = 32;
 
 /// Whether the bounds may get close before there are too many states, if each further grid halves what
 /// is between them, and has as many times the states of the one before as the last one has.
@@ -65,9 +63,8 @@ fn may_get_close(grids: &[Grid], most_states: usize) -> bool {
 }
 
 impl Policy {
-    /// The policy on the finest grid that [`optimum`](super::optimum) finishes; `None` if that is none,
-    /// if its bounds are more than two points apart, or if `goes_on` says so. It gives up early where finer grids
-    /// will hardly bring the bounds so close.
+    /// The policy on the finest grid that [`optimum`](super::optimum) finishes; `None` if that is none, or
+    /// `goes_on` says so.
     ///
     /// # Errors
     /// When there is something in the task or in the world that the process does not know.
@@ -78,15 +75,48 @@ impl Policy {
         goes_on: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
         let world = TimedWorld::new(task, model, settings)?;
+        let optimum = refined(&world, settings, &|_| true, goes_on)?;
+        Self::on_finest(world, optimum, settings, goes_on)
+    }
+
+    /// The same, where the bounds are at most two points apart: close enough to go by the policy, which
+    /// on a coarse grid loses much that others do not, because it decides only at the boundaries of
+    /// cells. It gives up early where finer grids will hardly bring the bounds so close.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn close(
+        task: &Task,
+        model: &WorldModel,
+        settings: &Settings,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, NotTabulated> {
+        let world = TimedWorld::new(task, model, settings)?;
+        let first = Settings {
+            most_states: settings.most_states / FIRST_SHARE,
+            ..settings.clone()
+        };
+        if grid(&world, settings.first_cells.max(1), &first, goes_on)?.is_err() {
+            return Ok(None);
+        }
         let is_promising = |grids: &[Grid]| may_get_close(grids, settings.most_states);
         let optimum = refined(&world, settings, &is_promising, goes_on)?;
+        if optimum.upper - optimum.lower > CLOSE {
+            return Ok(None);
+        }
+        Self::on_finest(world, optimum, settings, goes_on)
+    }
+
+    fn on_finest(
+        world: TimedWorld,
+        optimum: TimedOptimum,
+        settings: &Settings,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, NotTabulated> {
         let finest = optimum.grids.len().checked_sub(1);
         let Some(cells) = finest.map(|halvings| settings.first_cells.max(1) << halvings) else {
             return Ok(None);
         };
-        if !is_close(&optimum) {
-            return Ok(None);
-        }
         #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
         let (step, count) = (world.horizon / cells as f64, cells as f64);
         let chances = Chances::new(&world, step, cells, Side::Below)?;

@@ -78,7 +78,7 @@ impl Setting<'_> {
                 most_states: self.experiment.table_states,
                 ..Settings::default()
             };
-            let policy = Policy::new(task, &world, &settings, goes_on);
+            let policy = Policy::close(task, &world, &settings, goes_on);
             let policy = policy.ok()??;
             Some(Arc::new(policy) as Arc<dyn Outlook>)
         });

@@ -361,7 +361,7 @@ impl RunSpec {
         let model = model.filter(|_| self.executor.asks_odds());
         let outlook = model.as_ref().filter(|_| self.executor.asks_outlook());
         let outlook = outlook.and_then(|model| {
-            let policy = Policy::new(task, model, &Settings::default(), &|| true);
+            let policy = Policy::close(task, model, &Settings::default(), &|| true);
             let policy = policy.ok()??;
             Some(Arc::new(policy) as Arc<dyn Outlook>)
         });
