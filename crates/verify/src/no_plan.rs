@@ -1,8 +1,8 @@
 //! That a problem has no plan: facts with the times before which they cannot be true.
 //!
-//! The certificate ([`NoPlan`]) is an inductive invariant of the delete relaxation, as Bäckström, Jonsson
-//! & Ståhlberg (SoCS 2013) and Eriksson, Röger & Helmert (ICAPS 2017) use such invariants to certify that
-//! planning tasks are unsolvable, here with times. It lists facts, each with a time before which it is
+//! The certificate ([`NoPlan`]) is an inductive invariant of the delete relaxation (as in Eriksson,
+//! Röger & Helmert, "Unsolvability certificates for classical planning", ICAPS 2017), here with times. It
+//! lists facts, each with a time before which it is
 //! not true in any course of events; what it does not list is never true. The checker
 //! ([`verify_no_plan`]) confirms that
 //!
@@ -125,7 +125,8 @@ pub enum NoPlanAnswerError {
 struct Answer {
     #[allow(dead_code, reason = "read so that nothing else is taken for an answer")]
     format: Format,
-    answer: String,
+    #[serde(rename = "answer")]
+    finding: String,
     certificate: Option<NoPlan>,
     uncertified: Option<String>,
 }
@@ -142,7 +143,7 @@ enum Format {
 /// When it has none.
 pub fn certificate_of(answer: &str) -> Result<NoPlan, NoPlanAnswerError> {
     let answer: Answer = serde_json::from_str(answer)?;
-    if answer.answer != "no plan" {
+    if answer.finding != "no plan" {
         return Err(NoPlanAnswerError::NotDenied);
     }
     answer.certificate.ok_or_else(|| {

@@ -29,9 +29,17 @@ pub struct Instances {
     lasting: Lasting,
     actions: Vec<Action>,
     known: BTreeSet<(SchemaId, Vec<ObjectId>)>,
-    /// For each schema the atoms that its instances need when they start, or that nobody but timed
-    /// initials makes true, and pairs of terms that have to be the same object, or different ones.
-    needs: Vec<(Vec<problem::Atom>, Vec<(Term, Term, bool)>)>,
+    /// By schema.
+    needs: Vec<Needs>,
+}
+
+/// What all instances of a schema need, as far as it is told of objects alone.
+#[derive(Debug, Default)]
+struct Needs {
+    /// What is needed at the start, or what nobody but timed initials makes true.
+    atoms: Vec<problem::Atom>,
+    /// Terms that have to be the same object, or different ones.
+    pairs: Vec<(Term, Term, bool)>,
 }
 
 impl Instances {
@@ -102,7 +110,7 @@ impl Instances {
 
     /// Whether no need that the last bound parameter completes is out of reach.
     fn may_be_bound(&self, schema: SchemaId, reached: &Reached, binding: &[ObjectId]) -> bool {
-        let (atoms, pairs) = &self.needs[schema.index()];
+        let Needs { atoms, pairs } = &self.needs[schema.index()];
         let object = |term: &Term| match term {
             Term::Variable(variable) => binding.get(*variable).copied(),
             Term::Object(object) => Some(*object),
@@ -218,15 +226,12 @@ fn brought_about(moments: &Moments<'_>, action: &Action) -> Vec<(Fact, Rational)
     facts
 }
 
-/// See [`Instances::needs`].
-fn needs(
-    schema: &problem::Schema,
-    lasting: &Lasting,
-) -> (Vec<problem::Atom>, Vec<(Term, Term, bool)>) {
-    let (mut atoms, mut pairs) = (Vec::new(), Vec::new());
+/// See [`Needs`].
+fn needs(schema: &problem::Schema, lasting: &Lasting) -> Needs {
+    let mut needs = Needs::default();
     match &schema.body {
         problem::Body::Instantaneous { condition, .. } => {
-            collect(condition, &|_| true, &mut atoms, &mut pairs);
+            collect(condition, &|_| true, &mut needs);
         }
         problem::Body::Durative {
             at_start,
@@ -234,16 +239,16 @@ fn needs(
             at_end,
             ..
         } => {
-            collect(at_start, &|_| true, &mut atoms, &mut pairs);
+            collect(at_start, &|_| true, &mut needs);
             // Over an action that may take no time, nothing is needed; so that is left to the instances.
             let is_fixed = |atom: &problem::Atom| lasting.is_fixed(atom.predicate);
-            collect(at_end, &is_fixed, &mut atoms, &mut pairs);
+            collect(at_end, &is_fixed, &mut needs);
             if takes_time(schema) {
-                collect(over_all, &is_fixed, &mut atoms, &mut pairs);
+                collect(over_all, &is_fixed, &mut needs);
             }
         }
     }
-    (atoms, pairs)
+    needs
 }
 
 /// Whether a constant bound says that all instances take time.
@@ -262,23 +267,18 @@ fn takes_time(schema: &problem::Schema) -> bool {
 }
 
 /// The conjuncts that are atoms of some kind, or compare objects.
-fn collect(
-    condition: &Condition,
-    counts: &dyn Fn(&problem::Atom) -> bool,
-    atoms: &mut Vec<problem::Atom>,
-    pairs: &mut Vec<(Term, Term, bool)>,
-) {
+fn collect(condition: &Condition, counts: &dyn Fn(&problem::Atom) -> bool, needs: &mut Needs) {
     match condition {
         Condition::And(parts) => {
             for part in parts {
-                collect(part, counts, atoms, pairs);
+                collect(part, counts, needs);
             }
         }
-        Condition::Atom(atom) if counts(atom) => atoms.push(atom.clone()),
-        Condition::Equal(left, right) => pairs.push((*left, *right, true)),
+        Condition::Atom(atom) if counts(atom) => needs.atoms.push(atom.clone()),
+        Condition::Equal(left, right) => needs.pairs.push((*left, *right, true)),
         Condition::Not(part) => {
             if let Condition::Equal(left, right) = &**part {
-                pairs.push((*left, *right, false));
+                needs.pairs.push((*left, *right, false));
             }
         }
         _ => {}

@@ -142,9 +142,9 @@ impl Draft {
         }
         for (time, fact, truth) in &self.timed {
             if *truth {
-                write!(problem, " (at {time} (f{fact}))").unwrap()
+                write!(problem, " (at {time} (f{fact}))").unwrap();
             } else {
-                write!(problem, " (at {time} (not (f{fact})))").unwrap()
+                write!(problem, " (at {time} (not (f{fact})))").unwrap();
             }
         }
         problem.push_str(") (:goal (and");
