@@ -132,7 +132,8 @@ impl Expansion for Above<'_> {
         states: &IndexSet<State>,
         next: &mut IndexSet<State>,
         hopes: &mut Hopes,
-    ) -> Nodes {
+        most: usize,
+    ) -> Option<Nodes> {
         let mut here = Cell {
             bound: self,
             number: cell,
@@ -152,10 +153,13 @@ impl Expansion for Above<'_> {
         }
         let mut done = 0;
         while let Some(moment) = here.moments.get_index(done).cloned() {
+            if nodes.len() >= most {
+                return None;
+            }
             nodes.push(here.choices(&moment));
             done += 1;
         }
-        nodes
+        Some(nodes)
     }
 
     fn last(&self, state: &State) -> f64 {

@@ -225,7 +225,8 @@ impl Expansion for Below<'_> {
         states: &IndexSet<State>,
         next: &mut IndexSet<State>,
         hopes: &mut Hopes,
-    ) -> Nodes {
+        most: usize,
+    ) -> Option<Nodes> {
         let mut here = Cell {
             bound: self,
             number: cell,
@@ -235,9 +236,12 @@ impl Expansion for Below<'_> {
         };
         let mut nodes = Nodes::with_capacity(states.len());
         while let Some(state) = here.moments.get_index(nodes.len()).cloned() {
+            if nodes.len() >= most {
+                return None;
+            }
             nodes.push(here.choices(&state));
         }
-        nodes
+        Some(nodes)
     }
 
     fn last(&self, state: &State) -> f64 {

@@ -65,14 +65,15 @@ pub(super) trait Expansion {
     fn initial(&self) -> Vec<(f64, State)>;
 
     /// The nodes of a cell, which depend on nothing but these states; those to which they lead are
-    /// entered into `next`.
+    /// entered into `next`. `None` if there are more nodes than `most`.
     fn expand(
         &self,
         cell: usize,
         states: &IndexSet<State>,
         next: &mut IndexSet<State>,
         hopes: &mut Hopes,
-    ) -> Nodes;
+        most: usize,
+    ) -> Option<Nodes>;
 
     /// What a state is worth when the last cell is over.
     fn last(&self, state: &State) -> f64;
@@ -221,7 +222,8 @@ pub(super) fn value(
             return Err(Stop::Interrupted);
         }
         let mut next = IndexSet::new();
-        let nodes = bound.expand(cell, states, &mut next, &mut hopes);
+        let nodes = bound.expand(cell, states, &mut next, &mut hopes, usize::MAX);
+        let nodes = nodes.unwrap_or_default();
         let mut here = settled(&nodes, &values, Tolls::NONE);
         here.truncate(states.len());
         values = here;
@@ -233,6 +235,10 @@ pub(super) fn value(
     Ok(value.sum())
 }
 
+/// A cell may have so many nodes for each state that there may be in all cells together: within a cell
+/// much can happen in many orders.
+const NODES: usize = 4;
+
 /// The states at the beginning of each cell, and at the end of the last.
 pub(super) fn explored(
     bound: &impl Expansion,
@@ -243,12 +249,14 @@ pub(super) fn explored(
     let initial = bound.initial();
     let mut layers: Vec<IndexSet<State>> =
         vec![initial.iter().map(|(_, state)| state.clone()).collect()];
+    let most_nodes = left.saturating_mul(NODES);
     for cell in 0..bound.cells() {
         if !goes_on() {
             return Err(Stop::Interrupted);
         }
         let mut next = IndexSet::new();
-        bound.expand(cell, &layers[cell], &mut next, hopes);
+        let nodes = bound.expand(cell, &layers[cell], &mut next, hopes, most_nodes);
+        nodes.ok_or(Stop::TooManyStates)?;
         *left = left.checked_sub(next.len()).ok_or(Stop::TooManyStates)?;
         layers.push(next);
     }

@@ -170,7 +170,7 @@ impl Policy {
                 return None;
             }
             let mut next = IndexSet::new();
-            let nodes = bound.expand(layers.len(), &states, &mut next, &mut hopes);
+            let nodes = bound.expand(layers.len(), &states, &mut next, &mut hopes, usize::MAX)?;
             let after = tables.last().map(|table| of(table, &next));
             let values = settled(&nodes, &after.unwrap_or_default(), self.tolls);
             tables.push(states.into_iter().zip(values).collect());
@@ -189,7 +189,8 @@ impl Policy {
         let bound = Below::new(world, &self.chances);
         let mut next = IndexSet::new();
         let only = IndexSet::from([state.clone()]);
-        let nodes = bound.expand(cell, &only, &mut next, &mut hopes);
+        let nodes = bound.expand(cell, &only, &mut next, &mut hopes, usize::MAX);
+        let nodes = nodes.unwrap_or_default();
         let after = of(&self.values[cell + 1], &next);
         let here = settled(&nodes, &after, self.tolls);
         let choices = nodes.first().into_iter().flatten();
