@@ -32,7 +32,7 @@
 //!
 //! The cells are halved until the bounds are close enough, or there are too many states. Where more
 //! facts are never worse, the bound from above is then taken on finer grids of a *kinder* world
-//! ([`kinder`]): one in which what may happen at one time or another, and does nothing but harm,
+//! (`kinder`): one in which what may happen at one time or another, and does nothing but harm,
 //! never happens. It has fewer states, and whoever succeeds in the real world does so in it.
 //! Probabilities are floating-point numbers; the bounds are widened by 1e-9, far more than rounding
 //! adds up to.
