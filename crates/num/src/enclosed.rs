@@ -5,7 +5,7 @@
 
 mod normal;
 
-pub use normal::{exp_of_minus, normal, normal_density};
+pub use normal::{exp_of_minus, normal, normal_between, normal_density};
 
 use crate::Rational;
 

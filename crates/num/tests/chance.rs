@@ -222,3 +222,40 @@ fn steps_of_values_add_up_to_what_an_interval_has() {
     let far = [cell.below[1].clone(), cell.above[1].clone()];
     assert_eq!(chance.mass(&number(30), &far)[0], total);
 }
+
+#[test]
+fn what_lies_in_a_short_interval_is_known_to_a_part_of_itself() {
+    // The density in the middle times the width, as the interval is next to nothing.
+    let bells = [
+        Density::Normal {
+            mean: Rational::from(10),
+            deviation: Rational::from(3),
+        },
+        Density::Lognormal {
+            location: Rational::from(2),
+            spread: Rational::new(1, 2),
+        },
+    ];
+    for density in bells {
+        for tenths in [3, 20, 74, 100, 170, 300] {
+            let (lower, width) = (number(tenths), Rational::new(1, 1_000_000_000));
+            let upper = &lower + &width;
+            let [least, most] = density.between([Some(&lower), Some(&upper)]);
+            let [below, above] = density.at(&lower);
+            let [later_below, later_above] = density.at(&upper);
+            assert!(
+                least <= above.max(later_above) * &width,
+                "{density:?} {tenths}"
+            );
+            assert!(
+                most >= below.min(later_below) * &width,
+                "{density:?} {tenths}"
+            );
+            let apart = (&most - &least).checked_div(&most).unwrap();
+            assert!(
+                apart < Rational::new(1, 1_000_000),
+                "{density:?} {tenths}: {apart}"
+            );
+        }
+    }
+}

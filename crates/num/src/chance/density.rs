@@ -151,6 +151,11 @@ impl Density {
         {
             return [Rational::ZERO, Rational::ZERO];
         }
+        if let (Some(lower), Some(upper)) = (lower, upper)
+            && let Some(within) = self.within([lower, upper])
+        {
+            return within;
+        }
         let [least, most] = upper.map_or([Rational::ONE, Rational::ONE], |at| self.at_most(at));
         let [under, over] = lower.map_or([Rational::ZERO, Rational::ZERO], |at| self.at_most(at));
         [(least - over).max(Rational::ZERO), most - under]
@@ -201,6 +206,47 @@ impl Density {
                 let divisor = at * spread;
                 [a.min(c), most].map(|own| own.checked_div(&divisor).unwrap_or_default())
             }
+        }
+    }
+
+    /// The same between two values with a bell-shaped distribution, of which the difference of two
+    /// probabilities of [`at_most`](Self::at_most) would say little where the interval is short.
+    fn within(&self, ends: [&Rational; 2]) -> Option<[Rational; 2]> {
+        match self {
+            Self::Normal { mean, deviation } => {
+                let [Some(lower), Some(upper)] =
+                    ends.map(|end| (end - mean).checked_div(deviation))
+                else {
+                    return None;
+                };
+                Some(enclosed::normal_between([&lower, &upper]))
+            }
+            Self::Lognormal { spread, .. } => {
+                let [lower, upper] = ends;
+                let places = self.standardized(lower)?;
+                // Twice the area tangent of this part, which is the logarithm of their ratio.
+                let part = (upper - lower).checked_div(&(upper + lower))?;
+                let twice = &part * Rational::from(2);
+                let at_most = twice.checked_div(&(Rational::ONE - &part * &part))?;
+                let [below, above] = enclosed::ln(&upper.checked_div(lower)?)?;
+                let least = below.max(twice).checked_div(spread)?;
+                let greatest = above.min(at_most).checked_div(spread)?;
+                // As an interval of this width moves, what it holds rises until its middle is at the
+                // peak, and falls from there on.
+                let at = |place: &Rational, width: &Rational| {
+                    enclosed::normal_between([place, &(place + width)])
+                };
+                let [[first, _], [second, _]] = places.each_ref().map(|own| at(own, &least));
+                let [[_, third], [_, fourth]] = places.each_ref().map(|own| at(own, &greatest));
+                let middle = -&greatest / Rational::from(2);
+                let most = if places[0] < middle && middle < places[1] {
+                    at(&middle, &greatest)[1].clone()
+                } else {
+                    third.max(fourth)
+                };
+                Some([first.min(second), most])
+            }
+            _ => None,
         }
     }
 
