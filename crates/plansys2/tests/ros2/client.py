@@ -17,43 +17,66 @@ from plansys2_msgs.srv import GetPlan, ValidateDomain
 from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
+# How long anything is waited for: only what hangs takes so long.
+PATIENCE = 120
+SERVICES = {
+    "planner/get_plan": GetPlan,
+    "planner/validate_domain": ValidateDomain,
+    "planner/get_state": GetState,
+    "planner/change_state": ChangeState,
+    "executor/get_state": GetState,
+    "executor/change_state": ChangeState,
+}
+BEGUN = time.monotonic()
 STATUSES = {GoalStatus.STATUS_SUCCEEDED: "succeeded", GoalStatus.STATUS_CANCELED: "canceled",
             GoalStatus.STATUS_ABORTED: "aborted"}  # fmt: skip
+
+
+def note(what):
+    """Tells what has been done, and when: where something takes long, this says where."""
+    print(f"{time.monotonic() - BEGUN:6.2f} s: {what}", file=sys.stderr, flush=True)
 
 
 class Client:
     def __init__(self):
         rclpy.init()
         self.node = rclpy.create_node("client")
+        # At the beginning, as PlanSys2's terminal does: the first request of a client whose peer does not know it yet
+        # takes three seconds.
+        self.clients = {name: self.node.create_client(kind, name) for name, kind in SERVICES.items()}
+        self.executing = ActionClient(self.node, ExecutePlan, "execute_plan")
         self.infos, self.plans = [], []
         self.node.create_subscription(ActionExecutionInfo, "action_execution_info", self.infos.append, 100)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.node.create_subscription(Plan, "executing_plan", self.plans.append, latched)
 
     def spin(self, future):
-        rclpy.spin_until_future_complete(self.node, future, timeout_sec=60)
+        rclpy.spin_until_future_complete(self.node, future, timeout_sec=PATIENCE)
         assert future.done(), "no answer"
         return future.result()
 
-    def call(self, kind, name, **request):
-        client = self.node.create_client(kind, name)
-        assert client.wait_for_service(timeout_sec=20), f"{name} is not there"
-        return self.spin(client.call_async(kind.Request(**request)))
+    def call(self, name, **request):
+        client = self.clients[name]
+        assert client.wait_for_service(timeout_sec=PATIENCE), f"{name} is not there"
+        answer = self.spin(client.call_async(SERVICES[name].Request(**request)))
+        note(f"{name} has answered")
+        return answer
 
     def state(self, node):
-        return self.call(GetState, f"{node}/get_state").current_state.label
+        return self.call(f"{node}/get_state").current_state.label
 
     def change(self, node, transition):
-        return self.call(ChangeState, f"{node}/change_state", transition=Transition(id=transition)).success
+        return self.call(f"{node}/change_state", transition=Transition(id=transition)).success
 
     def execute(self, plan, cancel_after=None):
         """What became of it, and how often there was feedback."""
-        client = ActionClient(self.node, ExecutePlan, "execute_plan")
-        assert client.wait_for_server(timeout_sec=20), "execute_plan is not there"
+        client = self.executing
+        assert client.wait_for_server(timeout_sec=PATIENCE), "execute_plan is not there"
         feedback = []
         goal = self.spin(client.send_goal_async(
             ExecutePlan.Goal(plan=plan), lambda it: feedback.append(it.feedback.action_execution_status)
         ))  # fmt: skip
+        note(f"execute_plan: {'accepted' if goal.accepted else 'rejected'}")
         if not goal.accepted:
             return {"outcome": "rejected"}
         result = goal.get_result_async()
@@ -63,6 +86,7 @@ class Client:
                 rclpy.spin_once(self.node, timeout_sec=0.1)
             assert len(self.spin(goal.cancel_goal_async()).goals_canceling) == 1
         answer = self.spin(result)
+        note(f"execute_plan: {STATUSES[answer.status]}")
         infos = answer.result.action_execution_status
         return {
             "outcome": STATUSES[answer.status],
@@ -83,11 +107,11 @@ def main():
         for it in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE)
     ]
     said["then"] = [client.state("planner"), client.state("executor")]
-    broken = client.call(GetPlan, "planner/get_plan", domain="(define (domain", problem=problem)
+    broken = client.call("planner/get_plan", domain="(define (domain", problem=problem)
     said["broken"] = [broken.success, broken.error_info]
-    validated = [client.call(ValidateDomain, "planner/validate_domain", domain=it) for it in (domain, domain[:-9])]
+    validated = [client.call("planner/validate_domain", domain=it) for it in (domain, domain[:-9])]
     said["validated"] = [[it.success, it.error_info] for it in validated]
-    answer = client.call(GetPlan, "planner/get_plan", domain=domain, problem=problem)
+    answer = client.call("planner/get_plan", domain=domain, problem=problem)
     said["planned"] = [answer.success, [it.action for it in answer.plan.items]]
     said["executed"] = client.execute(answer.plan, float(sys.argv[3]) if len(sys.argv) > 3 else None)
     said["followed"] = [client.plans == [answer.plan], sorted({it.action_full_name for it in client.infos})]
