@@ -9,6 +9,8 @@
 
 mod facts_alone;
 
+pub(crate) use facts_alone::are_enough as is_about_facts_alone;
+
 use elbowroom_envelope::linear::Factor;
 use elbowroom_envelope::obligations::Requirement;
 use elbowroom_envelope::soundness::{Broken, SoundBox, broken_in};
@@ -26,7 +28,7 @@ pub(crate) fn of_deordered(
     plan: ParametrizedPlan,
     nominal: &Schedule,
 ) -> ParametrizedPlan {
-    if facts_alone::are_enough(task, &plan) {
+    if is_about_facts_alone(task, &plan) {
         return plan;
     }
     sound(task, &plan, nominal)

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::reduction::Edge;
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, ParameterId, Side};
-use elbowroom_stn::NodeId as ClassId;
+use elbowroom_stn::{Constraint, Network, NodeId as ClassId};
 
 /// Through which of its ends a parameter can make the network inconsistent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,10 +34,11 @@ pub(crate) fn own_limits(
 ) -> (BTreeMap<BoxEnd, Rational>, Vec<Edge>) {
     // For each pair of classes, the end that bounds their difference, and its constant.
     let mut differences: BTreeMap<(ClassId, ClassId), Vec<(BoxEnd, &Rational)>> = BTreeMap::new();
+    let own = own_edges(edges);
     for edge in edges {
         if let Some(end) = edge.end
-            && !coupled.contains(&end.parameter)
-            && is_difference(edges, end.parameter)
+            && coupled.binary_search(&end.parameter).is_err()
+            && is_difference(edges, &own[&end.parameter])
         {
             let both_ways = differences.entry((edge.from, edge.to)).or_default();
             both_ways.push((end, &edge.constant));
@@ -67,13 +68,23 @@ pub(crate) fn own_limits(
     (limits, left)
 }
 
-/// Whether a parameter is the difference of two times: an edge there and one back, and no more.
-fn is_difference(edges: &[Edge], parameter: ParameterId) -> bool {
-    let own = edges
-        .iter()
-        .filter(|edge| edge.end.is_some_and(|end| end.parameter == parameter));
-    match own.collect::<Vec<_>>()[..] {
+/// For each parameter, the positions of its edges.
+fn own_edges(edges: &[Edge]) -> BTreeMap<ParameterId, Vec<usize>> {
+    let mut own: BTreeMap<ParameterId, Vec<usize>> = BTreeMap::new();
+    for (index, edge) in edges.iter().enumerate() {
+        if let Some(end) = edge.end {
+            own.entry(end.parameter).or_default().push(index);
+        }
+    }
+    own
+}
+
+/// Whether a parameter with these edges is the difference of two times: an edge there and one back, and no
+/// more.
+fn is_difference(edges: &[Edge], own: &[usize]) -> bool {
+    match *own {
         [there, back] => {
+            let (there, back) = (&edges[there], &edges[back]);
             (there.from, there.to) == (back.to, back.from)
                 && there.from != there.to
                 && there.constant == -&back.constant
@@ -82,55 +93,40 @@ fn is_difference(edges: &[Edge], parameter: ParameterId) -> bool {
     }
 }
 
-/// Looks for the cycles that parameters are on.
+/// On which cycles the parameters are.
 pub(crate) struct Cycles<'a> {
     edges: &'a [Edge],
-    /// For each class, the edges that leave it: positions in `leaving`.
-    ranges: Vec<std::ops::Range<usize>>,
-    /// Positions in `edges`.
-    leaving: Vec<usize>,
-    /// For each parameter, its edges.
+    /// For each parameter, the positions of its edges.
     own: BTreeMap<ParameterId, Vec<usize>>,
-    /// For each class, the last search that saw it.
-    seen: Vec<usize>,
-    searches: usize,
-    stack: Vec<usize>,
+    /// For each class, those with the same number reach each other.
+    component: Vec<usize>,
+    /// For each edge, whether there is no way around it between classes that reach each other.
+    is_bridge: Vec<bool>,
 }
 
 impl<'a> Cycles<'a> {
     pub(crate) fn new(edges: &'a [Edge], class_count: usize) -> Self {
-        let mut leaving: Vec<usize> = (0..edges.len()).collect();
-        leaving.sort_by_key(|&index| edges[index].from);
-        let first_from =
-            |class: usize| leaving.partition_point(|&index| edges[index].from.index() < class);
-        let ranges = (0..class_count).map(|class| first_from(class)..first_from(class + 1));
-        let ranges = ranges.collect();
-        let mut own: BTreeMap<ParameterId, Vec<usize>> = BTreeMap::new();
-        for (index, edge) in edges.iter().enumerate() {
-            if let Some(end) = edge.end {
-                own.entry(end.parameter).or_default().push(index);
-            }
+        let mut graph: Network<i128> = Network::with_nodes(class_count);
+        for edge in edges {
+            // Only where it leads counts.
+            graph.add(Constraint::at_most(edge.from, edge.to, 0));
         }
         Self {
             edges,
-            ranges,
-            leaving,
-            own,
-            seen: vec![0; class_count],
-            searches: 0,
-            stack: Vec::new(),
+            own: own_edges(edges),
+            component: graph.components(),
+            is_bridge: graph.strong_bridges(),
         }
     }
 
     /// How an uncoupled parameter lies on cycles. Its edges are one `s -> d` ("at most") and one
     /// `d -> s` ("at least"), or only one of them; going there and back along both says nothing.
-    pub(crate) fn role(&mut self, parameter: ParameterId) -> Role {
-        let own = self.own.remove(&parameter).unwrap_or_default();
-        let mut on_cycle = |side: Side| {
+    pub(crate) fn role(&self, parameter: ParameterId) -> Role {
+        let own = self.own.get(&parameter).map_or(&[][..], Vec::as_slice);
+        let on_cycle = |side: Side| {
             own.iter().any(|&index| {
-                let edge = &self.edges[index];
-                edge.end.is_some_and(|end| end.side == side)
-                    && self.reaches(edge.to.index(), edge.from.index(), parameter)
+                let end = self.edges[index].end;
+                end.is_some_and(|end| end.side == side) && self.is_closed(index, own)
             })
         };
         match (on_cycle(Side::Upper), on_cycle(Side::Lower)) {
@@ -141,27 +137,85 @@ impl<'a> Cycles<'a> {
         }
     }
 
+    /// Whether edges lead back from the end of this one to its beginning that are not among these.
+    fn is_closed(&self, index: usize, own: &[usize]) -> bool {
+        let edge = &self.edges[index];
+        let (from, to) = (edge.from, edge.to);
+        let mut back = own.iter().filter(|&&other| {
+            let other = &self.edges[other];
+            (other.from, other.to) == (to, from)
+        });
+        from == to
+            || self.component[from.index()] == self.component[to.index()]
+                && back.all(|&back| !self.is_bridge[back])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use elbowroom_plan::{NodeId, Origin};
+
+    use super::*;
+
     /// Whether edges lead from one class to another that are not the parameter's own.
-    fn reaches(&mut self, from: usize, to: usize, parameter: ParameterId) -> bool {
-        self.searches += 1;
-        self.stack.clear();
-        self.stack.push(from);
-        self.seen[from] = self.searches;
-        while let Some(class) = self.stack.pop() {
+    fn leads(edges: &[Edge], (from, to): (ClassId, ClassId), parameter: ParameterId) -> bool {
+        let (mut seen, mut stack) = (Vec::new(), vec![from]);
+        while let Some(class) = stack.pop() {
             if class == to {
                 return true;
             }
-            for &index in &self.leaving[self.ranges[class].clone()] {
-                let edge = &self.edges[index];
-                let far = edge.to.index();
-                if self.seen[far] != self.searches
-                    && edge.end.is_none_or(|end| end.parameter != parameter)
-                {
-                    self.seen[far] = self.searches;
-                    self.stack.push(far);
-                }
+            if !seen.contains(&class) {
+                seen.push(class);
+                let is_other = |edge: &&Edge| edge.end.is_none_or(|end| end.parameter != parameter);
+                let leaving = edges.iter().filter(|edge| edge.from == class);
+                stack.extend(leaving.filter(is_other).map(|edge| edge.to));
             }
         }
         false
+    }
+
+    proptest! {
+        #[test]
+        fn a_parameter_is_on_a_cycle_if_other_edges_lead_back(
+            count in 1..7_u32,
+            parameters in prop::collection::vec((0..7_u32, 0..7_u32, 1..4_u8), 1..7),
+            fixed in prop::collection::vec((0..7_u32, 0..7_u32), 0..9),
+        ) {
+            let edge = |from: u32, to: u32, end| Edge {
+                from: ClassId(from % count),
+                to: ClassId(to % count),
+                constant: Rational::ZERO,
+                end,
+                origin: Origin::Beginning,
+                node: NodeId::ZERO,
+            };
+            let mut edges: Vec<Edge> = fixed.into_iter().map(|(a, b)| edge(a, b, None)).collect();
+            let known = parameters.len();
+            for (index, (a, b, which)) in parameters.into_iter().enumerate() {
+                let end = |side| Some(BoxEnd { parameter: ParameterId::from(index), side });
+                if which & 1 != 0 {
+                    edges.push(edge(a, b, end(Side::Upper)));
+                }
+                if which & 2 != 0 {
+                    edges.push(edge(b, a, end(Side::Lower)));
+                }
+            }
+            let cycles = Cycles::new(&edges, count as usize);
+            for parameter in (0..known).map(ParameterId::from) {
+                let on = |side: Side| edges.iter().any(|edge| {
+                    edge.end == Some(BoxEnd { parameter, side })
+                        && leads(&edges, (edge.to, edge.from), parameter)
+                });
+                let role = match (on(Side::Upper), on(Side::Lower)) {
+                    (false, false) => Role::None,
+                    (true, false) => Role::Lower,
+                    (false, true) => Role::Upper,
+                    (true, true) => Role::Both,
+                };
+                prop_assert_eq!(cycles.role(parameter), role);
+            }
+        }
     }
 }

@@ -70,7 +70,7 @@ impl Feasibility {
         let all_edges = reduction.edges().to_vec();
         let class_count = reduction.class_count();
         let (own_limits, edges) = own_limits(&all_edges, &reduction.coupled);
-        let mut cycles = Cycles::new(&edges, class_count);
+        let cycles = Cycles::new(&edges, class_count);
         let roles: Vec<Role> = (0..plan.parameters.len())
             .map(ParameterId::from)
             .map(|id| {

@@ -14,7 +14,7 @@ use crate::known::Known;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::reduction::Reduction;
-use crate::soundness::{Broken, Conditions, Counterexample, Soundness};
+use crate::soundness::{Asked, Broken, Conditions, Counterexample, Soundness};
 
 /// Decides whether a plan is guaranteed to work in a box: for all values in it there is a
 /// schedule, and every schedule is valid (paper 1, CHECKINENVELOPE and theorem 1). "There is a
@@ -41,6 +41,7 @@ pub struct Oracle {
     task: Arc<Task>,
     plan: Arc<ParametrizedPlan>,
     guarantee: Guarantee,
+    asked: Asked,
     controllability: Controllability,
     /// The conditions on all schedules; `None` while no values with a schedule are known.
     soundness: Option<Soundness>,
@@ -79,8 +80,31 @@ impl Oracle {
         plan: &Arc<ParametrizedPlan>,
         guarantee: Guarantee,
     ) -> Result<Self, Refusal> {
+        Self::asking(task, plan, guarantee, Asked::All)
+    }
+
+    /// The oracle for a plan all of whose schedules are known to be valid, whatever the values of its
+    /// parameters, such as a deordered plan about facts alone. It takes time that grows little faster than
+    /// the plan; to look at each condition takes time that grows with the square of its length.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn of_times(
+        task: &Arc<Task>,
+        plan: &Arc<ParametrizedPlan>,
+        guarantee: Guarantee,
+    ) -> Result<Self, Refusal> {
+        Self::asking(task, plan, guarantee, Asked::Times)
+    }
+
+    fn asking(
+        task: &Arc<Task>,
+        plan: &Arc<ParametrizedPlan>,
+        guarantee: Guarantee,
+        asked: Asked,
+    ) -> Result<Self, Refusal> {
         let around = plan.nominal();
-        let soundness = Soundness::around(task, plan, &around)?;
+        let soundness = Soundness::around(task, plan, &around, asked)?;
         let controllability = match &soundness {
             Some(soundness) => Controllability::new(guarantee, plan, soundness.reduction()),
             None => Controllability::new(guarantee, plan, &Reduction::new(plan)),
@@ -89,6 +113,7 @@ impl Oracle {
             task: Arc::clone(task),
             plan: Arc::clone(plan),
             guarantee,
+            asked,
             controllability,
             soundness,
             around,
@@ -335,7 +360,8 @@ impl Oracle {
     /// Values in the box that have no schedule, if that shows already; then nothing changes.
     fn move_to(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Valuation>, Refusal> {
         let nearest = envelope.nearest(&self.plan.nominal());
-        let Some(soundness) = Soundness::around(&self.task, &self.plan, &nearest)? else {
+        let Some(soundness) = Soundness::around(&self.task, &self.plan, &nearest, self.asked)?
+        else {
             return Ok(Some(nearest));
         };
         self.refuted_before = self.refutations();

@@ -1,11 +1,12 @@
 //! The plan's network with rigidly connected nodes taken together, and weights that depend on a
 //! box.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_num::{CommonDenominator, Delta, Rational};
 use elbowroom_stn::{
-    ConsistentNetwork, Constraint, ConstraintId, Network, NodeId as ClassId, Weight,
+    ConsistentNetwork, Constraint, ConstraintId, Network, NodeId as ClassId, Schedule as Times,
+    Weight,
 };
 
 use crate::obligations::{BadCase, Substitution};
@@ -44,6 +45,8 @@ pub struct Reduction {
     pub substitution: Substitution,
     /// Parameters that bound more than the one difference they are.
     pub coupled: Vec<ParameterId>,
+    /// Parameters in constraints.
+    mentioned: BTreeSet<ParameterId>,
 }
 
 /// The network of a box, and which edge each of its constraints comes from.
@@ -69,6 +72,7 @@ impl Reduction {
             edges: Vec::new(),
             substitution: Substitution::new(),
             coupled: Vec::new(),
+            mentioned: BTreeSet::new(),
         };
         for (node, _) in plan.plan.nodes().skip(1) {
             let ends = (node, NodeId::ZERO);
@@ -103,6 +107,8 @@ impl Reduction {
                 }
             }
         }
+        reduction.coupled.sort_unstable();
+        reduction.coupled.dedup();
         reduction.keep_tightest();
         reduction.drop_implied(plan);
         reduction
@@ -116,11 +122,13 @@ impl Reduction {
     fn drop_implied(&mut self, plan: &ParametrizedPlan) {
         let ranges = DecoupledEnvelope::ranges(plan);
         let BoxNetwork { network, edges } = self.network(&ranges);
+        let nominal = DecoupledEnvelope::point(&plan.nominal());
+        let nominal = self.network(&nominal).network;
         let has_parameter = |id: ConstraintId| self.edges[edges[id.index()]].end.is_some();
         // Whole numbers are several times faster; sums of paths must stay far from overflow.
-        let implied = match scaled(&network) {
-            Some(network) => implied(network, has_parameter),
-            None => implied(network, has_parameter),
+        let implied = match scaled([&network, &nominal]) {
+            Some([network, nominal]) => implied(network, nominal, has_parameter),
+            None => implied(network, nominal, has_parameter),
         };
         let implied: Vec<usize> = implied.into_iter().map(|id| edges[id.index()]).collect();
         let mut index = 0;
@@ -146,26 +154,17 @@ impl Reduction {
         parameters.dedup();
         for parameter in parameters {
             debug_assert!(parameter.index() < plan.parameters.len());
-            if self.is_mentioned(parameter) {
+            if !self.mentioned.insert(parameter) {
                 self.coupled.push(parameter);
             } else if equal {
                 self.substitution.insert(parameter, (from, to));
             }
         }
-        self.coupled.sort_unstable();
-        self.coupled.dedup();
-    }
-
-    /// Whether an earlier constraint mentions the parameter.
-    fn is_mentioned(&self, parameter: ParameterId) -> bool {
-        self.edges
-            .iter()
-            .any(|edge| edge.end.is_some_and(|end| end.parameter == parameter))
     }
 
     /// Whether the parameter bounds a difference of times.
     pub fn is_in_network(&self, parameter: ParameterId) -> bool {
-        self.substitution.contains_key(&parameter) || self.is_mentioned(parameter)
+        self.mentioned.contains(&parameter)
     }
 
     /// A parameter in a product that the corners of a box say nothing about.
@@ -297,29 +296,119 @@ impl Edge {
 
 /// The constraints that others imply; none if the network is inconsistent (then there is nothing
 /// to gain, and the check of the nominal values will say so).
+///
+/// They are looked for in a schedule of the plan as it is: in one of the whole network everything
+/// may be at once, and then each search goes through all of it.
 fn implied<W: Weight>(
     network: Network<W>,
+    nominal: Network<W>,
     keep: impl Fn(ConstraintId) -> bool,
 ) -> Vec<ConstraintId> {
-    ConsistentNetwork::try_from(network)
-        .map(|network| network.implied(keep))
-        .unwrap_or_default()
+    let Ok(network) = ConsistentNetwork::try_from(network) else {
+        return Vec::new();
+    };
+    let nominal = ConsistentNetwork::try_from(nominal).ok();
+    let schedule = nominal.map(|nominal| nominal.earliest_schedule(ClassId(0)));
+    let Some(schedule) = schedule.filter(|schedule| schedule.holds_in(network.network())) else {
+        return network.implied(keep);
+    };
+    // What is near in time is looked through at once, the way back to the beginning is not.
+    let late = implied_by_earlier(network.network(), &schedule, &keep);
+    let mut left = Network::with_nodes(network.network().node_count());
+    let mut ids = Vec::new();
+    for (id, constraint) in network
+        .network()
+        .constraint_ids()
+        .zip(network.network().constraints())
+    {
+        if !late[id.index()] {
+            left.add(constraint.clone());
+            ids.push(id);
+        }
+    }
+    let is_late = network
+        .network()
+        .constraint_ids()
+        .filter(|id| late[id.index()]);
+    let mut implied: Vec<ConstraintId> = is_late.collect();
+    if let Ok(left) = ConsistentNetwork::try_from(left) {
+        let more = left.implied_seen_from(&schedule, |id| keep(ids[id.index()]));
+        implied.extend(more.into_iter().map(|id| ids[id.index()]));
+    }
+    implied.sort_unstable();
+    implied
 }
 
-/// The network with all bounds multiplied by their common denominator, if they are so small that no
-/// sum of them overflows.
-fn scaled(network: &Network<Delta>) -> Option<Network<i128>> {
-    let bounds = network.constraints().iter();
-    let unit = CommonDenominator::of(bounds.map(|constraint| &constraint.bound.real))?;
-    let mut whole = Network::with_nodes(network.node_count());
-    for constraint in network.constraints() {
-        whole.add(Constraint {
-            from: constraint.from,
-            to: constraint.to,
-            bound: i128::from(unit.whole(&constraint.bound.real)?),
-        });
+/// Of the constraints that say that a node comes so long after the first one, those that follow from one that
+/// says so of a node that is no later in the schedule.
+///
+/// All of them can go: if they followed from each other in a circle, all of its nodes would be at one time, the
+/// bounds between them would add up to nothing, and so each would be 0. Nodes on such circles are left alone.
+fn implied_by_earlier<W: Weight>(
+    network: &Network<W>,
+    schedule: &Times<W>,
+    keep: &impl Fn(ConstraintId) -> bool,
+) -> Vec<bool> {
+    let zero = ClassId(0);
+    let least = |known: &mut Option<W>, bound: W| {
+        if known.as_ref().is_none_or(|known| bound < *known) {
+            *known = Some(bound);
+        }
+    };
+    let mut own: Vec<Option<W>> = vec![None; network.node_count()];
+    for constraint in network.constraints().iter().filter(|own| own.to == zero) {
+        least(&mut own[constraint.from.index()], constraint.bound.clone());
     }
-    Some(whole)
+    let mut tight = Network::with_nodes(network.node_count());
+    for constraint in network.constraints() {
+        if constraint.slack_in(schedule) == W::zero() {
+            tight.add(constraint.clone());
+        }
+    }
+    let circle = tight.components();
+    let mut by_earlier: Vec<Option<W>> = vec![None; network.node_count()];
+    for constraint in network.constraints() {
+        let (from, to) = (constraint.from, constraint.to);
+        if to != zero
+            && schedule[to] <= schedule[from]
+            && circle[to.index()] != circle[from.index()]
+            && let Some(further) = &own[to.index()]
+        {
+            let bound = constraint.bound.plus(further);
+            least(&mut by_earlier[from.index()], bound);
+        }
+    }
+    let constraints = network.constraint_ids().zip(network.constraints());
+    constraints
+        .map(|(id, constraint)| {
+            let by_earlier = &by_earlier[constraint.from.index()];
+            constraint.to == zero
+                && !keep(id)
+                && by_earlier
+                    .as_ref()
+                    .is_some_and(|bound| *bound <= constraint.bound)
+        })
+        .collect()
+}
+
+/// The networks with all bounds multiplied by their common denominator, if they are so small that no
+/// sum of them overflows.
+fn scaled(networks: [&Network<Delta>; 2]) -> Option<[Network<i128>; 2]> {
+    let bounds = networks.into_iter().flat_map(Network::constraints);
+    let unit = CommonDenominator::of(bounds.map(|constraint| &constraint.bound.real))?;
+    let whole = |network: &Network<Delta>| {
+        let mut whole = Network::with_nodes(network.node_count());
+        for constraint in network.constraints() {
+            whole.add(Constraint {
+                from: constraint.from,
+                to: constraint.to,
+                bound: i128::from(unit.whole(&constraint.bound.real)?),
+            });
+        }
+        Some(whole)
+    };
+    let [one, other] = networks.map(whole);
+    Some([one?, other?])
 }
 
 /// Each node's class and offset: a union-find over constraints of the form `[c, c]`.

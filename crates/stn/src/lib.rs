@@ -50,6 +50,7 @@
 //! ```
 
 pub mod branching;
+mod bridges;
 mod consistency;
 mod consistent;
 mod direction;

@@ -17,6 +17,7 @@ use super::facts_only::{as_timed, facts_only};
 use super::vary::is_about_an_absent_action;
 use crate::chances::{ChanceError, chances};
 use crate::flow::{self, FlowError};
+use crate::room;
 
 impl From<FlowError> for PrepareError {
     fn from(error: FlowError) -> Self {
@@ -126,7 +127,13 @@ impl Analyst {
         plan: &Arc<ParametrizedPlan>,
     ) -> Result<DecoupledEnvelope, PrepareError> {
         let beyond = |refusal: Refusal| PrepareError::Beyond(refusal.to_string());
-        let mut oracle = Oracle::new(task, plan, self.settings.guarantee).map_err(beyond)?;
+        let guarantee = self.settings.guarantee;
+        let oracle = if room::is_about_facts_alone(task, plan) {
+            Oracle::of_times(task, plan, guarantee)
+        } else {
+            Oracle::new(task, plan, guarantee)
+        };
+        let mut oracle = oracle.map_err(beyond)?;
         let search = &self.settings.search;
         let run = irr(&mut oracle, search, &mut |_| self.flow()).map_err(beyond)?;
         let envelope = run.envelope.map_err(|_| PrepareError::NoGuarantee)?;

@@ -12,7 +12,7 @@ use elbowroom_model::ground::{Action, Body, Change, Condition, DurativeBody, Eff
 use elbowroom_plan::{ParameterKind, ParametrizedPlan, Reason};
 
 /// Whether nothing in the plan depends on a number that its schedule, or a parameter, may change.
-pub(super) fn are_enough(task: &Task, plan: &ParametrizedPlan) -> bool {
+pub(crate) fn are_enough(task: &Task, plan: &ParametrizedPlan) -> bool {
     let is_time =
         |kind: ParameterKind| matches!(kind, ParameterKind::Duration(_) | ParameterKind::Timed(_));
     let constraints = &plan.plan.constraints;

@@ -32,6 +32,8 @@ pub(super) struct Opening<'a> {
     pub(super) plan: ParametrizedPlan,
     pub(super) opened: BTreeMap<Quantity, ParameterId>,
     open_numbers: BTreeMap<OpenNumber, ParameterId>,
+    /// The names of all parameters.
+    names: BTreeSet<String>,
     /// Instances whose durations the executor chooses.
     pub(super) controllable: BTreeSet<InstanceId>,
 }
@@ -46,10 +48,13 @@ impl<'a> Opening<'a> {
         if unknowns::occur_in_rules(task) {
             return Err(ParametrizeError::OpenRule);
         }
+        let names = plan.parameters.iter();
+        let names = names.map(|parameter| parameter.name.clone()).collect();
         Ok(Self {
             task,
             nominal,
             plan,
+            names,
             opened: BTreeMap::new(),
             open_numbers: BTreeMap::new(),
             controllable: BTreeSet::new(),
@@ -117,8 +122,10 @@ impl<'a> Opening<'a> {
         } else {
             let id = ParameterId::from(self.plan.parameters.len());
             let range = kind.natural_range(&nominal);
+            let name = self.unused(name);
+            self.names.insert(name.clone());
             self.plan.parameters.push(Parameter {
-                name: self.unused(name),
+                name,
                 kind,
                 nominal,
                 weight: Rational::ONE,
@@ -150,11 +157,11 @@ impl<'a> Opening<'a> {
 
     /// The name, or the name with a number that makes it unique.
     fn unused(&self, name: String) -> String {
-        if self.plan.find(&name).is_none() {
+        if !self.names.contains(&name) {
             return name;
         }
         let numbered = (2..).map(|number: u64| format!("{name}_{number}"));
-        let mut free = numbered.filter(|name| self.plan.find(name).is_none());
+        let mut free = numbered.filter(|name| !self.names.contains(name));
         free.next().expect("some number is free")
     }
 

@@ -1,5 +1,7 @@
 //! Opening durations, constants, initial values and the times of timed initials.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::FluentId;
 use elbowroom_model::problem::{Comparison, FunctionId};
@@ -8,7 +10,7 @@ use elbowroom_num::Rational;
 use super::constants::{self, Place};
 use super::opening::{Opening, Quantity};
 use super::{ConstantTarget, ParametrizeError, VarySpec, nothing, select};
-use crate::parameter::{Parameter, ParameterKind};
+use crate::parameter::ParameterKind;
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, NodeId, Reason};
 use crate::valuation::ParameterId;
 
@@ -18,6 +20,8 @@ impl Opening<'_> {
         spec: &VarySpec,
         instances: &[InstanceId],
     ) -> Result<(), ParametrizeError> {
+        let known = self.known_durations();
+        let mut set = Vec::new();
         for &id in instances {
             if self.controllable.contains(&id) {
                 continue;
@@ -29,9 +33,7 @@ impl Opening<'_> {
                 return Err(nothing(spec, why));
             }
             let (start, end) = (plan.start(id), plan.end(id));
-            let is_open = |parameter: &Parameter| parameter.kind == ParameterKind::Duration(id);
-            if let Some(known) = self.plan.parameters.iter().position(is_open) {
-                let known = ParameterId::from(known);
+            if let Some(&known) = known.get(&id) {
                 self.opened.entry(Quantity::Duration(id)).or_insert(known);
             }
             let is_new = !self.opened.contains_key(&Quantity::Duration(id));
@@ -41,30 +43,50 @@ impl Opening<'_> {
             let kind = ParameterKind::Duration(id);
             let parameter = self.parameter(spec, Quantity::Duration(id), name, kind, nominal)?;
             if is_new {
-                self.set_duration(id, start, end, parameter);
+                set.push((id, start, end, parameter));
             }
         }
+        self.set_durations(&set);
         Ok(())
     }
 
-    /// Puts the parameter in place of whatever fixed how long the instance takes.
-    fn set_duration(&mut self, id: InstanceId, start: NodeId, end: NodeId, parameter: ParameterId) {
+    /// The parameters that stand for durations already.
+    fn known_durations(&self) -> BTreeMap<InstanceId, ParameterId> {
+        let mut known = BTreeMap::new();
+        for (index, parameter) in self.plan.parameters.iter().enumerate() {
+            if let ParameterKind::Duration(id) = parameter.kind {
+                known.entry(id).or_insert(ParameterId::from(index));
+            }
+        }
+        known
+    }
+
+    /// Puts parameters in place of whatever fixed how long these instances take, from their starts to their
+    /// ends.
+    fn set_durations(&mut self, set: &[(InstanceId, NodeId, NodeId, ParameterId)]) {
         let plan = &mut self.plan.plan;
-        plan.free_duration(id);
+        let ids: BTreeSet<InstanceId> = set.iter().map(|(id, ..)| *id).collect();
+        let ends: BTreeSet<_> = set
+            .iter()
+            .map(|(_, start, end, _)| (*start, *end))
+            .collect();
         plan.constraints
             .retain(|constraint| match constraint.reason {
-                Reason::Duration(other) => other != id,
+                Reason::Duration(id) => !ids.contains(&id),
                 // Fixing the duration served the schedules of one duration; each value is one.
-                Reason::Pinned => (constraint.from, constraint.to) != (start, end),
+                Reason::Pinned => !ends.contains(&(constraint.from, constraint.to)),
                 _ => true,
             });
-        plan.constraints.push(Constraint {
-            from: start,
-            to: end,
-            lower: Bound::Parameter(parameter),
-            upper: Bound::Parameter(parameter),
-            reason: Reason::Duration(id),
-        });
+        for &(id, from, to, parameter) in set {
+            plan.free_duration(id);
+            plan.constraints.push(Constraint {
+                from,
+                to,
+                lower: Bound::Parameter(parameter),
+                upper: Bound::Parameter(parameter),
+                reason: Reason::Duration(id),
+            });
+        }
     }
 
     pub(super) fn open_constants(

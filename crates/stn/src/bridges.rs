@@ -1,0 +1,282 @@
+//! Constraints on which it hangs that one node is reached from another.
+
+use crate::{Network, NodeId, Weight};
+
+impl<W: Weight> Network<W> {
+    /// For each constraint, whether every way along the others, whatever their bounds, from its `from` to its
+    /// `to` is missing while there is one back: without it, the nodes that reach each other fall apart.
+    ///
+    /// These are the strong bridges of the graph (Italiano, Laura & Santaroni, *Finding strong bridges and
+    /// strong articulation points in linear time*, TCS 2012): an edge is one if all ways from some node of
+    /// its component, or all ways to it, lead through the edge. Such edges dominate what they lead to; the
+    /// dominators are found by Semi-NCA (Georgiadis, Tarjan & Werneck, *Finding dominators in practice*,
+    /// JGAA 2006), in time that hardly grows faster than the network.
+    pub fn strong_bridges(&self) -> Vec<bool> {
+        let component = self.components();
+        let inner: Vec<bool> = self
+            .constraints()
+            .iter()
+            .map(|own| component[own.from.index()] == component[own.to.index()])
+            .collect();
+        let mut is_root = vec![true; self.node_count()];
+        let mut roots = Vec::new();
+        for (node, own) in self.nodes().zip(&component) {
+            if std::mem::replace(&mut is_root[*own], false) {
+                roots.push(node);
+            }
+        }
+        let mut bridges = vec![false; self.constraints().len()];
+        for is_forward in [true, false] {
+            let graph = Split::new(self, &inner, is_forward);
+            graph.mark_dominating(&roots, &mut bridges);
+        }
+        bridges
+    }
+}
+
+/// A network with a node in the middle of each constraint that stays inside its component.
+struct Split {
+    /// How many of the nodes are those of the network; the others are constraints.
+    node_count: usize,
+    /// Where the nodes begin whose edges lead on from a node: positions in `next`.
+    first: Vec<usize>,
+    next: Vec<usize>,
+    /// For each constraint, where it comes from.
+    sources: Vec<usize>,
+    /// For each constraint, where it leads to.
+    targets: Vec<usize>,
+}
+
+impl Split {
+    fn new<W: Weight>(network: &Network<W>, inner: &[bool], is_forward: bool) -> Self {
+        let node_count = network.node_count();
+        let constraints = network.constraints().iter();
+        let (sources, targets): (Vec<usize>, Vec<usize>) = constraints
+            .map(|own| {
+                let (from, to) = (own.from.index(), own.to.index());
+                if is_forward { (from, to) } else { (to, from) }
+            })
+            .unzip();
+        let mut first = vec![0; node_count + 1];
+        for (source, _) in sources.iter().zip(inner).filter(|(_, inner)| **inner) {
+            first[source + 1] += 1;
+        }
+        for node in 0..node_count {
+            first[node + 1] += first[node];
+        }
+        let mut place = first.clone();
+        let mut next = vec![0; first[node_count]];
+        for (index, source) in sources.iter().enumerate().filter(|(own, _)| inner[*own]) {
+            next[place[*source]] = node_count + index;
+            place[*source] += 1;
+        }
+        Self {
+            node_count,
+            first,
+            next,
+            sources,
+            targets,
+        }
+    }
+
+    /// What a node leads on to.
+    fn leads_to(&self, node: usize) -> &[usize] {
+        match node.checked_sub(self.node_count) {
+            None => &self.next[self.first[node]..self.first[node + 1]],
+            Some(constraint) => std::slice::from_ref(&self.targets[constraint]),
+        }
+    }
+
+    /// Marks the constraints that all ways from the root of their component to where they lead to go through.
+    fn mark_dominating(&self, roots: &[NodeId], marked: &mut [bool]) {
+        let mut tree = Tree::new(self.node_count + self.targets.len());
+        for root in roots {
+            tree.grow(self, root.index());
+        }
+        // Who leads to a node, as numbers of the tree.
+        let mut entering: Vec<Vec<usize>> = vec![Vec::new(); tree.nodes.len()];
+        for (constraint, target) in self.targets.iter().enumerate() {
+            let own = tree.numbers[self.node_count + constraint];
+            if own != 0 {
+                entering[tree.numbers[*target]].push(own);
+                entering[own].push(tree.numbers[self.sources[constraint]]);
+            }
+        }
+        let dominators = tree.dominators(&entering);
+        for (number, dominator) in dominators.into_iter().enumerate().skip(1) {
+            let is_node = tree.nodes[number] < self.node_count;
+            if let (true, Some(constraint)) =
+                (is_node, tree.nodes[dominator].checked_sub(self.node_count))
+            {
+                marked[constraint] = true;
+            }
+        }
+    }
+}
+
+/// Nodes in the order in which a depth-first search comes upon them, which numbers them from 1 on.
+struct Tree {
+    /// For each node its number; 0 while it is not seen.
+    numbers: Vec<usize>,
+    /// For each number its node; the first is nobody's.
+    nodes: Vec<usize>,
+    /// For each number that of the node from which it was seen; 0 of roots.
+    parents: Vec<usize>,
+}
+
+impl Tree {
+    fn new(count: usize) -> Self {
+        Self {
+            numbers: vec![0; count],
+            nodes: vec![0],
+            parents: vec![0],
+        }
+    }
+
+    /// Sees everything that a root leads to.
+    fn grow(&mut self, graph: &Split, root: usize) {
+        // Nodes, each with how much of what it leads to has been looked at.
+        let mut path = vec![(root, 0)];
+        self.see(root, 0);
+        while let Some((node, looked_at)) = path.last_mut() {
+            let Some(&next) = graph.leads_to(*node).get(*looked_at) else {
+                path.pop();
+                continue;
+            };
+            *looked_at += 1;
+            if self.numbers[next] == 0 {
+                self.see(next, self.numbers[*node]);
+                path.push((next, 0));
+            }
+        }
+    }
+
+    fn see(&mut self, node: usize, parent: usize) {
+        self.numbers[node] = self.nodes.len();
+        self.nodes.push(node);
+        self.parents.push(parent);
+    }
+
+    /// For each number that of its immediate dominator; 0 of roots.
+    fn dominators(&self, entering: &[Vec<usize>]) -> Vec<usize> {
+        let count = self.nodes.len();
+        let mut semi: Vec<usize> = (0..count).collect();
+        let mut label = semi.clone();
+        let mut up = self.parents.clone();
+        let mut path = Vec::new();
+        for own in (1..count).rev().filter(|&own| self.parents[own] != 0) {
+            semi[own] = self.parents[own];
+            for &from in &entering[own] {
+                let least = lowest(from, own + 1, (&semi, &mut label, &mut up), &mut path);
+                semi[own] = semi[own].min(semi[least]);
+            }
+        }
+        let mut dominators = self.parents.clone();
+        for own in 1..count {
+            while dominators[own] > semi[own] {
+                dominators[own] = dominators[dominators[own]];
+            }
+        }
+        dominators
+    }
+}
+
+/// Among a node and those above it that have been looked at, which are numbered from `looked_at` on, the
+/// one whose semidominator is least; the way up is made shorter.
+fn lowest(
+    node: usize,
+    looked_at: usize,
+    (semi, label, up): (&[usize], &mut [usize], &mut [usize]),
+    path: &mut Vec<usize>,
+) -> usize {
+    if node < looked_at || up[node] < looked_at {
+        return label[node];
+    }
+    let mut top = node;
+    while up[top] >= looked_at {
+        path.push(top);
+        top = up[top];
+    }
+    while let Some(own) = path.pop() {
+        if semi[label[top]] < semi[label[own]] {
+            label[own] = label[top];
+        }
+        up[own] = up[top];
+        top = own;
+    }
+    label[node]
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::Constraint;
+
+    fn network(count: usize, edges: &[(usize, usize)]) -> Network<i128> {
+        let mut network = Network::with_nodes(count);
+        let node = |index: usize| NodeId(u32::try_from(index).unwrap());
+        for (from, to) in edges {
+            network.add(Constraint {
+                from: node(*from),
+                to: node(*to),
+                bound: 0,
+            });
+        }
+        network
+    }
+
+    /// Whether edges lead from one node to another, without one of them.
+    fn leads(
+        network: &Network<i128>,
+        (from, to): (NodeId, NodeId),
+        without: Option<usize>,
+    ) -> bool {
+        let mut seen = vec![false; network.node_count()];
+        let mut stack = vec![from];
+        while let Some(node) = stack.pop() {
+            if node == to {
+                return true;
+            }
+            if !std::mem::replace(&mut seen[node.index()], true) {
+                let leaving = network.constraints().iter().enumerate();
+                let leaving =
+                    leaving.filter(|(index, own)| own.from == node && Some(*index) != without);
+                stack.extend(leaving.map(|(_, own)| own.to));
+            }
+        }
+        false
+    }
+
+    proptest! {
+        #[test]
+        fn a_bridge_is_what_there_is_no_way_around(
+            count in 1..9_usize,
+            edges in prop::collection::vec((0..9_usize, 0..9_usize), 0..24),
+        ) {
+            let edges: Vec<_> = edges.into_iter().map(|(a, b)| (a % count, b % count)).collect();
+            let network = network(count, &edges);
+            let bridges = network.strong_bridges();
+            for (index, own) in network.constraints().iter().enumerate() {
+                let is_bridge = leads(&network, (own.to, own.from), None)
+                    && !leads(&network, (own.from, own.to), Some(index));
+                prop_assert_eq!(bridges[index], is_bridge, "{:?} of {:?}", own, &edges);
+            }
+        }
+    }
+
+    #[test]
+    fn a_long_chain_there_and_back_is_all_bridges() {
+        const COUNT: usize = 20_000;
+        let there = (1..COUNT).map(|index| (index - 1, index));
+        let back = (1..COUNT).map(|index| (index, index - 1));
+        let edges: Vec<_> = there.chain(back).collect();
+        assert!(
+            network(COUNT, &edges)
+                .strong_bridges()
+                .into_iter()
+                .all(|own| own)
+        );
+    }
+}
