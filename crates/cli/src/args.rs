@@ -231,7 +231,7 @@ pub(crate) struct ManArgs {
 }
 
 /// The problem that every command is about.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub(crate) struct ProblemArgs {
     /// The domain, in PDDL
     #[arg(value_name = "DOMAIN")]

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use elbowroom::PlanKind;
 use elbowroom::model::validate::Violation;
-use elbowroom::model::{Problem, Task, TimeTriggeredPlan};
+use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
 use elbowroom::plan::format;
@@ -38,14 +38,28 @@ pub(crate) fn task_with_sources(
     epsilon: &Rational,
     output: &mut Output,
 ) -> Result<(Task, Source, Source), Failure> {
+    let (read, warnings) = silent_task_with_sources(arguments, epsilon)?;
+    warn(&warnings, output);
+    Ok(read)
+}
+
+/// The same, which says nothing: the warnings come along.
+pub(crate) fn silent_task_with_sources(
+    arguments: &ProblemArgs,
+    epsilon: &Rational,
+) -> Result<((Task, Source, Source), Vec<Diagnostic>), Failure> {
     let domain = source(&arguments.domain, "domain")?;
     let problem = source(&arguments.problem, "problem")?;
-    let read: Problem = with_warnings(pddl::read_problem(&domain, &problem), output)?;
-    Ok((
-        Task::new(read).with_epsilon(epsilon.clone()),
-        domain,
-        problem,
-    ))
+    let (read, warnings) = pddl::read_problem(&domain, &problem)?;
+    let task = Task::new(read).with_epsilon(epsilon.clone());
+    Ok(((task, domain, problem), warnings))
+}
+
+/// Writes warnings to standard error.
+pub(crate) fn warn(warnings: &[Diagnostic], output: &mut Output) {
+    for warning in warnings {
+        output.warn_about(warning);
+    }
 }
 
 /// Reads a plan of either kind: told by its content, or by a name that ends in `.stn`.
@@ -204,8 +218,6 @@ pub(crate) fn with_warnings<T>(
     output: &mut Output,
 ) -> Result<T, Failure> {
     let (value, warnings) = outcome?;
-    for warning in &warnings {
-        output.warn_about(warning);
-    }
+    warn(&warnings, output);
     Ok(value)
 }

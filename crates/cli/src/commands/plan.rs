@@ -1,14 +1,15 @@
 //! `elbowroom plan`: find a plan, or have another planner find one.
 
+mod reading;
 mod text;
 mod watch;
 
 use std::sync::Arc;
 
-use elbowroom::answers::RequestError;
+use elbowroom::answers::{RequestError, Watcher};
 use elbowroom::answers::plan::{
     BestPlanRequest, PlanAim, PlanFinding, PlanOutcome, PlanRequest, best_plan, certify, plan,
-    plan_with,
+    plan_with, unread,
 };
 use elbowroom::execute::SpecError;
 use elbowroom::external::Planner;
@@ -33,18 +34,26 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
     } else {
         Some(named(arguments)?)
     };
-    let (task, domain, problem) =
-        input::task_with_sources(&arguments.problem, &arguments.epsilon, output)?;
+    let mut watch = Watch::start(arguments);
+    let (task, domain, problem) = match reading::read(arguments, &mut watch, output)? {
+        Ok(read) => read,
+        Err(halt) => {
+            let name = planner.as_ref().map_or(EMBEDDED, |planner| &planner.name);
+            let outcome = unread(name, halt, watch.elapsed());
+            drop(watch);
+            return print(arguments, &outcome, output);
+        }
+    };
     if let Some(objective) = arguments.objective {
         return best(
             arguments,
             objective,
             planner.as_ref(),
             &Arc::new(task),
+            watch,
             output,
         );
     }
-    let mut watch = Watch::start(arguments, planner.is_some());
     let mut request = PlanRequest {
         task: &task,
         first_plan_only: arguments.first || watch.limit().is_none(),
@@ -53,7 +62,8 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
     let mut outcome = match &planner {
         None => plan(&mut request, &mut watch).map_err(unsupported)?,
         Some(planner) => {
-            let limit = watch.limit();
+            // It keeps its time limit itself.
+            let limit = watch.hand_over_the_limit();
             let sources = [&domain, &problem];
             plan_with(planner, &mut request, sources, limit, &mut watch).map_err(text::failure)?
         }
@@ -73,6 +83,7 @@ fn best(
     objective: PlanObjectiveChoice,
     planner: Option<&Planner>,
     task: &Arc<Task>,
+    mut watch: Watch,
     output: &mut Output,
 ) -> Answer {
     if planner.is_some() {
@@ -103,7 +114,6 @@ fn best(
             PlanAim::Probability(&world)
         }
     };
-    let mut watch = Watch::start(arguments, false);
     let request = BestPlanRequest {
         task,
         aim,

@@ -257,6 +257,36 @@ pub fn plan(
     Ok(PlanOutcome { answer, plan })
 }
 
+/// The answer of who was told to stop before the problem was read.
+pub fn unread(planner: &str, halt: Halt, elapsed: Duration) -> PlanOutcome {
+    let stop = PlanStop::from(halt);
+    let ended = match halt {
+        Halt::TimeLimit => "gave up at the time limit",
+        Halt::Cancelled => "stopped",
+    };
+    let reason = format!(
+        "no plan found: {ended}, before domain and problem were read; this is no proof that there \
+         is none"
+    );
+    PlanOutcome {
+        answer: PlanAnswer {
+            format: PlanFormat::Plan,
+            version: Version,
+            domain: String::new(),
+            problem: String::new(),
+            planner: planner.to_owned(),
+            finding: PlanFinding::None { reason },
+            choice: None,
+            stop,
+            plans: 0,
+            seconds: elapsed.as_secs_f64(),
+            first_plan_seconds: None,
+            statistics: Counts::default().into(),
+        },
+        plan: None,
+    }
+}
+
 impl Course<'_> {
     /// The answer, with how the plan was chosen if it was chosen among many.
     fn answer(

@@ -99,6 +99,11 @@ impl TimedWorld {
         model: &WorldModel,
         settings: &Settings,
     ) -> Result<Self, NotTabulated> {
+        if let Some(feature) = task.only_judged() {
+            return Err(NotTabulated::new(format!(
+                "it does not heed {feature}, which the problem has"
+            )));
+        }
         if !model.reports.is_perfect() {
             return Err(NotTabulated::new("the world's reports are not perfect"));
         }

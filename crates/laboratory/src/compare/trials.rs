@@ -18,7 +18,9 @@ use super::place::Place;
 use super::{
     Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, beginnings, clairvoyant,
 };
-use elbowroom::execute::{Embedded, Execution, NamedText, RememberingPlanner, RunSpec};
+use elbowroom::execute::{
+    Embedded, Execution, NamedText, RememberingPlanner, RunSpec, SpecError,
+};
 use elbowroom::flow;
 
 use crate::record::{TrialRecord, TrialRecords};
@@ -83,6 +85,10 @@ impl Setting<'_> {
     ) -> Result<Common<'a>, ExperimentError> {
         let (domain, problem) = self.texts()?;
         let task = Self::task(&domain, &problem)?;
+        // Whoever plans: a plan of another planner could not be carried out.
+        if let Some(feature) = task.left_to_the_judge() {
+            return Err(self.wrong(&SpecError::Unheeded(feature).to_string()));
+        }
         let situation = Situation::initial(&task);
         let mut planner = self.planner(domain, problem, goes_on)?;
         let first = match planner.plan(&task, &situation).answer {

@@ -137,6 +137,12 @@ impl<'a> Relaxed<'a> {
         self.graph.operators.len() as u64
     }
 
+    /// The number of operators, and of all that they change.
+    pub(crate) fn weight(&self) -> u64 {
+        let graph = &self.graph;
+        (graph.operators.len() + graph.effects.len() + graph.gains.len()) as u64
+    }
+
     /// Whether nothing that the end of the action adds is true, or can become true before it, in a
     /// state in which one instance of the action is under way.
     pub(crate) fn is_end_the_only_way(&mut self, state: &State, action: u32) -> bool {

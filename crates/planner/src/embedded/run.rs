@@ -20,16 +20,17 @@ use super::search::{Aim, Search, Strategy, Turn};
 use super::symmetry::Symmetry;
 use super::tuning::{Member, Technique};
 
-/// How much work lies between two reports, in operators of estimates: about ten milliseconds.
+/// How much work lies between two reports, in operators of estimates and what they change: about ten
+/// milliseconds.
 const REPORT_WORK: u64 = 2_000_000;
 
 /// The number of looked-up pairs that lie between two reports at most: some milliseconds.
 const REPORT_LOOKUPS: u64 = 4_000_000;
 
-/// The most turns between two reports where each state is a linear program.
+/// What turns count for between two reports, at most, where each state is a linear program.
 const REPORT_SYMBOLIC_TURNS: u64 = 8;
 
-/// The most turns between two reports.
+/// What turns count for between two reports, at most: one each, more where much is unsettled.
 const REPORT_TURNS: u64 = 256;
 
 pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
@@ -54,12 +55,10 @@ pub(super) struct Planner<'a> {
 impl Planner<'_> {
     pub(super) fn run(mut self) -> Answer {
         let compiled = self.compiled;
-        let mut searches: Vec<Search<'_>> = self
-            .strategies()
-            .into_iter()
-            .map(|strategy| Search::new(compiled, self.symmetry, strategy))
-            .collect();
-        let mut is_over = vec![false; searches.len()];
+        let strategies = self.strategies();
+        let mut is_over = vec![false; strategies.len()];
+        // The others are made when their first turn comes: that takes its time where actions are many.
+        let mut searches = vec![Search::new(compiled, self.symmetry, strategies[0])];
         let mut stopped = match self.work(&mut searches[0], compiled.tuning.root_check_after) {
             Outcome::Stop(stopped) => Some(stopped),
             Outcome::Better | Outcome::BudgetSpent => None,
@@ -88,10 +87,15 @@ impl Planner<'_> {
         let most = tuning.first_round_work / (1 + searches[0].size());
         budget = budget.min(most.max(tuning.root_check_after));
         while stopped.is_none() && !self.is_first_plan_enough() {
-            for (search, is_over) in searches.iter_mut().zip(&mut is_over) {
+            for (number, is_over) in is_over.iter_mut().enumerate() {
                 if *is_over {
                     continue;
                 }
+                if number == searches.len() {
+                    let strategy = strategies[number];
+                    searches.push(Search::new(compiled, self.symmetry, strategy));
+                }
+                let search = &mut searches[number];
                 match self.work(search, share(search, budget, compiled)) {
                     Outcome::Stop(reason) => stopped = Some(reason),
                     Outcome::Better | Outcome::BudgetSpent => {}
@@ -242,11 +246,10 @@ impl Planner<'_> {
         } else {
             REPORT_TURNS
         };
-        let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, most_turns);
+        let report_every = (REPORT_WORK / (1 + search.weight())).clamp(1, most_turns);
         let mut reported = (0, search.lookups());
-        let (mut turn, mut spent) = (0, 0);
+        let mut spent = 0;
         while spent < budget || self.keeps_its_turn(search, budget, spent) {
-            turn += 1;
             let result = search.turn();
             spent += search.price();
             // To schedule and to judge a candidate takes longer than many turns, and one that is no
@@ -268,9 +271,9 @@ impl Planner<'_> {
                 }
             }
             let lookups = search.lookups() - reported.1;
-            is_report_due |= turn - reported.0 >= report_every || lookups >= REPORT_LOOKUPS;
+            is_report_due |= spent - reported.0 >= report_every || lookups >= REPORT_LOOKUPS;
             if is_report_due {
-                reported = (turn, search.lookups());
+                reported = (spent, search.lookups());
                 self.count(&before, search);
                 if (self.observe)(&self.progress).is_break() {
                     return Outcome::Stop(Stopped::Interrupted);

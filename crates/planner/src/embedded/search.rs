@@ -225,6 +225,11 @@ impl<'a> Search<'a> {
         self.relaxed.size()
     }
 
+    /// The same, with all that the operators change: what an estimate may take at most.
+    pub(crate) fn weight(&self) -> u64 {
+        self.relaxed.weight()
+    }
+
     /// How many turns the last one counts for: more where much is unsettled.
     pub(crate) fn price(&self) -> u64 {
         self.price

@@ -31,16 +31,22 @@ struct Worth {
 }
 
 impl Watch {
-    /// Starts to watch. Another planner keeps its time limit itself.
-    pub(super) fn start(arguments: &PlanArgs, is_other_planner: bool) -> Self {
+    /// Starts to watch: from now on, whatever is done counts.
+    pub(super) fn start(arguments: &PlanArgs) -> Self {
         let limit = arguments.time_limit.as_ref().map(duration);
-        let own_limit = limit.filter(|_| !is_other_planner);
         Self {
-            stopwatch: Stopwatch::start(&Interrupt::listen()).until(own_limit),
+            stopwatch: Stopwatch::start(&Interrupt::listen()).until(limit),
             line: Progress::new(),
             limit,
             best: None,
         }
+    }
+
+    /// What is left of the time limit, for a planner that keeps it itself.
+    pub(super) fn hand_over_the_limit(&mut self) -> Option<Duration> {
+        self.stopwatch = self.stopwatch.clone().until(None);
+        let elapsed = self.stopwatch.elapsed();
+        self.limit.map(|limit| limit.saturating_sub(elapsed))
     }
 
     pub(super) fn limit(&self) -> Option<Duration> {

@@ -91,7 +91,10 @@ impl Graph {
         for (number, test) in compiled.tests.iter().enumerate() {
             is_free_test.push(test.difference.reads_duration());
             test.difference.visit_fluents(&mut |fluent| {
-                tests_of_fluent[fluent as usize].push(narrow(number));
+                let tests: &mut Vec<u32> = &mut tests_of_fluent[fluent as usize];
+                if tests.last() != Some(&narrow(number)) {
+                    tests.push(narrow(number));
+                }
             });
         }
         let mut graph = Self {

@@ -1,6 +1,7 @@
 //! From actions to operators.
 
 use super::super::super::compile::{Action, Change, Compiled, Compressibility, NONE, Snap, Update};
+use super::super::super::hash::Map;
 use super::super::super::time::{NEVER, Ticks};
 use super::super::numbers;
 use super::{Gain, Graph, Kind, Stays};
@@ -139,9 +140,11 @@ impl Graph {
 
     fn gains_of(&self, compiled: &Compiled, updates: &[&Update]) -> Vec<(u32, Gain)> {
         let mut gains: Vec<(u32, Gain)> = Vec::new();
+        // A fluent can occur in as many tests as there are actions.
+        let mut known: Map<u32, ()> = Map::default();
         for update in updates {
             for &test in &self.tests_of_fluent[update.fluent as usize] {
-                if gains.iter().all(|(known, _)| *known != test) {
+                if updates.len() == 1 || known.insert(test, ()).is_none() {
                     let gain = numbers::gain(compiled, test, updates);
                     if gain != Gain::Adds(0.0) {
                         gains.push((test, gain));

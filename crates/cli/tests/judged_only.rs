@@ -1,0 +1,143 @@
+//! Parts of the language that only the judge heeds: every other command refuses them by name.
+
+mod command;
+
+use std::fs;
+use std::path::PathBuf;
+
+use command::elbowroom;
+
+/// What stands in the domain, a step of a plan for it, and the name under which it is refused.
+const FEATURES: [(&str, &str, &str); 3] = [
+    (
+        "(:process fills :parameters () :precondition (open) :effect (increase (level) (* #t 1)))
+         (:durative-action wait :parameters () :duration (= ?duration 3) :effect (at end (seen)))",
+        "(wait)",
+        "processes and events (PDDL+)",
+    ),
+    (
+        "(:event spills :parameters () :precondition (and (open) (>= (level) 5))
+           :effect (not (open)))
+         (:durative-action wait :parameters () :duration (= ?duration 3) :effect (at end (seen)))",
+        "(wait)",
+        "processes and events (PDDL+)",
+    ),
+    (
+        "(:durative-action wait :parameters () :control (?amount - number)
+           :duration (= ?duration 3) :condition (at start (<= ?amount 5))
+           :effect (and (at end (seen)) (at end (increase (level) ?amount))))",
+        "(wait 2)",
+        "control parameters (`:control`)",
+    ),
+];
+
+/// Commands with `D`, `P`, `PLAN`, `NETWORK`, `ODDS`, `WORLD` and `EXPERIMENT` for files.
+const REFUSING: [&str; 19] = [
+    "plan D P",
+    "plan D P --time-limit 1",
+    "plan D P --objective room",
+    "stn D P PLAN",
+    "envelope D P PLAN",
+    "envelope D P PLAN --method best",
+    "envelope D P PLAN --method exact",
+    "envelope D P NETWORK",
+    "check D P NETWORK",
+    "run D P",
+    "run D P --plan PLAN",
+    "run D P --plan NETWORK",
+    "odds D P --likelihoods ODDS",
+    "odds D P PLAN --likelihoods ODDS",
+    "export smt2 D P PLAN --contains all=1%",
+    "export stnu D P PLAN --contains all=1%",
+    "export prism D P --likelihoods ODDS",
+    "export prism D P --world WORLD",
+    "compare EXPERIMENT",
+];
+
+/// A folder with files for a domain with this in it.
+fn folder(number: usize, (content, step, _): (&str, &str, &str)) -> PathBuf {
+    let name = format!("elbowroom-{}-judged-{number}", std::process::id());
+    let folder = std::env::temp_dir().join(name);
+    fs::create_dir_all(&folder).expect("a temporary folder can be made");
+    let write = |name: &str, text: &str| {
+        fs::write(folder.join(name), text).expect("a temporary file can be written");
+    };
+    let domain = format!(
+        "(define (domain bath) (:requirements :fluents :durative-actions :time)
+           (:predicates (open) (seen)) (:functions (level)) {content})"
+    );
+    write("D", &domain);
+    let problem = "(define (problem evening) (:domain bath) (:init (open) (= (level) 0))
+        (:goal (seen)))";
+    write("P", problem);
+    write("PLAN", &format!("0: {step} [3]\n"));
+    write("NETWORK", "durative-action instance n0 : (wait);\n");
+    write(
+        "ODDS",
+        "format = \"elbowroom-likelihoods\"\nversion = 1\n[defaults]\nbecomes_true = 0.0\n\
+         becomes_false = 0.01\nstart = 0.7\neffect = 0.95\n",
+    );
+    write("WORLD", "format = \"elbowroom-world\"\nversion = 1\n");
+    let planner = format!(
+        "sh -c 'cat {}' {{domain}} {{problem}}",
+        folder.join("PLAN").display()
+    );
+    write(
+        "EXPERIMENT",
+        &format!(
+            "format = \"elbowroom-experiment\"\nversion = 1\ntitle = \"Bath\"\ndomain = \"D\"\n\
+             problem = \"P\"\ntrials = 1\nexecutors = [\"guarded\"]\nplanner = \"{planner}\"\n\
+             planner_time = 5\n[[column]]\nname = \"late\"\nworld = \"WORLD\"\n"
+        ),
+    );
+    folder
+}
+
+#[test]
+fn what_only_the_judge_heeds_is_judged_and_refused_by_name_by_all_others() {
+    for (number, feature) in FEATURES.into_iter().enumerate() {
+        let folder = folder(number, feature);
+        let run = |command: &str| {
+            let words = command.split(' ').map(|word| {
+                let file = folder.join(word);
+                if file.is_file() {
+                    file.display().to_string()
+                } else {
+                    word.to_owned()
+                }
+            });
+            let words: Vec<String> = words.collect();
+            elbowroom(&words.iter().map(String::as_str).collect::<Vec<_>>())
+        };
+        let judged = run("check D P PLAN");
+        assert_eq!(judged.status.code(), Some(0), "{judged:?}");
+        for command in REFUSING {
+            let output = run(command);
+            assert_eq!(output.status.code(), Some(2), "{command}: {output:?}");
+            assert!(output.stdout.is_empty(), "{command}: {output:?}");
+            let said = String::from_utf8(output.stderr).expect("text");
+            let (name, place) = (feature.2, &folder);
+            assert!(said.contains(name), "{command} in {}: {said}", place.display());
+        }
+        // A repair finds that nothing has to change, but gives no guarantee, and says why.
+        let repaired = run("envelope D P PLAN --repair");
+        let said = String::from_utf8(repaired.stdout).expect("text");
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(said.contains("not guaranteed"), "{said}");
+        assert!(said.contains(feature.2), "{said}");
+        fs::remove_dir_all(&folder).expect("it is there");
+    }
+}
+
+#[test]
+fn compare_refuses_before_anything_else_what_executors_do_not_heed() {
+    let folder = folder(FEATURES.len(), FEATURES[0]);
+    let experiment = folder.join("EXPERIMENT").display().to_string();
+    let output = elbowroom(&["compare", &experiment]);
+    let said = String::from_utf8(output.stderr).expect("text");
+    assert!(
+        said.contains("executors do not heed processes and events (PDDL+) yet"),
+        "{said}"
+    );
+    fs::remove_dir_all(&folder).expect("it is there");
+}
