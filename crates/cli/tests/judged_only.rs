@@ -117,7 +117,11 @@ fn what_only_the_judge_heeds_is_judged_and_refused_by_name_by_all_others() {
             assert!(output.stdout.is_empty(), "{command}: {output:?}");
             let said = String::from_utf8(output.stderr).expect("text");
             let (name, place) = (feature.2, &folder);
-            assert!(said.contains(name), "{command} in {}: {said}", place.display());
+            assert!(
+                said.contains(name),
+                "{command} in {}: {said}",
+                place.display()
+            );
         }
         // A repair finds that nothing has to change, but gives no guarantee, and says why.
         let repaired = run("envelope D P PLAN --repair");

@@ -18,9 +18,7 @@ use super::place::Place;
 use super::{
     Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, beginnings, clairvoyant,
 };
-use elbowroom::execute::{
-    Embedded, Execution, NamedText, RememberingPlanner, RunSpec, SpecError,
-};
+use elbowroom::execute::{Embedded, Execution, NamedText, RememberingPlanner, RunSpec, SpecError};
 use elbowroom::flow;
 
 use crate::record::{TrialRecord, TrialRecords};
