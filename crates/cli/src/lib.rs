@@ -19,6 +19,7 @@ mod interrupt;
 mod journal;
 mod limits;
 mod look;
+mod memory;
 mod number;
 mod output;
 mod progress;

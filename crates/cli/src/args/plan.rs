@@ -32,7 +32,8 @@ pub(crate) struct PlanArgs {
     /// The world file (docs/formats/world.md) for --objective probability
     #[arg(long, value_name = "WORLD.toml", requires = "objective")]
     pub(crate) world: Option<PathBuf>,
-    /// Memory limit in MB; by default 2048 for the embedded planner
+    /// Memory limit in MB, of all that planning takes; by default, the states of the embedded
+    /// planner may take 2048
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
     #[arg(allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,

@@ -6,11 +6,11 @@ mod watch;
 
 use std::sync::Arc;
 
-use elbowroom::answers::{RequestError, Watcher};
 use elbowroom::answers::plan::{
     BestPlanRequest, PlanAim, PlanFinding, PlanOutcome, PlanRequest, best_plan, certify, plan,
     plan_with, unread,
 };
+use elbowroom::answers::{RequestError, Watcher};
 use elbowroom::execute::SpecError;
 use elbowroom::external::Planner;
 use elbowroom::model::Task;
@@ -62,8 +62,8 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
     let mut outcome = match &planner {
         None => plan(&mut request, &mut watch).map_err(unsupported)?,
         Some(planner) => {
-            // It keeps its time limit itself.
-            let limit = watch.hand_over_the_limit();
+            // It keeps them itself.
+            let limit = watch.hand_over_the_limits();
             let sources = [&domain, &problem];
             plan_with(planner, &mut request, sources, limit, &mut watch).map_err(text::failure)?
         }

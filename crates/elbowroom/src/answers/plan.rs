@@ -262,6 +262,7 @@ pub fn unread(planner: &str, halt: Halt, elapsed: Duration) -> PlanOutcome {
     let stop = PlanStop::from(halt);
     let ended = match halt {
         Halt::TimeLimit => "gave up at the time limit",
+        Halt::MemoryLimit => "gave up at the memory limit",
         Halt::Cancelled => "stopped",
     };
     let reason = format!(
@@ -365,6 +366,7 @@ impl From<Halt> for PlanStop {
     fn from(halt: Halt) -> Self {
         match halt {
             Halt::TimeLimit => Self::TimeLimit,
+            Halt::MemoryLimit => Self::MemoryLimit,
             Halt::Cancelled => Self::Cancelled,
         }
     }

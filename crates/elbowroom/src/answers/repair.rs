@@ -234,6 +234,7 @@ fn stopped(halt: Option<Halt>, bound: Rational) -> RepairFinding {
     RepairFinding::None {
         reason: match halt {
             Some(Halt::TimeLimit) => "the time limit was reached".to_owned(),
+            Some(Halt::MemoryLimit) => "the memory limit was reached".to_owned(),
             Some(Halt::Cancelled) => "it was cancelled".to_owned(),
             None => "there are too many cases to tell apart".to_owned(),
         },

@@ -34,6 +34,8 @@ pub trait Watcher {
 pub enum Halt {
     /// Time is up.
     TimeLimit,
+    /// More memory would be needed.
+    MemoryLimit,
     /// Nobody is interested any longer.
     Cancelled,
 }

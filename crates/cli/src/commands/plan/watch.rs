@@ -9,6 +9,7 @@ use elbowroom::num::Rational;
 
 use crate::args::PlanArgs;
 use crate::interrupt::Interrupt;
+use crate::memory::MemoryLimit;
 use crate::number;
 use crate::progress::Progress;
 use crate::stopwatch::{Stopwatch, duration};
@@ -19,6 +20,7 @@ pub(super) struct Watch {
     stopwatch: Stopwatch,
     line: Progress,
     limit: Option<Duration>,
+    memory: Option<MemoryLimit>,
     best: Option<Worth>,
 }
 
@@ -38,13 +40,17 @@ impl Watch {
             stopwatch: Stopwatch::start(&Interrupt::listen()).until(limit),
             line: Progress::new(),
             limit,
+            memory: arguments
+                .memory
+                .map(|megabytes| MemoryLimit::of(megabytes << 20)),
             best: None,
         }
     }
 
-    /// What is left of the time limit, for a planner that keeps it itself.
-    pub(super) fn hand_over_the_limit(&mut self) -> Option<Duration> {
+    /// Leaves the limits to a planner that keeps them itself: what is left of the time.
+    pub(super) fn hand_over_the_limits(&mut self) -> Option<Duration> {
         self.stopwatch = self.stopwatch.clone().until(None);
+        self.memory = None;
         let elapsed = self.stopwatch.elapsed();
         self.limit.map(|limit| limit.saturating_sub(elapsed))
     }
@@ -96,7 +102,12 @@ impl Watcher for Watch {
     }
 
     fn flow(&mut self) -> ControlFlow<Halt> {
-        self.stopwatch.flow()
+        self.stopwatch.flow()?;
+        let memory = self.memory.as_mut();
+        if memory.is_some_and(MemoryLimit::is_exceeded) {
+            return ControlFlow::Break(Halt::MemoryLimit);
+        }
+        ControlFlow::Continue(())
     }
 
     fn notice(&mut self, event: &Event<'_>) {

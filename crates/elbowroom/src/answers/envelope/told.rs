@@ -20,7 +20,8 @@ impl From<Halt> for Stop {
     fn from(halt: Halt) -> Self {
         match halt {
             Halt::TimeLimit => Self::TimeLimit,
-            Halt::Cancelled => Self::Cancelled,
+            // Only searches for plans have a limit of memory.
+            Halt::MemoryLimit | Halt::Cancelled => Self::Cancelled,
         }
     }
 }
