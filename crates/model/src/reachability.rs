@@ -52,7 +52,7 @@ use relaxation::Relaxation;
 const STEPS_PER_QUESTION: u64 = 8192;
 
 /// The number of actions made between two such questions.
-const ACTIONS_PER_QUESTION: usize = 256;
+const ACTIONS_PER_QUESTION: usize = 32;
 
 /// Limits of grounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

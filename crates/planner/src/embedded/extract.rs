@@ -20,17 +20,24 @@ struct Timing {
     end: Option<NodeId>,
 }
 
+/// How many choices are taken between two questions whether to go on.
+const STEPS_PER_QUESTION: usize = 16;
+
 /// The plan that the choices stand for, everything as early as possible; `None` if the judge does
-/// not find it valid.
+/// not find it valid, or `goes_on` says no.
 pub(crate) fn plan_of(
     task: &Task,
     situation: &Situation,
     compiled: &Compiled,
     steps: &[Step],
+    goes_on: &mut dyn FnMut() -> bool,
 ) -> Option<(TimeTriggeredPlan, validate::Report)> {
     let mut replay = Replay::new(compiled);
-    for &step in steps {
+    for (number, &step) in steps.iter().enumerate() {
         replay.take(step)?;
+        if number % STEPS_PER_QUESTION == STEPS_PER_QUESTION - 1 && !goes_on() {
+            return None;
+        }
     }
     while replay.state.timed < compiled.timed_until_goal {
         replay.take(Step::Timed)?;

@@ -163,12 +163,16 @@ impl Network {
     /// Notes that a node has set an annotation. Older nodes that are known to come before it need
     /// not be remembered for that annotation.
     pub(crate) fn mark(&mut self, annotation: u32, node: NodeId) {
-        // The edges to a new node are the last ones.
-        let newest = self.edges.iter().rev().take_while(|edge| edge.to == node);
-        for edge in newest.filter(|edge| edge.distance >= 0) {
-            let known = (annotation, edge.from);
-            if let Some(place) = self.marks.iter().position(|mark| *mark == known) {
-                self.marks.swap_remove(place);
+        let older = self.marks.iter().filter(|mark| mark.0 == annotation);
+        let older: Vec<NodeId> = older.map(|mark| mark.1).collect();
+        if !older.is_empty() {
+            // The edges to a new node are the last ones.
+            let newest = self.edges.iter().rev().take_while(|edge| edge.to == node);
+            for edge in newest.filter(|edge| edge.distance >= 0 && older.contains(&edge.from)) {
+                let known = (annotation, edge.from);
+                if let Some(place) = self.marks.iter().position(|mark| *mark == known) {
+                    self.marks.swap_remove(place);
+                }
             }
         }
         self.marks.push((annotation, node));

@@ -247,7 +247,7 @@ impl Planner<'_> {
             REPORT_TURNS
         };
         let report_every = (REPORT_WORK / (1 + search.weight())).clamp(1, most_turns);
-        let mut reported = (0, search.lookups());
+        let mut reported = (search.labour(), search.lookups());
         let mut spent = 0;
         while spent < budget || self.keeps_its_turn(search, budget, spent) {
             let result = search.turn();
@@ -271,9 +271,10 @@ impl Planner<'_> {
                 }
             }
             let lookups = search.lookups() - reported.1;
-            is_report_due |= spent - reported.0 >= report_every || lookups >= REPORT_LOOKUPS;
+            is_report_due |=
+                search.labour() - reported.0 >= report_every || lookups >= REPORT_LOOKUPS;
             if is_report_due {
-                reported = (spent, search.lookups());
+                reported = (search.labour(), search.lookups());
                 self.count(&before, search);
                 if (self.observe)(&self.progress).is_break() {
                     return Outcome::Stop(Stopped::Interrupted);
@@ -307,15 +308,22 @@ impl Planner<'_> {
 
     /// Looks at the choices that a search takes for a plan.
     fn consider(&mut self, steps: &[Step], search: &mut Search<'_>) -> Option<Outcome> {
-        let judged = extract::plan_of(self.task, self.situation, self.compiled, steps);
+        let (task, situation) = (self.task, self.situation);
+        let mut is_interrupted = false;
+        let mut goes_on = || {
+            is_interrupted = (self.observe)(&self.progress).is_break();
+            !is_interrupted
+        };
+        let judged = extract::plan_of(task, situation, self.compiled, steps, &mut goes_on);
+        if is_interrupted {
+            return Some(Outcome::Stop(Stopped::Interrupted));
+        }
         let Some((plan, report)) = judged else {
             search.has_lost = true;
             return None;
         };
         let worth = |found: &Found| (found.value.clone(), found.makespan.clone());
         let whole = self.value(plan.clone(), &report);
-        let (task, situation) = (self.task, self.situation);
-        let mut is_interrupted = false;
         let mut goes_on = || {
             is_interrupted = (self.observe)(&self.progress).is_break();
             !is_interrupted

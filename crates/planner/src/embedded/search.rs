@@ -72,6 +72,8 @@ pub(crate) struct Search<'a> {
     pub(crate) has_lost: bool,
     /// How much the last turn counts for.
     price: u64,
+    /// What all turns took, in turns of states without an unsettled past.
+    labour: u64,
     /// What the turns since the last better estimate count for.
     idle: u64,
     /// The number of successors that had their turn.
@@ -171,6 +173,7 @@ impl<'a> Search<'a> {
             horizon: NEVER,
             has_lost: strategy.is_chronological,
             price: 1,
+            labour: 0,
             idle: 0,
             drawn: 0,
             expanded: 0,
@@ -235,6 +238,11 @@ impl<'a> Search<'a> {
         self.price
     }
 
+    /// What all turns took so far, those included in which no state was made.
+    pub(crate) fn labour(&self) -> u64 {
+        self.labour
+    }
+
     /// Whether it compresses: its states take less time than those of others where actions are many.
     pub(crate) fn compresses(&self) -> bool {
         self.strategy.compresses.is_some()
@@ -256,6 +264,7 @@ impl<'a> Search<'a> {
     /// Looks at one more state.
     pub(crate) fn turn(&mut self) -> Turn {
         self.price = 1;
+        self.labour += 1;
         if !std::mem::replace(&mut self.has_begun, true) {
             let initial = root(self.compiled);
             if initial.earliest_end() > self.horizon {
@@ -271,6 +280,8 @@ impl<'a> Search<'a> {
         if !self.looks_no_later_than(latest_end) || self.is_cut(parent) {
             return Turn::Nothing;
         }
+        let unsettled = self.nodes[parent as usize].state.network.node_count() as u64;
+        self.labour += unsettled * unsettled / (1 + self.size());
         let Some((step, state)) = self.make(parent, step) else {
             return Turn::Nothing;
         };
