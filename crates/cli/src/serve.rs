@@ -8,13 +8,13 @@ use std::io::{self, Read as _, Write};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs as _};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::thread;
-use std::time::Duration;
 
 use elbowroom::execution::run::FIRST_GOAL;
 use tiny_http::{Header, Method, Request, Response, Server};
 
+pub(crate) use crate::board::{Board, NAME};
 use crate::desk::{Ask, Desk};
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
@@ -24,186 +24,8 @@ use crate::words::plain;
 /// The limit on clients that are served at once; others are asked to come back.
 const MOST_CLIENTS: usize = 64;
 
-/// How often a client that hears nothing new is told so, in order to notice that it has gone.
-const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
-
-/// How long clients have to fetch the end of the run.
-const FAREWELL: Duration = Duration::from_secs(2);
-
 /// The least length of a token, in bytes.
 const LEAST_TOKEN: usize = 16;
-
-/// The name of the trace on its page.
-pub(crate) const NAME: &str = "the run";
-
-/// The trace of a run so far.
-#[derive(Clone, Default)]
-pub(crate) struct Board(Arc<Shared>);
-
-#[derive(Default)]
-struct Shared {
-    state: Mutex<State>,
-    changed: Condvar,
-    /// The document of so many lines.
-    document: Mutex<Option<(usize, Arc<str>)>>,
-    clients: AtomicUsize,
-}
-
-#[derive(Default)]
-struct State {
-    trace: String,
-    /// Where each line ends.
-    ends: Vec<usize>,
-    lines: usize,
-    is_over: bool,
-    /// Clients that wait for news.
-    listeners: usize,
-}
-
-impl Board {
-    /// Adds a line of the trace, with its line feed.
-    pub(crate) fn add(&self, line: &str) {
-        let mut state = self.lock();
-        state.trace.push_str(line);
-        let end = state.trace.len();
-        state.ends.push(end);
-        state.lines += 1;
-        drop(state);
-        self.0.changed.notify_all();
-    }
-
-    /// The trace so far.
-    pub(crate) fn trace(&self) -> String {
-        self.lock().trace.clone()
-    }
-
-    /// Says that the run is over, and waits a little for clients that fetch how it ended.
-    pub(crate) fn close(&self) {
-        let mut state = self.lock();
-        state.is_over = true;
-        self.0.changed.notify_all();
-        let waits = |state: &mut State| state.listeners > 0;
-        state = self
-            .0
-            .changed
-            .wait_timeout_while(state, FAREWELL, waits)
-            .unwrap_or_else(PoisonError::into_inner)
-            .0;
-        drop(state);
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // A thread that failed while it held the lock has left whole lines.
-        let state = self.0.state.lock();
-        state.unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// What the page shows now, as JSON; made once for all clients.
-    pub(crate) fn document(&self) -> Result<Arc<str>, String> {
-        let cached = self.0.document.lock();
-        let mut cached = cached.unwrap_or_else(PoisonError::into_inner);
-        let (lines, trace) = {
-            let state = self.lock();
-            if let Some((lines, document)) = &*cached
-                && *lines == state.lines
-            {
-                return Ok(Arc::clone(document));
-            }
-            (state.lines, state.trace.clone())
-        };
-        let document =
-            elbowroom_page::live_document(NAME, &trace).map_err(|error| error.to_string())?;
-        let text = serde_json::to_string(&document).map_err(|error| error.to_string())?;
-        let text: Arc<str> = text.into();
-        *cached = Some((lines, Arc::clone(&text)));
-        Ok(text)
-    }
-}
-
-impl Board {
-    /// The page as it is now.
-    pub(crate) fn page(&self) -> Result<String, String> {
-        elbowroom_page::live_page(NAME, &self.trace()).map_err(|error| error.to_string())
-    }
-
-    /// Tells a client of every change, until the run is over or the client has gone.
-    pub(crate) fn tell_changes(&self, client: &mut dyn Write) -> io::Result<()> {
-        self.listened(|| self.tell_all_changes(client))
-    }
-
-    /// Tells a client every line of the trace behind line `after`, or from now on, until the run is
-    /// over or the client has gone.
-    pub(crate) fn tell_lines(
-        &self,
-        after: Option<usize>,
-        client: &mut dyn Write,
-    ) -> io::Result<()> {
-        self.listened(|| self.tell_all_lines(after, client))
-    }
-
-    fn listened(&self, tell: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
-        self.lock().listeners += 1;
-        let told = tell();
-        self.lock().listeners -= 1;
-        self.0.changed.notify_all();
-        told
-    }
-
-    /// Waits until there are more than `told` lines, or none will come, or for a while.
-    fn await_lines(&self, told: usize) -> MutexGuard<'_, State> {
-        let state = self.lock();
-        let waits = |state: &mut State| state.lines <= told && !state.is_over;
-        let changed = &self.0.changed;
-        let waited = changed.wait_timeout_while(state, SIGN_OF_LIFE, waits);
-        waited.unwrap_or_else(PoisonError::into_inner).0
-    }
-
-    fn tell_all_changes(&self, client: &mut dyn Write) -> io::Result<()> {
-        let mut told = 0;
-        loop {
-            let (lines, is_over) = {
-                let state = self.await_lines(told);
-                (state.lines, state.is_over)
-            };
-            if is_over {
-                let document = self.document().map_err(io::Error::other)?;
-                write!(client, "event: over\ndata: {document}\n\n")?;
-                return client.flush();
-            }
-            if lines == told {
-                client.write_all(b": nothing new\n\n")?;
-            } else {
-                told = lines;
-                write!(client, "event: change\ndata: {lines}\n\n")?;
-            }
-            client.flush()?;
-        }
-    }
-
-    fn tell_all_lines(&self, after: Option<usize>, client: &mut dyn Write) -> io::Result<()> {
-        let mut told = after.unwrap_or_else(|| self.lock().lines);
-        loop {
-            let (news, is_over) = {
-                let state = self.await_lines(told);
-                told = told.min(state.lines);
-                let from = told.checked_sub(1).map_or(0, |last| state.ends[last]);
-                (state.trace[from..].to_owned(), state.is_over)
-            };
-            for line in news.lines() {
-                told += 1;
-                write!(client, "id: {told}\nevent: entry\ndata: {line}\n\n")?;
-            }
-            if is_over {
-                client.write_all(b"event: over\ndata: {}\n\n")?;
-                return client.flush();
-            }
-            if news.is_empty() {
-                client.write_all(b": nothing new\n\n")?;
-            }
-            client.flush()?;
-        }
-    }
-}
 
 /// The right to stop the run.
 pub(crate) struct Control {
@@ -321,6 +143,7 @@ pub(crate) fn start(
     };
     output::tell(&format!("the run is shown at http://{own}/{with_token}"));
     let doorman = Arc::new(Doorman {
+        clients: AtomicUsize::new(0),
         board,
         control,
         desk,
@@ -335,6 +158,7 @@ pub(crate) fn start(
 }
 
 struct Doorman {
+    clients: AtomicUsize,
     board: Board,
     control: Option<Control>,
     desk: Option<Desk>,
@@ -344,7 +168,7 @@ struct Doorman {
 impl Doorman {
     /// Serves a client in a thread of its own.
     fn admit(self: Arc<Self>, request: Request) {
-        let clients = &self.board.0.clients;
+        let clients = &self.clients;
         if clients.fetch_add(1, Ordering::SeqCst) >= MOST_CLIENTS {
             clients.fetch_sub(1, Ordering::SeqCst);
             let _ = request.respond(plain_text(503, "too many clients; come back later\n"));
@@ -353,7 +177,7 @@ impl Doorman {
         thread::spawn(move || {
             // A client that has gone away needs no answer.
             let _ = self.serve(request);
-            self.board.0.clients.fetch_sub(1, Ordering::SeqCst);
+            self.clients.fetch_sub(1, Ordering::SeqCst);
         });
     }
 

@@ -43,6 +43,7 @@ mod handover;
 pub mod here;
 mod intake;
 mod lasting;
+mod oblivion;
 mod progress;
 mod room;
 mod settings;

@@ -131,21 +131,22 @@ fn perturbed_results(name: &str, text: &str) -> Result<PerturbedResults, PageErr
 /// The page about a run that goes on, from its trace so far. It follows the run by what its server
 /// tells: `events` is a stream of events, `change` whenever there is more and `over` with the
 /// document of the whole run; `document` is [`live_document`] as JSON. With `#token=…` in its
-/// address, it can also ask the server to `stop` the run.
+/// address, it can also ask the server to `stop` the run. `left_out` is how many lines behind the first
+/// one the text no longer has.
 ///
 /// # Errors
 /// When the text is no trace of a run, or damaged.
-pub fn live_page(name: &str, text: &str) -> Result<String, PageError> {
-    Ok(html::live(&live_document(name, text)?))
+pub fn live_page(name: &str, text: &str, left_out: usize) -> Result<String, PageError> {
+    Ok(html::live(&live_document(name, text, left_out)?))
 }
 
-/// What the page about a run that goes on shows.
+/// What the page about a run that goes on shows; `left_out` as for [`live_page`].
 ///
 /// # Errors
 /// When the text is no trace of a run, or damaged.
-pub fn live_document(name: &str, text: &str) -> Result<Document, PageError> {
+pub fn live_document(name: &str, text: &str, left_out: usize) -> Result<Document, PageError> {
     match format(text).as_deref() {
-        Some(TRACE) => of_trace(name, text, run::Record::Growing),
+        Some(TRACE) => of_trace(name, text, run::Record::Growing { left_out }),
         _ => Err(PageError::NoRun(name.to_owned())),
     }
 }

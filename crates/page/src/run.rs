@@ -31,7 +31,10 @@ pub(crate) enum Record {
     /// It ends there.
     Ended,
     /// It grows while the run goes on.
-    Growing,
+    Growing {
+        /// How many lines behind the first one it no longer has.
+        left_out: usize,
+    },
 }
 
 /// The page about a run.
@@ -41,7 +44,15 @@ pub(crate) enum Record {
 pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record) -> Document {
     let mut texts = Texts::default();
     let task = task(spec).map(Arc::new);
-    let mut belief = task.as_ref().map(|task| Belief::new(task, &mut texts));
+    let left_out = match record {
+        Record::Growing { left_out } => left_out,
+        Record::Ended => 0,
+    };
+    // What was believed follows from the beginning.
+    let mut belief = task
+        .as_ref()
+        .filter(|_| left_out == 0)
+        .map(|task| Belief::new(task, &mut texts));
     let (mut bars, mut guarantees, mut log) =
         (Bars::default(), Guarantees::default(), Log::default());
     let mut report = None;
@@ -109,6 +120,10 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         ("planner".to_owned(), spec.planner.clone()),
         ("trace".to_owned(), name.to_owned()),
     ];
+    if left_out > 0 {
+        let words = format!("the first {left_out} lines of the trace, and facts and numbers");
+        facts.push(("not shown".to_owned(), words));
+    }
     if let Some(report) = report {
         facts.push(("new plans".to_owned(), report.replans.to_string()));
         facts.push(("actions started".to_owned(), report.starts.to_string()));
@@ -124,11 +139,11 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
                         "The trace ends at {} before the run was over.",
                         nearest(&now)
                     ),
-                    Record::Growing if is_paused => format!(
+                    Record::Growing { .. } if is_paused => format!(
                         "The run is paused: nothing more is started. It is at {}.",
                         nearest(&now)
                     ),
-                    Record::Growing => format!("The run goes on; it is at {}.", nearest(&now)),
+                    Record::Growing { .. } => format!("The run goes on; it is at {}.", nearest(&now)),
                 },
             },
         },

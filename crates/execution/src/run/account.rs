@@ -14,11 +14,14 @@ use crate::event::{Ending, Measured, Ticket};
 use crate::executor::{Order, StepId};
 use crate::progression::Progression;
 
-/// Everything that was started.
+/// Everything that was started, but for what a lasting run has forgotten.
 #[derive(Clone, Debug, Default)]
 pub struct Account {
-    /// By ticket.
-    entries: Vec<Opened>,
+    entries: BTreeMap<Ticket, Opened>,
+    /// How many there were: tickets are given out in this order.
+    started: usize,
+    /// How many of them were left when something was last forgotten.
+    kept: usize,
     /// The steps of the present plan.
     steps: BTreeMap<StepId, Ticket>,
     /// Those that have not ended.
@@ -68,20 +71,17 @@ impl Account {
                 planned: Some(underway.planned.clone()),
                 step: None,
                 ordered: underway.start.clone(),
-                started: None,
+                started: Some(underway.start.clone()),
                 heard: None,
-                ended: Some((underway.start.clone(), Ending::Cancelled)),
+                ended: None,
                 cancelled: None,
                 warned: None,
                 measured: [Vec::new(), Vec::new()],
             };
+            account.entries.insert(*ticket, opened);
             // Numbers in between were of what has ended.
-            account.entries.resize(index(*ticket), opened.clone());
-            account.entries.push(Opened {
-                started: Some(underway.start.clone()),
-                ended: None,
-                ..opened
-            });
+            let number = usize::try_from(ticket.0).unwrap_or(usize::MAX);
+            account.started = account.started.max(number.saturating_add(1));
             account.open.insert(*ticket);
         }
         account.begin_plan(running);
@@ -90,7 +90,23 @@ impl Account {
 
     /// The number of actions started.
     pub fn started(&self) -> usize {
-        self.entries.len()
+        self.started
+    }
+
+    /// Forgets the first starts that have ended and are not of the present plan, until no more than
+    /// so many are left, if there are as many such. To be called often: it does nothing before
+    /// there are twice as many.
+    pub(super) fn forget(&mut self, most: usize) {
+        if self.entries.len() < 2 * most.max(self.kept) {
+            return;
+        }
+        let mut surplus = self.entries.len() - most;
+        self.entries.retain(|_, entry| {
+            let is_past = surplus > 0 && entry.ended.is_some() && entry.step.is_none();
+            surplus -= usize::from(is_past);
+            !is_past
+        });
+        self.kept = self.entries.len();
     }
 
     /// The tickets of actions that have not ended.
@@ -99,8 +115,9 @@ impl Account {
     }
 
     pub(super) fn open(&mut self, order: &Order, now: &Rational) -> Ticket {
-        let ticket = Ticket(self.entries.len() as u64);
-        self.entries.push(Opened {
+        let ticket = Ticket(self.started as u64);
+        self.started += 1;
+        let opened = Opened {
             action: Arc::clone(&order.action),
             planned: order.duration.clone(),
             step: Some(order.step),
@@ -111,7 +128,8 @@ impl Account {
             cancelled: None,
             warned: None,
             measured: [Vec::new(), Vec::new()],
-        });
+        };
+        self.entries.insert(ticket, opened);
         self.steps.insert(order.step, ticket);
         self.open.insert(ticket);
         ticket
@@ -120,10 +138,14 @@ impl Account {
     /// The steps of earlier plans no longer mean anything, but for those that go on.
     pub(super) fn begin_plan(&mut self, running: &BTreeMap<StepId, Ticket>) {
         for ticket in std::mem::take(&mut self.steps).into_values() {
-            self.entries[index(ticket)].step = None;
+            if let Some(entry) = self.entries.get_mut(&ticket) {
+                entry.step = None;
+            }
         }
         for (step, ticket) in running {
-            self.entries[index(*ticket)].step = Some(*step);
+            if let Some(entry) = self.entries.get_mut(ticket) {
+                entry.step = Some(*step);
+            }
             self.steps.insert(*step, *ticket);
         }
     }
@@ -131,7 +153,7 @@ impl Account {
     /// The actions of the present plan that were started, or went on when it began.
     pub(super) fn of_plan(&self) -> impl Iterator<Item = (Ticket, &Opened)> + '_ {
         let tickets = self.steps.values();
-        tickets.map(|ticket| (*ticket, &self.entries[index(*ticket)]))
+        tickets.filter_map(|ticket| Some((*ticket, self.get(*ticket)?)))
     }
 
     pub(super) fn ticket(&self, step: StepId) -> Option<Ticket> {
@@ -139,11 +161,13 @@ impl Account {
     }
 
     pub(super) fn get(&self, ticket: Ticket) -> Option<&Opened> {
-        self.entries.get(index(ticket))
+        self.entries.get(&ticket)
     }
 
     pub(super) fn note_start(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) {
-        let entry = &mut self.entries[index(ticket)];
+        let Some(entry) = self.entries.get_mut(&ticket) else {
+            return;
+        };
         entry.started = Some(time.clone());
         entry.measured[0] = measured.to_vec();
         if entry.planned.is_none() {
@@ -159,20 +183,25 @@ impl Account {
         ending: &Ending,
         measured: &[Measured],
     ) {
-        let entry = &mut self.entries[index(ticket)];
+        let Some(entry) = self.entries.get_mut(&ticket) else {
+            return;
+        };
         entry.ended = Some((time.clone(), ending.clone()));
         entry.measured[1] = measured.to_vec();
         self.open.remove(&ticket);
     }
 
     pub(super) fn note_heard(&mut self, ticket: Ticket, time: &Rational) {
-        let heard = &mut self.entries[index(ticket)].heard;
-        let latest = heard.take().into_iter().chain([time.clone()]).max();
-        *heard = latest;
+        if let Some(entry) = self.entries.get_mut(&ticket) {
+            let latest = entry.heard.take().into_iter().chain([time.clone()]).max();
+            entry.heard = latest;
+        }
     }
 
     pub(super) fn note_warning(&mut self, ticket: Ticket, until: &Rational) {
-        self.entries[index(ticket)].warned = Some(until.clone());
+        if let Some(entry) = self.entries.get_mut(&ticket) {
+            entry.warned = Some(until.clone());
+        }
     }
 
     pub(super) fn is_cancelled(&self, ticket: Ticket) -> bool {
@@ -181,7 +210,9 @@ impl Account {
     }
 
     pub(super) fn note_cancel(&mut self, ticket: Ticket, time: &Rational) {
-        self.entries[index(ticket)].cancelled = Some(time.clone());
+        if let Some(entry) = self.entries.get_mut(&ticket) {
+            entry.cancelled = Some(time.clone());
+        }
     }
 
     /// Until when to wait for a word of an action. `allowed` is until when the present plan allows
@@ -192,7 +223,9 @@ impl Account {
         patience: &Patience,
         allowed: Option<Rational>,
     ) -> Rational {
-        let entry = &self.entries[index(ticket)];
+        let Some(entry) = self.get(ticket) else {
+            return Rational::ZERO;
+        };
         if let Some(cancelled) = &entry.cancelled {
             return cancelled + &patience.at_least;
         }
@@ -203,10 +236,9 @@ impl Account {
         allowed.map_or(limit.clone(), |allowed| limit.max(allowed))
     }
 
-    /// All that was started and did start, as steps for the judge.
+    /// All that was started, did start and is not forgotten, as steps for the judge.
     pub(super) fn executed(&self, now: &Rational) -> Vec<ExecutedStep> {
-        let numbered = self.entries.iter().enumerate();
-        let steps = numbered.filter_map(|(index, entry)| {
+        let steps = self.entries.iter().filter_map(|(ticket, entry)| {
             let start = entry.started.clone()?;
             let end = entry.ended.as_ref().map_or(now, |(time, _)| time);
             let ending = entry.ended.as_ref().map(|(_, ending)| ending.clone());
@@ -216,7 +248,7 @@ impl Account {
                 .as_ref()
                 .map(|_| (end - &start).max(Rational::ZERO));
             Some(ExecutedStep {
-                ticket: Ticket(index as u64),
+                ticket: *ticket,
                 ending,
                 step: Step {
                     action: as_it_was(entry, is_whole),
@@ -263,8 +295,4 @@ fn cut_off(body: &mut DurativeBody) {
         condition: Condition::TRUE,
         effects: Vec::new(),
     };
-}
-
-fn index(ticket: Ticket) -> usize {
-    usize::try_from(ticket.0).unwrap_or(usize::MAX)
 }

@@ -54,14 +54,7 @@ impl Run<'_> {
 
     /// Facts and numbers that can never become true again, and since when.
     pub(super) fn dead_end(&self) -> Vec<Reason> {
-        let mut past = Past {
-            task: &self.task,
-            beginning: &self.beginning,
-            history: &self.history,
-            account: &self.account,
-            now: &self.now,
-            known: BTreeMap::new(),
-        };
+        let mut past = self.past();
         let mut present = past.after(self.history.len());
         let _ = present.advance(&self.now);
         let Some(lost) = unreachable(&present) else {
@@ -72,6 +65,22 @@ impl Run<'_> {
         }
         let explained = lost.iter().take(MOST_NAMED).map(|goal| past.explain(goal));
         explained.collect()
+    }
+
+    /// What was believed after so many events of the history.
+    pub(super) fn believed_after(&self, count: usize) -> Progression {
+        self.past().after(count)
+    }
+
+    fn past(&self) -> Past<'_> {
+        Past {
+            task: &self.task,
+            beginning: &self.beginning,
+            history: &self.history,
+            account: &self.account,
+            now: &self.now,
+            known: BTreeMap::new(),
+        }
     }
 }
 

@@ -136,6 +136,7 @@ impl Run<'_> {
         });
         self.now = passage.now.max(self.now.clone());
         self.take_in(passage.observations);
+        self.forget_the_past();
         if let Err(stop) = self.after_passage() {
             self.stop(stop);
         }

@@ -53,10 +53,16 @@ impl<'a> Views<'a> {
             let board = None;
             return Ok(Self { arguments, board });
         }
-        for file in files.into_iter().flatten() {
+        for file in files.iter().copied().flatten() {
             output::write_bytes(file, b"")?;
         }
-        let board = Board::default();
+        // What is written for viewers in the end is the whole run.
+        let is_for_viewers = files.iter().any(|file| file.is_some());
+        let board = if spec.is_lasting && !is_for_viewers {
+            Board::lasting()
+        } else {
+            Board::default()
+        };
         let mut header = |line: &str| board.add(line);
         let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
         written.map_err(|error| Failure::new(format!("cannot show the run: {error}"), ""))?;

@@ -57,7 +57,7 @@ impl Front {
             own,
             domain: domain.clone(),
             desk: Desk::default(),
-            board: Board::default(),
+            board: Board::lasting(),
             run: OnceLock::new(),
             problem: Mutex::default(),
             has_problem: Condvar::new(),
@@ -165,6 +165,16 @@ impl Front {
             }
             ("GET", "/v1/events") => {
                 let after = first_line(request)?;
+                if let (Some(after), Some(until)) = (after, self.board.left_out_until())
+                    && after < until
+                {
+                    let error = format!("the lines up to {until} are no longer kept here");
+                    let help = format!(
+                        "/v1/events?after={until} has the others; the files of --journal and --trace \
+                         have all of them"
+                    );
+                    return Err(Refused::new(410, error, help));
+                }
                 let begun = respond_with_events(stream);
                 begun.and_then(|()| self.board.tell_lines(after, stream))
             }
