@@ -7,10 +7,11 @@ mod world;
 
 use std::sync::Arc;
 
+use elbowroom::execution::run::Rested;
 use elbowroom::execution::{Entry, Recorder};
 use elbowroom::executive::Status;
 use elbowroom::model::Task;
-use elbowroom::report::trace::Line;
+use elbowroom::report::trace::{Line, SnapshotLine, snapshot_text};
 
 pub(crate) use world::Attended;
 
@@ -38,6 +39,14 @@ impl Attendance {
     /// By those who only hand in requests.
     pub(crate) fn at(desk: Desk) -> Self {
         Self(Some(Attendants { desk, asked: None }))
+    }
+
+    /// The run goes on where it rested, and what was before is no longer known.
+    pub(crate) fn begin_at_rest(&self, snapshot: &SnapshotLine) {
+        if let Some((status, board)) = self.0.as_ref().and_then(|it| it.asked.as_ref()) {
+            status.begin_at_rest(snapshot.now());
+            board.add(&format!("{}\n", snapshot_text(snapshot)));
+        }
     }
 
     /// Where requests wait.
@@ -94,5 +103,9 @@ impl<R: Recorder> Recorder for Witnessed<R> {
                 attendants.desk.acknowledge();
             }
         }
+    }
+
+    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
+        self.inner.begin_anew(rested)
     }
 }

@@ -4,12 +4,16 @@
 //! the digits of the record before it (zeros before the first) and of the line. So a record that is
 //! damaged, missing or out of place is noticed.
 
+mod segments;
+
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Seek as _, SeekFrom, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::exit::Failure;
 use crate::words::plain;
+
+pub(crate) use segments::Segments;
 
 /// The digits before a line, and the space behind them.
 const HEAD: usize = 9;
@@ -20,9 +24,18 @@ const BEGINNING: &str = "00000000";
 /// A journal that is being written.
 pub(crate) struct JournalFile {
     file: File,
+    path: PathBuf,
     /// The checksum of the last record.
     last: String,
     error: Option<io::Error>,
+    /// The first line, which says what is run.
+    header: String,
+    /// How long the file is, in bytes.
+    length: u64,
+    /// When it is begun anew.
+    segments: Option<Segments>,
+    /// It is not begun anew before it is as long.
+    least: u64,
 }
 
 /// A journal that was read.
@@ -64,8 +77,13 @@ impl JournalFile {
         }
         Ok(Self {
             file,
+            path: path.to_owned(),
             last: BEGINNING.to_owned(),
             error: None,
+            header: String::new(),
+            length: 0,
+            segments: None,
+            least: 0,
         })
     }
 
@@ -84,10 +102,16 @@ impl JournalFile {
             file.seek(SeekFrom::Start(journal.length))
         };
         cut().map_err(|error| cannot_write(path, &error))?;
+        let header = journal.text.lines().next().unwrap_or_default();
         Ok(Self {
             file,
+            path: path.to_owned(),
             last: journal.last.clone(),
             error: None,
+            header: header.to_owned(),
+            length: journal.length,
+            segments: None,
+            least: 0,
         })
     }
 
@@ -95,11 +119,12 @@ impl JournalFile {
     /// Returns whether it is written.
     pub(crate) fn write(&mut self, line: &str) -> bool {
         if self.error.is_none() {
-            let sum = checksum(&self.last, line.trim_end_matches('\n'));
-            self.error = self
-                .file
-                .write_all(format!("{sum} {line}").as_bytes())
-                .err();
+            if self.header.is_empty() {
+                line.trim_end_matches('\n').clone_into(&mut self.header);
+            }
+            let (sum, record) = record(&self.last, line);
+            self.error = self.file.write_all(record.as_bytes()).err();
+            self.length += record.len() as u64;
             self.last = sum;
         }
         self.error.is_none()
@@ -218,6 +243,13 @@ impl Journal {
             ..self
         }
     }
+}
+
+/// A line as a record, and its checksum.
+fn record(before: &str, line: &str) -> (String, String) {
+    let sum = checksum(before, line.trim_end_matches('\n'));
+    let record = format!("{sum} {line}");
+    (sum, record)
 }
 
 fn checksum(before: &str, line: &str) -> String {

@@ -7,8 +7,8 @@ use std::fmt;
 use std::io::{self, Read as _, Write};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs as _};
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use elbowroom::execution::run::FIRST_GOAL;

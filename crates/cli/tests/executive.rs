@@ -5,6 +5,8 @@
 #[path = "executive/client.rs"]
 mod client;
 mod command;
+#[path = "executive/killed.rs"]
+mod killed;
 #[path = "../../../testing/skipped.rs"]
 mod skipped;
 

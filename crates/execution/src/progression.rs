@@ -12,6 +12,7 @@ mod goal;
 mod motion;
 mod polynomial;
 mod reading;
+mod standstill;
 mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,6 +26,7 @@ use elbowroom_num::{Interval, Rational};
 
 pub(crate) use goal::Outlook;
 pub use reading::Unreadable;
+pub use standstill::Standstill;
 
 use crate::event::{Measured, Ticket};
 use motion::{Motion, Rate};

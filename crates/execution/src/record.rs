@@ -6,18 +6,30 @@ use elbowroom_num::Rational;
 use crate::event::{Command, Observation, Ticket};
 use crate::executor::{Decided, Mission, Planned};
 use crate::reason::Reason;
-use crate::run::{Report, Verdict};
+use crate::run::{Report, Rested, Verdict};
 
 /// Takes the record of a run as it comes about.
 pub trait Recorder: Send {
     /// One entry. What is kept must be kept before this returns, so that a run that is cut short
     /// leaves its record.
     fn record(&mut self, entry: &Entry<'_>);
+
+    /// A lasting run rests, without goals and with nothing under way, and could be gone on with from
+    /// what `rested` says, without what was recorded before: whoever wants to, may begin its record
+    /// anew here, and says whether it has. Asked as long as the run rests.
+    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
+        let _ = rested;
+        false
+    }
 }
 
 impl<R: Recorder + ?Sized> Recorder for &mut R {
     fn record(&mut self, entry: &Entry<'_>) {
         (**self).record(entry);
+    }
+
+    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
+        (**self).begin_anew(rested)
     }
 }
 

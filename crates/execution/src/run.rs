@@ -45,6 +45,7 @@ mod intake;
 mod lasting;
 mod oblivion;
 mod progress;
+mod rested;
 mod room;
 mod settings;
 
@@ -58,6 +59,7 @@ pub use amid::{Amid, Beginning};
 pub use drive::{Next, NotAsked};
 pub use farewell::FAREWELL;
 pub use lasting::{FIRST_GOAL, GoalReader};
+pub use rested::Rested;
 pub use settings::{
     Patience, PlanningTime, Report, RunSettings, RunningRule, UnknownSetting, Verdict,
 };
@@ -126,6 +128,8 @@ pub struct Run<'a> {
     closing: Option<Closing>,
     /// The report, once the run is over.
     report: Option<Report>,
+    /// How often it goes on after it was over.
+    reopenings: usize,
 }
 
 /// Why the plan is not gone on with.
@@ -185,6 +189,7 @@ impl<'a> Run<'a> {
             asked: None,
             closing: None,
             report: None,
+            reopenings: 0,
         }
     }
 

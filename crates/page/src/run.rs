@@ -51,7 +51,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
     // What was believed follows from the beginning.
     let mut belief = task
         .as_ref()
-        .filter(|_| left_out == 0)
+        .filter(|_| left_out == 0 && stored.snapshot.is_none())
         .map(|task| Belief::new(task, &mut texts));
     let (mut bars, mut guarantees, mut log) =
         (Bars::default(), Guarantees::default(), Log::default());
@@ -81,9 +81,11 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         bars.read(line);
         guarantees.read(line, &bars);
         log.read(line, &bars);
-        if let Line::Over(over) = line {
-            report = Some(over);
-        }
+        // A run that was over may have been gone on with.
+        report = match line {
+            Line::Over(over) => Some(over),
+            _ => None,
+        };
     }
     let now = log.now.clone();
     if let Some(belief) = &mut belief {
@@ -120,7 +122,10 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         ("planner".to_owned(), spec.planner.clone()),
         ("trace".to_owned(), name.to_owned()),
     ];
-    if left_out > 0 {
+    if stored.snapshot.is_some() {
+        let words = "what was before this segment of the journal, and facts and numbers";
+        facts.push(("not shown".to_owned(), words.to_owned()));
+    } else if left_out > 0 {
         let words = format!("the first {left_out} lines of the trace, and facts and numbers");
         facts.push(("not shown".to_owned(), words));
     }
@@ -143,7 +148,9 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
                         "The run is paused: nothing more is started. It is at {}.",
                         nearest(&now)
                     ),
-                    Record::Growing { .. } => format!("The run goes on; it is at {}.", nearest(&now)),
+                    Record::Growing { .. } => {
+                        format!("The run goes on; it is at {}.", nearest(&now))
+                    }
                 },
             },
         },

@@ -7,6 +7,7 @@
 
 mod of;
 mod replay;
+mod snapshot;
 
 use std::sync::Arc;
 
@@ -16,11 +17,14 @@ use serde::Serialize;
 
 pub use crate::line::{self, Line};
 pub use replay::{Difference, Replay, ReplayPlanner, ReplayWorld, Stored, TraceError};
+pub use snapshot::SnapshotLine;
 
 /// The value of `format` in the first line of a trace.
 pub const FORMAT: &str = "elbowroom-trace";
 /// The version of the format.
 pub const VERSION: u64 = 1;
+/// The kind of the second line of a record that begins anew.
+const SNAPSHOT: &str = "snapshot";
 /// The kind of the first line.
 const HEADER: &str = "header";
 
@@ -50,6 +54,19 @@ impl<'a> TraceWriter<'a> {
         (self.sink)(&format!("{header}\n"));
         Ok(())
     }
+}
+
+/// The second line of a record that begins anew, without its line feed.
+pub fn snapshot_text(snapshot: &SnapshotLine) -> String {
+    #[derive(Serialize)]
+    struct Named<'a> {
+        event: &'static str,
+        #[serde(flatten)]
+        snapshot: &'a SnapshotLine,
+    }
+    let event = SNAPSHOT;
+    serde_json::to_string(&Named { event, snapshot })
+        .expect("all keys are texts, and decimals of rationals are finite")
 }
 
 /// The first line.

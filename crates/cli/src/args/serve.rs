@@ -41,6 +41,29 @@ pub(crate) struct ServeArgs {
     /// stop. Without it, the executive can only be looked at
     #[arg(long, value_name = "FILE")]
     pub(crate) token: Option<PathBuf>,
+    /// Begin the journal anew when it is as long and the executive rests, without goals and with
+    /// nothing under way: in bytes, or with K, M or G; 10M unless it is given. `--resume` then goes on
+    /// from there
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub(crate) journal_size: Option<u64>,
+    /// Keep as many earlier segments of the journal, as FILE.1 (the last one), FILE.2, …; 1 unless it
+    /// is given
+    #[arg(long, value_name = "COUNT")]
+    pub(crate) journal_segments: Option<usize>,
+}
+
+/// Reads a length in bytes.
+fn size(text: &str) -> Result<u64, String> {
+    let (digits, unit) = match text.char_indices().last() {
+        Some((at, 'k' | 'K')) => (&text[..at], 1_000),
+        Some((at, 'M')) => (&text[..at], 1_000_000),
+        Some((at, 'G')) => (&text[..at], 1_000_000_000),
+        _ => (text, 1),
+    };
+    let number = digits.parse::<u64>().ok();
+    let size = number.and_then(|number| number.checked_mul(unit));
+    size.filter(|size| *size > 0)
+        .ok_or_else(|| "write a number of bytes, such as 500K, 10M or 1G".to_owned())
 }
 
 #[derive(Args, Debug)]

@@ -35,7 +35,7 @@ use crate::desk::Desk;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::journal::JournalFile;
+use crate::journal::{JournalFile, Segments};
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 use crate::words::tame;
@@ -72,6 +72,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         first,
         interrupt: &interrupt,
         attendance: &attendance,
+        segments: None,
     };
     job.execute(arguments, output)
 }
@@ -154,6 +155,8 @@ pub(super) struct Job<'a> {
     pub(super) first: Option<TimeTriggeredPlan>,
     pub(super) interrupt: &'a Interrupt,
     pub(super) attendance: &'a Attendance,
+    /// When the journal is begun anew, if it is to be.
+    pub(super) segments: Option<Segments>,
 }
 
 impl Job<'_> {
@@ -235,7 +238,7 @@ impl Job<'_> {
         arguments: &RunArgs,
         output: &mut Output,
     ) -> Answer {
-        let mut file = JournalFile::create(path)?;
+        let mut file = JournalFile::create(path)?.in_segments(self.segments);
         let mut is_kept = false;
         let mut sink = |line: &str| is_kept = file.write(line);
         let mut header = trace::TraceWriter::new(Arc::clone(self.task), &mut sink);

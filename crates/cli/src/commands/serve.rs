@@ -25,10 +25,14 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::http::{self, Listener};
 use crate::input;
 use crate::interrupt::Interrupt;
+use crate::journal::Segments;
 use crate::output::{self, Output};
 use crate::serve::Control;
 use crate::words::plain;
 use front::Front;
+
+/// The length of a journal from which on it is begun anew, in bytes.
+const LONG: u64 = 10_000_000;
 
 /// Executes what is asked for, until it is asked to end.
 pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
@@ -103,6 +107,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         first,
         interrupt: &interrupt,
         attendance: &attendance,
+        segments: Some(segments(arguments)),
     };
     let answer = job.execute(&arguments.run, output);
     front.close();
@@ -135,6 +140,14 @@ fn check(arguments: &ServeArgs) -> Result<(), Failure> {
                 "an executive listens at --http, and its journal is gone on with by --resume",
             ));
         }
+    }
+    let has_journal = run.journal.is_some() || run.resume.is_some();
+    let sized = arguments.journal_size.is_some() || arguments.journal_segments.is_some();
+    if sized && !has_journal {
+        return Err(Failure::new(
+            "there is no journal that could be begun anew",
+            "give --journal FILE, or leave out --journal-size and --journal-segments",
+        ));
     }
     if run.is_spoiled() {
         return Err(Failure::new(
@@ -239,6 +252,13 @@ fn begin(front: &Front, spec: &RunSpec, task: &Arc<Task>) -> Result<Attendance, 
     Ok(Attendance::by(front.desk().clone(), status, board.clone()))
 }
 
+fn segments(arguments: &ServeArgs) -> Segments {
+    Segments {
+        size: arguments.journal_size.unwrap_or(LONG),
+        kept: arguments.journal_segments.unwrap_or(1),
+    }
+}
+
 /// Attends a run that goes on after a crash.
 struct Server<'a> {
     arguments: &'a ServeArgs,
@@ -262,5 +282,9 @@ impl Host for Server<'_> {
         let attendance = begin(&front, spec, task);
         let _ = self.front.set(front);
         attendance
+    }
+
+    fn segments(&self) -> Option<Segments> {
+        Some(segments(self.arguments))
     }
 }

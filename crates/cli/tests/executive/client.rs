@@ -111,6 +111,11 @@ impl Executive {
         }
     }
 
+    /// The number of its process.
+    pub(crate) fn process(&self) -> u32 {
+        self.child.as_ref().expect("it runs").id()
+    }
+
     /// Waits for its end.
     pub(crate) fn end(&mut self) -> Output {
         let mut child = self.child.take().expect("it runs");
@@ -157,6 +162,28 @@ impl Executive {
     ) -> (u16, Value) {
         let stream = TcpStream::connect(self.address()).expect("it listens");
         talk(stream, verb, path, token, body)
+    }
+
+    /// The same of one that may be killed meanwhile: then there is no answer.
+    pub(crate) fn ask_if_there(
+        &self,
+        verb: &str,
+        path: &str,
+        body: &Value,
+    ) -> Option<(u16, Value)> {
+        let mut stream = TcpStream::connect(self.address()).ok()?;
+        let body = body.to_string();
+        let length = body.len();
+        let request = format!(
+            "{verb} {path} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {TOKEN}\r\n\
+             Content-Length: {length}\r\n\r\n{body}"
+        );
+        stream.write_all(request.as_bytes()).ok()?;
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).ok()?;
+        let (head, text) = answer.split_once("\r\n\r\n")?;
+        let status = head.split(' ').nth(1)?.parse().ok()?;
+        Some((status, serde_json::from_str(text).ok()?))
     }
 
     /// The page.

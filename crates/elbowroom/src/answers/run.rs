@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom_execution::run::{Report, Verdict};
+use elbowroom_execution::run::{Report, Rested, Verdict};
 use elbowroom_execution::{Entry, NoRecord, Planner, Progression, Recorder, World};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -21,6 +21,10 @@ pub struct RunRequest<'a> {
     pub task: &'a Arc<Task>,
     /// The plan to begin with; without one, one is made.
     pub plan: Option<TimeTriggeredPlan>,
+    /// Where a lasting run rested, to go on from there instead.
+    pub rested: Option<Rested>,
+    /// How many times the run was over, without a plan, and was gone on with.
+    pub reopened: usize,
     /// Who makes plans, if it is not whom the specification names: a replay, or a planner on
     /// another clock than the watcher's.
     pub planner: Option<Box<dyn Planner + 'a>>,
@@ -79,6 +83,8 @@ impl<'a> RunRequest<'a> {
             spec,
             task,
             plan: None,
+            rested: None,
+            reopened: 0,
             planner: None,
             recorder: Box::new(NoRecord),
             listener: None,
@@ -90,6 +96,22 @@ impl<'a> RunRequest<'a> {
     pub fn beginning_with(self, plan: impl Into<Option<TimeTriggeredPlan>>) -> Self {
         let plan = plan.into();
         Self { plan, ..self }
+    }
+
+    /// Goes on where a lasting run rested.
+    #[must_use]
+    pub fn resting(self, rested: impl Into<Option<Rested>>) -> Self {
+        let rested = rested.into();
+        Self { rested, ..self }
+    }
+
+    /// Goes on after the run was over, so many times.
+    #[must_use]
+    pub fn reopened(self, times: usize) -> Self {
+        Self {
+            reopened: times,
+            ..self
+        }
     }
 
     /// Replaces the planner that the specification names.
@@ -157,6 +179,8 @@ pub fn run(
             }
         })
         .beginning_with(request.plan)
+        .resting(request.rested)
+        .reopened(request.reopened)
         .planned_by(planner)
         .recorded_by(recorder)
         .ending_when(|| matches!(shared.get().flow(), ControlFlow::Break(_)))
@@ -244,5 +268,9 @@ impl Recorder for Heard<'_, '_> {
         self.watched
             .get()
             .notice(&Event::Run(RunProgress { entry, plans }));
+    }
+
+    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
+        self.inner.begin_anew(rested)
     }
 }

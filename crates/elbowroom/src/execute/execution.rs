@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, UnknownExecutor};
-use elbowroom_execution::run::{Ports, Report, Run, RunSettings};
+use elbowroom_execution::run::{Ports, Report, Rested, Run, RunSettings};
 use elbowroom_execution::{
     Executor, NoRecord, Odds, Outlook, Planner, Preparer, Progression, Recorder, Rehearsal, World,
 };
@@ -107,6 +107,8 @@ pub fn execute(
 pub struct Execution<'a> {
     task: Arc<Task>,
     plan: Option<TimeTriggeredPlan>,
+    rested: Option<Rested>,
+    reopened: usize,
     executor: Decider<'a>,
     settings: RunSettings,
     flow: flow::Settings,
@@ -140,6 +142,8 @@ impl<'a> Execution<'a> {
         Self {
             task: Arc::clone(task),
             plan: None,
+            rested: None,
+            reopened: 0,
             executor: Decider::Registered(ExecutorSpec::default()),
             settings: RunSettings::default(),
             flow: flow::Settings::default(),
@@ -163,6 +167,20 @@ impl<'a> Execution<'a> {
     pub fn beginning_with(self, plan: impl Into<Option<TimeTriggeredPlan>>) -> Self {
         let plan = plan.into();
         Self { plan, ..self }
+    }
+
+    /// Goes on where a lasting run rested: see [`Run::resting`].
+    pub fn resting(self, rested: impl Into<Option<Rested>>) -> Self {
+        let rested = rested.into();
+        Self { rested, ..self }
+    }
+
+    /// Goes on after it was over, so many times: see [`Run::reopened`].
+    pub fn reopened(self, times: usize) -> Self {
+        Self {
+            reopened: times,
+            ..self
+        }
     }
 
     /// Has this executor decide.
@@ -301,12 +319,16 @@ impl<'a> Execution<'a> {
             executor,
             recorder: self.recorder,
         };
-        let mut run =
-            Run::new(self.task, self.plan, self.settings, ports).ending_when(self.is_to_end);
+        let mut run = Run::new(self.task, self.plan, self.settings, ports)
+            .ending_when(self.is_to_end)
+            .reopened(self.reopened);
         if self.is_lasting {
             run = run.lasting(read_goal);
         } else if self.is_attended {
             run = run.attended();
+        }
+        if let Some(rested) = self.rested {
+            run = run.resting(rested);
         }
         if let Some(listener) = self.listener {
             run = run.told_to(listener);

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer};
-use elbowroom_external::{self as external, Event, Outcome, Request, Settings};
+use elbowroom_external::{self as external, Event, Outcome, Report, Request, Settings};
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
@@ -14,8 +14,9 @@ use crate::flow;
 /// A program that plans, supervised; each of its plans is judged, and where only its times are
 /// rounded, they are chosen again.
 ///
-/// The program takes as long as it takes, and that is measured. What goes wrong with it, is said
-/// in the answer: a run has no plan then, and ends.
+/// The program takes as long as it takes, and that is measured. If it crashes, or somebody kills it, it is
+/// asked once more. What goes wrong with it then, is said in the answer: a run has no plan then, and
+/// ends.
 pub struct External<'a> {
     /// Which program.
     pub planner: external::Planner,
@@ -33,7 +34,19 @@ pub struct External<'a> {
 
 impl Planner for External<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        let report = external::plan(
+        let first = self.ask(task, situation);
+        if !matches!(first.outcome, Outcome::Crashed { .. }) || !(self.goes_on)() {
+            return self.answer(first, Duration::ZERO);
+        }
+        let second = self.ask(task, situation);
+        self.answer(second, first.statistics.elapsed)
+    }
+}
+
+impl External<'_> {
+    /// Has the program plan.
+    fn ask(&self, task: &Task, situation: &Situation) -> Report {
+        external::plan(
             &self.planner,
             &mut Request {
                 task,
@@ -51,7 +64,11 @@ impl Planner for External<'_> {
                     ControlFlow::Continue(())
                 }
             },
-        );
+        )
+    }
+
+    /// The answer, `before` which as much time had passed.
+    fn answer(&self, report: Report, before: Duration) -> PlannerAnswer {
         let name = &self.planner.name;
         let answer = match report.outcome {
             Outcome::Plan(found) => PlanAnswer::Plan(found.plan),
@@ -65,7 +82,7 @@ impl Planner for External<'_> {
         };
         PlannerAnswer {
             answer,
-            seconds: Some(seconds(report.statistics.elapsed)),
+            seconds: Some(seconds(before + report.statistics.elapsed)),
             remark: None,
         }
     }

@@ -73,6 +73,14 @@ impl Status {
         self.known().record(entry);
     }
 
+    /// The run begins where an earlier one rested, without goals.
+    pub fn begin_at_rest(&self, now: &Rational) {
+        let mut known = self.known();
+        known.now.clone_from(now);
+        known.goals.clear();
+        known.rest = Some(NO_GOAL.to_owned());
+    }
+
     /// Takes note of what is believed.
     pub fn believe(&self, belief: &Progression) {
         let belief = Arc::new(belief.clone());
@@ -157,6 +165,8 @@ impl Status {
     }
 }
 
+/// Why a run rests that was asked for nothing.
+const NO_GOAL: &str = "there is no goal";
 const TO_COME: &str = "to-come";
 const RUNNING: &str = "running";
 
@@ -229,7 +239,7 @@ impl Known {
                 let reasons: Vec<String> = dead_end.iter().map(ToString::to_string).collect();
                 let goals = goals.join(", ");
                 self.rest = Some(match verdict {
-                    None => "there is no goal".to_owned(),
+                    None => NO_GOAL.to_owned(),
                     Some(Verdict::GoalReached) => {
                         self.goals.clear();
                         format!("reached: {goals}")

@@ -1,6 +1,6 @@
 //! What was started in a run, and what became of it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use elbowroom_model::Step;
@@ -14,6 +14,9 @@ use crate::event::{Ending, Measured, Ticket};
 use crate::executor::{Order, StepId};
 use crate::progression::Progression;
 
+/// So many of the starts before a rest are in the report of a lasting run.
+const MOST_REPORTED: usize = 2000;
+
 /// Everything that was started, but for what a lasting run has forgotten.
 #[derive(Clone, Debug, Default)]
 pub struct Account {
@@ -22,6 +25,8 @@ pub struct Account {
     started: usize,
     /// How many of them were left when something was last forgotten.
     kept: usize,
+    /// What was done before the run last had nothing to do, for its report.
+    closed: VecDeque<ExecutedStep>,
     /// The steps of the present plan.
     steps: BTreeMap<StepId, Ticket>,
     /// Those that have not ended.
@@ -91,6 +96,39 @@ impl Account {
     /// The number of actions started.
     pub fn started(&self) -> usize {
         self.started
+    }
+
+    /// So many were started before, and have ended.
+    pub(super) fn begin_at(&mut self, started: usize) {
+        *self = Self {
+            started,
+            ..Self::default()
+        };
+    }
+
+    /// Nothing is under way, and no plan: what was done is only of interest for the report, which
+    /// has the last ones.
+    pub(super) fn close(&mut self, now: &Rational) {
+        if self.entries.is_empty() {
+            return;
+        }
+        let done = self.done(now).collect::<Vec<_>>();
+        self.closed.extend(done);
+        let surplus = self.closed.len().saturating_sub(MOST_REPORTED);
+        self.closed.drain(..surplus);
+        self.entries.clear();
+        self.steps.clear();
+        self.kept = 0;
+    }
+
+    /// What was done before the run last had nothing to do is not reported any more.
+    pub(super) fn forget_closed(&mut self) {
+        self.closed.clear();
+    }
+
+    /// Whether that was started, and is no longer known.
+    pub(super) fn is_forgotten(&self, ticket: Ticket) -> bool {
+        ticket.0 < self.started as u64 && !self.entries.contains_key(&ticket)
     }
 
     /// Forgets the first starts that have ended and are not of the present plan, until no more than
@@ -238,7 +276,11 @@ impl Account {
 
     /// All that was started, did start and is not forgotten, as steps for the judge.
     pub(super) fn executed(&self, now: &Rational) -> Vec<ExecutedStep> {
-        let steps = self.entries.iter().filter_map(|(ticket, entry)| {
+        self.closed.iter().cloned().chain(self.done(now)).collect()
+    }
+
+    fn done<'a>(&'a self, now: &'a Rational) -> impl Iterator<Item = ExecutedStep> + 'a {
+        self.entries.iter().filter_map(move |(ticket, entry)| {
             let start = entry.started.clone()?;
             let end = entry.ended.as_ref().map_or(now, |(time, _)| time);
             let ending = entry.ended.as_ref().map(|(_, ending)| ending.clone());
@@ -256,8 +298,7 @@ impl Account {
                     duration,
                 },
             })
-        });
-        steps.collect()
+        })
     }
 }
 

@@ -53,7 +53,12 @@ impl Run<'_> {
                     let seen = world.look(&facts, &fluents);
                     seen.map(|seen| self.take_look(seen))
                 }
-                Next::Over(report) => return report,
+                Next::Over(report) => {
+                    if !self.reopen() {
+                        return report;
+                    }
+                    Ok(())
+                }
             };
             if let Err(error) = answered {
                 self.fail(error);

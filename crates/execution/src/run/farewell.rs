@@ -5,7 +5,7 @@ use elbowroom_num::Rational;
 use super::agenda::Todo;
 use super::{Next, Report, Run, Stop, Verdict};
 use crate::event::Ticket;
-use crate::reason::Reason;
+use crate::reason::{Cause, Reason};
 use crate::record::Entry;
 
 /// How many seconds of the world's time cancelled actions have to stop when a run ends.
@@ -110,5 +110,29 @@ impl Run<'_> {
         };
         self.ports.recorder.record(&Entry::Over(&report));
         self.report = Some(report);
+    }
+
+    /// Goes on where the run was over, if it is to: with a new plan from here.
+    pub(super) fn reopen(&mut self) -> bool {
+        let Some(left) = self.reopenings.checked_sub(1) else {
+            return false;
+        };
+        self.reopenings = left;
+        self.report = None;
+        self.agenda = vec![Todo::Replan(Reason::new(Cause::NewPlan))];
+        true
+    }
+}
+
+impl<'a> Run<'a> {
+    /// The same run, which was over so many times, each time without its goal
+    /// ([`Verdict::NoPlan`]), and was then gone on with: another plan is looked for, from where it
+    /// was over. [`Run::go`] goes on so often by itself.
+    #[must_use]
+    pub fn reopened(self, times: usize) -> Run<'a> {
+        Self {
+            reopenings: times,
+            ..self
+        }
     }
 }

@@ -17,6 +17,9 @@ pub(super) type Remark = Option<&'static str>;
 /// The objection to a report on a ticket that was not given out.
 const NEVER_STARTED: &str = "nothing of that number was started";
 
+/// The objection to a report on what is no longer known.
+const LONG_PAST: &str = "it had ended, and was long past";
+
 impl Run<'_> {
     /// Believes what is reported, as far as it can be believed, and notes what is new.
     pub(super) fn take_in(&mut self, observations: Vec<Observation>) {
@@ -93,13 +96,22 @@ impl Run<'_> {
     /// An action gives a sign of life: so long it has not been silent.
     fn heard(&mut self, ticket: Ticket, time: &Rational) -> Remark {
         match self.account.get(ticket) {
-            None => Some(NEVER_STARTED),
+            None => self.unknown(ticket),
             Some(entry) if entry.ended.is_some() => Some("it had ended already"),
             Some(_) => {
                 self.account.note_heard(ticket, time);
                 None
             }
         }
+    }
+
+    /// The objection to a report on a ticket that is not known.
+    fn unknown(&self, ticket: Ticket) -> Remark {
+        Some(if self.account.is_forgotten(ticket) {
+            LONG_PAST
+        } else {
+            NEVER_STARTED
+        })
     }
 
     /// The belief is never taken back in time, so a late report changes the present state. What is
@@ -110,7 +122,7 @@ impl Run<'_> {
 
     fn started(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) -> Remark {
         let Some(entry) = self.account.get(ticket) else {
-            return Some(NEVER_STARTED);
+            return self.unknown(ticket);
         };
         if entry.started.is_some() {
             return Some("it had started already");
@@ -155,7 +167,7 @@ impl Run<'_> {
         measured: &[Measured],
     ) -> Remark {
         let Some(entry) = self.account.get(ticket) else {
-            return Some(NEVER_STARTED);
+            return self.unknown(ticket);
         };
         if let Some((_, earlier)) = &entry.ended {
             let is_same = std::mem::discriminant(earlier) == std::mem::discriminant(ending);

@@ -265,9 +265,29 @@ impl<'a> Run<'a> {
             let reason = Reason::new(Cause::Surprise).about(About::AnyObservation);
             self.replan(&reason)?;
         } else {
+            self.begin_anew();
             self.stay();
         }
         Ok(true)
+    }
+
+    /// Since when the run rests, if it does.
+    pub(super) fn rests_since(&self) -> Option<&Rational> {
+        self.lasting.as_ref()?.rests_since.as_ref()
+    }
+
+    pub(super) fn has_no_goals(&self) -> bool {
+        let lasting = self.lasting.as_ref();
+        lasting.is_some_and(|lasting| lasting.goals.is_empty())
+    }
+
+    /// Rests since then, without goals.
+    pub(super) fn rest_without_goals(&mut self, since: Rational) {
+        if let Some(lasting) = &mut self.lasting {
+            lasting.goals.clear();
+            lasting.has_other_goals = true;
+            lasting.rests_since = Some(since);
+        }
     }
 
     fn wake(&mut self) {

@@ -31,6 +31,20 @@ impl Progress {
         self.answers = 0;
     }
 
+    /// From when the answers are counted, and how many there were.
+    pub(super) fn counted(&self) -> (Rational, usize) {
+        (self.since.clone(), self.answers)
+    }
+
+    /// Goes on from what was [counted](Progress::counted).
+    pub(super) fn go_on_counting(&mut self, since: Rational, answers: usize) {
+        *self = Self {
+            since,
+            answers,
+            unintelligible: None,
+        };
+    }
+
     /// Takes note of a message that could not be understood: it may be what the world meant to say
     /// instead of nothing.
     pub(super) fn note_unintelligible(&mut self, said: &str, why: &str) {

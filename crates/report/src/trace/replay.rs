@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use elbowroom_execution::run::Rested;
 use elbowroom_execution::{
     Command, Entry, Event, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder,
     World, WorldError,
@@ -15,7 +16,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::line::{Line, LookedLine, ObservationLine, PassedLine, PlannedLine, StepLine};
-use super::{FORMAT, VERSION};
+use super::{FORMAT, SNAPSHOT, SnapshotLine, VERSION};
 use crate::wire::read_observation;
 
 /// A trace that cannot be played back.
@@ -33,6 +34,8 @@ pub struct TraceError {
 pub struct Stored {
     /// The first line.
     header: Map<String, Value>,
+    /// Where the run rested, if the record begins there and not at the beginning of the run.
+    pub snapshot: Option<SnapshotLine>,
     /// The other lines. A last one that was cut off is left out.
     pub lines: Vec<Line>,
     /// Whether the last line was cut off.
@@ -71,6 +74,21 @@ impl Stored {
         for own in ["event", "format", "version"] {
             header.shift_remove(own);
         }
+        let is_snapshot = |line: &&&str| {
+            let value: Option<Value> = serde_json::from_str(line).ok();
+            value.is_some_and(|value| value.get("event").is_some_and(|it| it == SNAPSHOT))
+        };
+        let mut snapshot = None;
+        let mut rest = rest;
+        if let Some(line) = rest.first().filter(is_snapshot) {
+            let mut value: Map<String, Value> =
+                serde_json::from_str(line).map_err(|error| wrong(1, error.to_string()))?;
+            value.shift_remove("event");
+            let read = serde_json::from_value(Value::Object(value));
+            snapshot = Some(read.map_err(|error| wrong(1, error.to_string()))?);
+            rest = &rest[1..];
+        }
+        let before = lines.len() - rest.len();
         let mut read = Vec::with_capacity(rest.len());
         let mut is_cut_off = false;
         for (index, line) in rest.iter().enumerate() {
@@ -84,12 +102,13 @@ impl Stored {
                     } else {
                         "this is not JSON"
                     };
-                    return Err(wrong(index + 1, format!("{what}: {error}")));
+                    return Err(wrong(index + before, format!("{what}: {error}")));
                 }
             }
         }
         Ok(Self {
             header,
+            snapshot,
             lines: read,
             is_cut_off,
         })
@@ -112,9 +131,32 @@ impl Stored {
         matches!(self.lines.last(), Some(Line::Over(_)))
     }
 
+    /// The number of the first of its [lines](Stored::lines) in the file.
+    pub fn first_number(&self) -> usize {
+        2 + usize::from(self.snapshot.is_some())
+    }
+
+    /// How many times the run was over, and was gone on with.
+    pub fn reopened(&self) -> usize {
+        let is_over = |line: &&Line| matches!(line, Line::Over(_));
+        let over = self.lines.iter().filter(is_over).count();
+        over - usize::from(self.is_complete())
+    }
+
     /// The lines by their number in the file.
     fn numbered(&self) -> impl Iterator<Item = (usize, &Line)> {
-        (2..).zip(&self.lines)
+        (self.first_number()..).zip(&self.lines)
+    }
+
+    /// Where the run rested, if the record begins there.
+    ///
+    /// # Errors
+    /// When that is none of the task.
+    pub fn rested(&self, task: &Arc<Task>) -> Result<Option<Rested>, TraceError> {
+        let rested = self.snapshot.as_ref().map(|it| it.rested(task));
+        rested
+            .transpose()
+            .map_err(|message| TraceError { line: 2, message })
     }
 
     /// The plan that the run began with, if it was given one: `start`, `(action …)`, duration.
@@ -123,7 +165,9 @@ impl Stored {
     /// When its actions are none of the task.
     pub fn first_plan(&self, task: &Task) -> Result<Option<TimeTriggeredPlan>, TraceError> {
         match self.lines.first() {
-            Some(Line::Plan(plan)) => read_plan(&plan.steps, task, None, 2).map(Some),
+            Some(Line::Plan(plan)) if self.snapshot.is_none() => {
+                read_plan(&plan.steps, task, None, 2).map(Some)
+            }
             _ => Ok(None),
         }
     }
@@ -294,7 +338,9 @@ pub struct Difference {
 pub struct Replay {
     task: Arc<Task>,
     stored: VecDeque<Line>,
+    /// The number of the next line in the file.
     line: usize,
+    first: usize,
     difference: Option<Difference>,
     is_to_end: Arc<AtomicBool>,
 }
@@ -305,7 +351,8 @@ impl Replay {
         Self {
             task,
             stored: stored.lines.iter().cloned().collect(),
-            line: 1,
+            line: stored.first_number(),
+            first: stored.first_number(),
             difference: None,
             is_to_end: Arc::default(),
         }
@@ -329,7 +376,7 @@ impl Replay {
 
     /// How many entries agreed, and the first difference, if there is one.
     pub fn outcome(self) -> (usize, Option<Difference>) {
-        (self.line - 1, self.difference)
+        (self.line - self.first, self.difference)
     }
 }
 
@@ -348,7 +395,7 @@ impl Recorder for Replay {
             self.line += 1;
         } else {
             self.difference = Some(Difference {
-                line: self.line + 1,
+                line: self.line,
                 stored,
                 replayed,
             });

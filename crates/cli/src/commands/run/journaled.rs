@@ -3,13 +3,14 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use elbowroom::execution::run::Rested;
 use elbowroom::execution::{
     Command, Ending, Entry, Event, Observation, Passage, Recorder, World, WorldError,
 };
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
-use elbowroom::report::trace::Line;
+use elbowroom::report::trace::{Line, SnapshotLine, snapshot_text};
 
 use crate::desk::Desk;
 use crate::journal::JournalFile;
@@ -47,6 +48,13 @@ impl Recorder for JournalWriter<'_> {
             self.kept.0.store(true, Ordering::SeqCst);
         } else if let Some(desk) = self.desk.as_ref().filter(|_| has_requests) {
             desk.acknowledge();
+        }
+    }
+
+    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
+        self.file.is_long() && {
+            let snapshot = SnapshotLine::of(&self.task, &rested());
+            self.file.begin_anew(&snapshot_text(&snapshot))
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom::execution::Entry;
+use elbowroom::execution::run::Rested;
 use elbowroom::execution::{Command, Event, Recorder};
 use elbowroom::num::Rational;
 
@@ -80,5 +81,9 @@ impl Recorder for Live<'_> {
             Entry::Passed { now, .. } => self.show(now, false),
             _ => {}
         }
+    }
+
+    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
+        self.inner.begin_anew(rested)
     }
 }

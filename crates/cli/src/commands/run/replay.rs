@@ -25,17 +25,20 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
         let hint = "the trace may be of another version of this program";
         Failure::new(format!("{name}, {error}"), hint)
     })?;
-    let task = super::task(&spec, output)?;
+    let task = Arc::new(super::task(&spec, output)?);
+    let rested = stored.rested(&task);
+    let rested = rested.map_err(|error| unreadable(error.to_string()))?;
     let first = if spec.has_plan {
         let first = stored.first_plan(&task);
         first.map_err(|error| unreadable(error.to_string()))?
     } else {
         None
     };
-    let task = Arc::new(task);
     let mut replay = Replay::new(&stored, Arc::clone(&task));
     let request = RunRequest::new(&spec, &task)
         .beginning_with(first)
+        .resting(rested)
+        .reopened(stored.reopened())
         .planned_by(ReplayPlanner::new(&stored));
     let mut watch = AsStored(replay.interruption());
     execute(

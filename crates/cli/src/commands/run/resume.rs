@@ -33,7 +33,7 @@ use crate::clock::Clock;
 use crate::exit::{Answer, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::journal::{Journal, JournalFile};
+use crate::journal::{Journal, JournalFile, Segments};
 use crate::output::Output;
 use crate::stopwatch::Stopwatch;
 use past::{Past, PastPlanner, PastRecorder, Watch};
@@ -72,7 +72,9 @@ fn cut(path: &Path) -> Result<Cut, Failure> {
         journal = journal.without_last();
         stored = read(&journal)?;
     }
-    if let Some(Line::Over(report)) = stored.lines.last() {
+    if let Some(Line::Over(report)) = stored.lines.last()
+        && report.verdict != NO_PLAN
+    {
         return Err(Failure::new(
             format!("the run of {name} is over: {}", report.verdict),
             "there is nothing to go on with; `elbowroom report` shows what was done",
@@ -116,6 +118,11 @@ pub(in crate::commands) trait Host {
         task: &Arc<Task>,
         interrupt: &Interrupt,
     ) -> Result<Attendance, Failure>;
+
+    /// When the journal is begun anew, if it is to be.
+    fn segments(&self) -> Option<Segments> {
+        None
+    }
 }
 
 /// Nobody.
@@ -161,15 +168,22 @@ pub(in crate::commands) fn run(
         return Err(unreadable(&name, "its world was no process"));
     };
     let task = Arc::new(super::task(&spec, output)?);
+    // Before anything else is mentioned: the table of facts is as it was.
+    let rested = stored.rested(&task);
+    let rested = rested.map_err(|error| unreadable(&name, &error.to_string()))?;
+    let now = stored.snapshot.as_ref().map(|it| it.now().clone());
     let first = if spec.has_plan {
         let first = stored.first_plan(&task);
         first.map_err(|error| unreadable(&name, &error.to_string()))?
     } else {
         None
     };
-    let mut file = JournalFile::go_on(path, &journal, length)?;
+    let mut file = JournalFile::go_on(path, &journal, length)?.in_segments(host.segments());
     let interrupt = Interrupt::listen();
     let attendance = host.attend(&spec, &task, &interrupt)?;
+    if let Some(snapshot) = &stored.snapshot {
+        attendance.begin_at_rest(snapshot);
+    }
     let kept = Kept::default();
     let past = Arc::new(Past::new(&stored));
     let views = Views::open(arguments, &spec, &task, &interrupt, &attendance)?;
@@ -192,6 +206,8 @@ pub(in crate::commands) fn run(
             .map_err(contradiction)?;
         let request = RunRequest::new(&spec, &task)
             .beginning_with(first)
+            .resting(rested)
+            .reopened(stored.reopened() + usize::from(stored.is_complete()))
             .planned_by(PastPlanner {
                 left: stored
                     .lines
@@ -217,7 +233,7 @@ pub(in crate::commands) fn run(
                     interrupt: interrupt.clone(),
                 },
                 present: None,
-                last: Rational::ZERO,
+                last: now.unwrap_or_default(),
                 shift: Rational::ZERO,
                 news: None,
             },
@@ -246,6 +262,9 @@ pub(in crate::commands) fn run(
 
 /// The verdict of a run whose world has died.
 const WORLD_FAILED: &str = "world-failed";
+
+/// The verdict of a run for which no plan was found, which is not to say that there is none.
+const NO_PLAN: &str = "no-plan";
 
 /// Whether it is an answer of the world.
 fn is_answer(line: &Line) -> bool {

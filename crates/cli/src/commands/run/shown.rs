@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::execute::RunSpec;
+use elbowroom::execution::run::Rested;
 use elbowroom::execution::{Entry, Recorder};
 use elbowroom::model::Task;
 use elbowroom::report::trace::{Line, TraceWriter};
@@ -29,6 +30,10 @@ impl<R: Recorder> Recorder for Shown<R> {
         if let Some(board) = &self.board {
             board.add(&format!("{}\n", Line::of(&self.task, entry).text()));
         }
+    }
+
+    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
+        self.inner.begin_anew(rested)
     }
 }
 

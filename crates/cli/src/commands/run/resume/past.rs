@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use elbowroom::answers::{Halt, Watcher};
+use elbowroom::execution::run::Rested;
 use elbowroom::execution::{Entry, Planner, PlannerAnswer, Recorder};
 use elbowroom::model::{Situation, Task};
 use elbowroom::report::trace::{Line, ReplayPlanner, Stored};
@@ -16,6 +17,8 @@ use crate::stopwatch::Stopwatch;
 /// What stands in the journal, and how much of it has been played.
 pub(super) struct Past {
     lines: Vec<Line>,
+    /// The number of the first of them in the file.
+    first: usize,
     played: AtomicUsize,
     /// The first line that came out otherwise; 0 if none has.
     difference: AtomicUsize,
@@ -26,6 +29,7 @@ impl Past {
     pub(super) fn new(stored: &Stored) -> Self {
         let past = Self {
             lines: stored.lines.clone(),
+            first: stored.first_number(),
             played: AtomicUsize::new(0),
             difference: AtomicUsize::new(0),
             is_to_end: AtomicBool::new(false),
@@ -48,8 +52,7 @@ impl Past {
         };
         self.look_ahead(index + 1);
         if stored != line && self.difference().is_none() {
-            // The header is the first line of the file.
-            self.difference.store(index + 2, Ordering::SeqCst);
+            self.difference.store(index + self.first, Ordering::SeqCst);
         }
         false
     }
@@ -81,6 +84,11 @@ impl Recorder for PastRecorder<'_> {
         if self.past.play(&Line::of(&self.task, entry)) {
             self.writer.record(entry);
         }
+    }
+
+    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
+        // What the journal has is only played again until then.
+        self.past.is_over() && self.past.difference().is_none() && self.writer.begin_anew(rested)
     }
 }
 

@@ -26,7 +26,11 @@ pub(super) struct Open {
 
 impl UnderWay {
     pub(super) fn of(stored: &Stored) -> Self {
-        let mut under_way = Self::default();
+        let before = stored.snapshot.as_ref().map_or(0, |it| it.started as u64);
+        let mut under_way = Self {
+            given: before,
+            ..Self::default()
+        };
         for line in &stored.lines {
             match line {
                 Line::Command(line) => under_way.note(&line.command),

@@ -1,0 +1,219 @@
+//! Executives that are killed at any moment while goals come and go, journals that begin anew included.
+//!
+//! `ELBOWROOM_SERVE_KILLS=100 cargo test --workspace --test executive whenever -- --nocapture` makes a
+//! hundred of them. The number of one is the seed of what is asked, and of the moments at which it is
+//! killed.
+
+#![allow(
+    clippy::print_stdout,
+    reason = "how often executives were killed is worth seeing"
+)]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use serde_json::{Value, json};
+
+use super::client::{Executive, folder};
+use super::command;
+use super::skipped::skipped;
+use super::{lines, with_robot};
+
+const DONE: [&str; 6] = ["a1", "a2", "a3", "b1", "b2", "b3"];
+/// A journal begins anew after every few actions, and none of it is lost.
+const SEGMENTS: [&str; 4] = ["--journal-size", "30K", "--journal-segments", "1000"];
+
+/// Numbers that look random.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % limit
+    }
+}
+
+/// What was asked of an executive, and what it has said to that.
+#[derive(Default)]
+struct Asked {
+    goals: u64,
+    /// Goals that it said it had taken in, and whether they may have been cancelled since.
+    taken: BTreeMap<String, bool>,
+}
+
+impl Asked {
+    /// Asks something; `None` when nobody is there any more.
+    fn ask(&mut self, own: &Executive, dice: &mut Dice) -> Option<()> {
+        let job = DONE[usize::try_from(dice.below(6)).expect("small")];
+        if dice.below(5) == 0 {
+            let names: Vec<String> = self.taken.keys().cloned().collect();
+            let count = names.len() as u64;
+            if count > 0 {
+                let name = &names[usize::try_from(dice.below(count)).expect("small")];
+                self.taken.insert(name.clone(), true);
+                let path = format!("/v1/goals/{name}");
+                own.ask_if_there("DELETE", &path, &Value::Null)?;
+            }
+            return Some(());
+        }
+        // It has come undone, and is to be done again.
+        let undone = json!({"fact": format!("(done {job})"), "becomes": false});
+        own.ask_if_there("POST", "/v1/facts", &undone)?;
+        self.goals += 1;
+        let name = format!("g{}", self.goals);
+        let goal = json!({"name": name, "goal": format!("(done {job})")});
+        let (status, answer) = own.ask_if_there("POST", "/v1/goals", &goal)?;
+        assert!([200, 202].contains(&status), "{answer}");
+        if answer["taken"] == true {
+            self.taken.insert(name, false);
+        }
+        Some(())
+    }
+}
+
+/// Has a process killed in so many milliseconds, whatever happens meanwhile.
+fn kill_later(process: u32, milliseconds: u64) -> std::process::Child {
+    let seconds = format!("{}.{:03}", milliseconds / 1000, milliseconds % 1000);
+    Command::new("sh")
+        .args(["-c", &format!("sleep {seconds}; kill -9 {process}")])
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("there is a shell")
+}
+
+/// The segments of a journal, the first one first.
+fn segments(journal: &str) -> Vec<String> {
+    let later = (1..).map(|number| format!("{journal}.{number}"));
+    let mut all: Vec<String> = later.take_while(|it| Path::new(it).exists()).collect();
+    all.reverse();
+    all.push(journal.to_owned());
+    all
+}
+
+/// The names of the goals that some segment says were reached.
+fn reached(journal: &str) -> BTreeSet<String> {
+    let mut reached = BTreeSet::new();
+    for segment in segments(journal) {
+        let text = fs::read_to_string(&segment).expect("a journal");
+        for line in text.lines().filter(|line| line.contains("\"resting\"")) {
+            let line: Value = serde_json::from_str(&line[9..]).expect("JSON");
+            if line["verdict"] == "goal-reached" {
+                let names = line["goals"].as_array().expect("goals").iter();
+                reached.extend(names.filter_map(Value::as_str).map(str::to_owned));
+            }
+        }
+    }
+    reached
+}
+
+/// Kills an executive some times. How often, and how often its journal was begun anew.
+fn killed(number: u64) -> (u64, usize) {
+    let (place, mut dice) = (folder(&format!("serve-kill-{number}")), Dice(number));
+    dice.below(2);
+    let journal = place.join("journal").display().to_string();
+    let mut beginning = with_robot(&place, &journal);
+    beginning.extend(["--max-replans", "100000"].map(str::to_owned));
+    let mut asked = Asked::default();
+    let kills = 3 + dice.below(4);
+    for _ in 0..kills {
+        let mut own = launched(&place, &journal, &beginning);
+        let mut killer = kill_later(own.process(), dice.below(4000));
+        while asked.ask(&own, &mut dice).is_some() {
+            let pause = if dice.below(3) == 0 { 1500 } else { 100 };
+            std::thread::sleep(std::time::Duration::from_millis(dice.below(pause)));
+        }
+        killer.wait().expect("it kills");
+        own.kill();
+        if dice.below(3) == 0 {
+            super::kill(&fs::read_to_string(place.join("pid")).unwrap_or_default());
+        }
+    }
+    let what = format!("executive {number} after {kills} kills");
+    let mut own = launched(&place, &journal, &beginning);
+    // All that are still open can be reached.
+    let is_at_rest = |state: &Value| {
+        state["activity"] == "resting" && state["goals"].as_array().is_some_and(Vec::is_empty)
+    };
+    own.await_state(is_at_rest);
+    own.post("/v1/stop", &Value::Null);
+    let output = own.end();
+    assert_eq!(output.status.code(), Some(0), "{what}: {output:?}");
+    let reached = reached(&journal);
+    for (name, _) in asked
+        .taken
+        .iter()
+        .filter(|(_, is_cancelled)| !**is_cancelled)
+    {
+        assert!(
+            reached.contains(name),
+            "{what}: {name} was lost: {reached:?}"
+        );
+    }
+    let begun = lines(&place, "begun");
+    let tickets: BTreeSet<_> = begun.iter().filter_map(|it| it.split(' ').next()).collect();
+    assert_eq!(
+        tickets.len(),
+        begun.len(),
+        "{what}: begun twice: {begun:#?}"
+    );
+    let segments = segments(&journal);
+    for segment in &segments {
+        let replayed = command::elbowroom(&["run", "--replay", segment]);
+        assert_eq!(
+            replayed.status.code(),
+            Some(0),
+            "{what}: {segment}: {replayed:?}"
+        );
+    }
+    assert!(
+        !place.join("journal.new").exists(),
+        "{what}: half a segment is left"
+    );
+    fs::remove_dir_all(&place).expect("the folder is there");
+    (kills, segments.len() - 1)
+}
+
+fn launched(place: &Path, journal: &str, beginning: &[String]) -> Executive {
+    // A journal without a first record is that of an executive that never began.
+    let has_begun = fs::read_to_string(journal).is_ok_and(|text| text.contains('\n'));
+    let line: Vec<&str> = if has_begun {
+        vec!["--resume", journal]
+    } else {
+        let _ = fs::remove_file(journal);
+        beginning.iter().map(String::as_str).collect()
+    };
+    Executive::start(place, &[&line[..], &SEGMENTS].concat())
+}
+
+/// No goal that was taken in is lost, nothing is started twice, and every segment of the journal can be
+/// played back.
+#[test]
+fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped("there is no python3");
+        return;
+    }
+    let count = std::env::var("ELBOWROOM_SERVE_KILLS").ok();
+    let count: u64 = count.and_then(|it| it.parse().ok()).unwrap_or(6);
+    let workers: Vec<_> = (0..3)
+        .map(|worker| {
+            let numbers = (worker..count).step_by(3);
+            std::thread::spawn(move || numbers.map(killed).collect::<Vec<_>>())
+        })
+        .collect();
+    let mut all = Vec::new();
+    for worker in workers {
+        all.extend(worker.join().expect("each executive was right"));
+    }
+    let kills: u64 = all.iter().map(|(kills, _)| kills).sum();
+    let anew: usize = all.iter().map(|(_, anew)| anew).sum();
+    println!(
+        "{count} executives, killed {kills} times; their journals were begun anew {anew} times"
+    );
+    assert!(anew > 0, "no journal was begun anew");
+}

@@ -1,0 +1,209 @@
+//! Records that begin where a run rested: what follows is decided as if all that was before were
+//! known.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use elbowroom::execute::{Embedded, Execution};
+use elbowroom::execution::run::{Rested, RunSettings};
+use elbowroom::execution::{
+    Ending, Entry, Event, Observation, Planner, PlannerAnswer, Recorder, Request, Ticket,
+};
+use elbowroom::model::{Situation, Task};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::{
+    Line, Replay, ReplayPlanner, ReplayWorld, SnapshotLine, Stored, snapshot_text,
+};
+
+use super::scripted::{Scripted, abandon, fact, pursue, task};
+
+/// The embedded planner, whose plans take a while by the world's clock.
+struct Slow(u64);
+
+impl Planner for Slow {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        self.0 += 1;
+        let tenths = i64::try_from(self.0 % 7).expect("a small number");
+        PlannerAnswer {
+            seconds: Some(Rational::new(tenths, 10)),
+            ..Embedded::default().plan(task, situation)
+        }
+    }
+}
+
+/// The lines of a run's record, and after how many of them it could have begun anew, with what.
+struct Tape<'a> {
+    task: Arc<Task>,
+    lines: &'a mut Vec<String>,
+    beginnings: &'a mut Vec<(usize, String)>,
+}
+
+impl Recorder for Tape<'_> {
+    fn record(&mut self, entry: &Entry<'_>) {
+        self.lines.push(Line::of(&self.task, entry).text());
+    }
+
+    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
+        let snapshot = snapshot_text(&SnapshotLine::of(&self.task, &rested()));
+        self.beginnings.push((self.lines.len(), snapshot));
+        false
+    }
+}
+
+/// Numbers that look random.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, limit: u64) -> u64 {
+        let factor = 6_364_136_223_846_793_005;
+        self.0 = self.0.wrapping_mul(factor).wrapping_add(1_442_695);
+        (self.0 >> 33) % limit
+    }
+}
+
+const ITEMS: [&str; 3] = ["book", "cup", "key"];
+
+fn day() -> Arc<Task> {
+    task(
+        "(at 90 (not (power))) (at 130 (power)) (at 200 (= (charge) 3))",
+        "(have book)",
+    )
+}
+
+/// Goals that come and go, what others do, and reports on what is long over or never was.
+fn script(task: &Task, dice: &mut Dice) -> Vec<Observation> {
+    let fluent = task.fluent_named("(charge)").expect("a correct test");
+    let mut script = Vec::new();
+    for _ in 0..25 {
+        let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
+        let ticket = Ticket(dice.below(8));
+        let event = match dice.below(12) {
+            0..=4 => pursue(item, &format!("(have {item})")),
+            5 => abandon(item),
+            6 => fact(task, &format!("(have {item})"), false),
+            7 => fact(task, &format!("(here {item})"), dice.below(4) > 0),
+            8 => Event::Value {
+                fluent,
+                value: Rational::from(i64::try_from(dice.below(4)).expect("small")),
+            },
+            9 => Event::Ended {
+                ticket,
+                ending: Ending::Failed {
+                    why: "so they say".to_owned(),
+                },
+                measured: Vec::new(),
+            },
+            10 => Event::Asked(Request::Pause),
+            _ => Event::Asked(Request::Resume),
+        };
+        let tenths = i64::try_from(dice.below(3000)).expect("small");
+        let time = Rational::new(tenths, 10);
+        script.push(Observation { time, event });
+    }
+    script
+}
+
+fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
+    Execution::of(task)
+        .by(executor.parse().expect("a registered one"))
+        .with_settings(RunSettings::default())
+        .lasting(true)
+        .explaining()
+}
+
+/// The lines of a run by a random script, and where it could have begun anew.
+fn taped(executor: &str, seed: u64) -> (Vec<String>, Vec<(usize, String)>) {
+    let task = day();
+    let is_to_end = Arc::new(AtomicBool::new(false));
+    let mut world = Scripted {
+        now: Rational::ZERO,
+        coming: script(&task, &mut Dice(seed)),
+        end: Rational::from(320),
+        is_to_end: Arc::clone(&is_to_end),
+        slow: None,
+        on_cancel: None,
+    };
+    let (mut lines, mut beginnings) = (Vec::new(), Vec::new());
+    execution(&task, executor)
+        .planned_by(Slow(seed))
+        .recorded_by(Tape {
+            task: Arc::clone(&task),
+            lines: &mut lines,
+            beginnings: &mut beginnings,
+        })
+        .ending_when(move || is_to_end.load(Ordering::SeqCst))
+        .run_in(&mut world);
+    (lines, beginnings)
+}
+
+/// Wherever a run rests without goals and with nothing under way, its record can begin anew: played
+/// from there, every line that follows comes out as it did, down to the words of each reason.
+#[test]
+fn a_run_goes_on_from_where_it_rested_as_if_all_before_were_known() {
+    let header = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
+    let (mut resumed, mut followed) = (0, 0);
+    for (executor, seed) in ["guarded", "live", "stn", "fixed(50)"]
+        .into_iter()
+        .flat_map(|executor| (0..40).map(move |seed| (executor, seed)))
+    {
+        let (lines, beginnings) = taped(executor, seed);
+        let mut last = 0;
+        for (count, snapshot) in beginnings {
+            // While it goes on resting, hardly anything changes.
+            if count < last + 5 && last > 0 {
+                continue;
+            }
+            last = count;
+            let rest = lines[count..].join("\n");
+            let stored = Stored::read(&format!("{header}\n{snapshot}\n{rest}\n")).expect("whole");
+            let task = day();
+            let rested = stored.rested(&task).expect("of this task");
+            assert!(rested.is_some(), "the snapshot is read");
+            let mut replay = Replay::new(&stored, Arc::clone(&task));
+            let interruption = replay.interruption();
+            execution(&task, executor)
+                .resting(rested)
+                .planned_by(ReplayPlanner::new(&stored))
+                .recorded_by(&mut replay)
+                .ending_when(move || interruption.load(Ordering::SeqCst))
+                .run_in(&mut ReplayWorld::new(&stored, &task));
+            let (mut agreed, difference) = replay.outcome();
+            if let Some(difference) = &difference {
+                // The report at the end has only what was done since then.
+                let is_end = matches!(difference.stored, Line::Over(_));
+                assert!(is_end, "{executor}, {seed}, after {count}: {difference:#?}");
+                let (Line::Over(one), Line::Over(other)) =
+                    (&difference.stored, &difference.replayed)
+                else {
+                    panic!("{difference:?}");
+                };
+                assert!(one.executed.ends_with(&other.executed));
+                assert_eq!((one.starts, &one.time), (other.starts, &other.time));
+                agreed += 1;
+            }
+            assert_eq!(agreed, lines.len() - count, "{executor}, {seed}");
+            resumed += 1;
+            let command = |line: &&String| line.contains("\"event\":\"command\"");
+            followed += lines[count..].iter().filter(command).count();
+        }
+    }
+    assert!(
+        resumed > 500 && followed > 500,
+        "{resumed} beginnings, {followed} commands after them"
+    );
+}
+
+/// A snapshot of another problem is refused, in words.
+#[test]
+fn a_snapshot_of_another_problem_is_refused() {
+    let (_, beginnings) = taped("guarded", 1);
+    let (_, snapshot) = beginnings.last().expect("it has rested");
+    let header = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
+    let read = |snapshot: &str| Stored::read(&format!("{header}\n{snapshot}\n"));
+    let other = snapshot.replacen("(power)", "(steam)", 1);
+    let stored = read(&other).expect("it can be read");
+    let error = stored.rested(&day()).expect_err("there is no such fact");
+    assert_eq!(error.line, 2);
+    assert!(error.message.contains("no fact `(steam)`"), "{error}");
+    assert!(read(&snapshot.replacen("\"now\"", "\"then\"", 1)).is_err());
+}
