@@ -275,7 +275,7 @@ mod tests {
 
     /// Lines of which every fifth is where a plan is asked for.
     fn line(number: usize) -> String {
-        let event = if number % 5 == 0 {
+        let event = if number.is_multiple_of(5) {
             "planning"
         } else {
             "passed"

@@ -122,13 +122,8 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         ("planner".to_owned(), spec.planner.clone()),
         ("trace".to_owned(), name.to_owned()),
     ];
-    if stored.snapshot.is_some() {
-        let words = "what was before this segment of the journal, and facts and numbers";
-        facts.push(("not shown".to_owned(), words.to_owned()));
-    } else if left_out > 0 {
-        let words = format!("the first {left_out} lines of the trace, and facts and numbers");
-        facts.push(("not shown".to_owned(), words));
-    }
+    let not_shown = not_shown(stored, left_out);
+    facts.extend(not_shown.map(|words| ("not shown".to_owned(), words)));
     if let Some(report) = report {
         facts.push(("new plans".to_owned(), report.replans.to_string()));
         facts.push(("actions started".to_owned(), report.starts.to_string()));
@@ -137,28 +132,39 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         title: format!("Run of {problem}"),
         verdict: match report {
             Some(report) => verdict(report),
-            None => Verdict {
-                tone: Tone::Plain,
-                words: match record {
-                    Record::Ended => format!(
-                        "The trace ends at {} before the run was over.",
-                        nearest(&now)
-                    ),
-                    Record::Growing { .. } if is_paused => format!(
-                        "The run is paused: nothing more is started. It is at {}.",
-                        nearest(&now)
-                    ),
-                    Record::Growing { .. } => {
-                        format!("The run goes on; it is at {}.", nearest(&now))
-                    }
-                },
-            },
+            None => so_far(record, is_paused, &now),
         },
         facts,
         sections,
         texts: texts.into_texts(),
         is_paused,
         more: Vec::new(),
+    }
+}
+
+/// What of the run is not on the page, as its record does not begin at the beginning.
+fn not_shown(stored: &Stored, left_out: usize) -> Option<String> {
+    if stored.snapshot.is_some() {
+        let words = "what was before this segment of the journal, and facts and numbers";
+        return Some(words.to_owned());
+    }
+    let words = || format!("the first {left_out} lines of the trace, and facts and numbers");
+    (left_out > 0).then(words)
+}
+
+/// How a run stands that is not over in its record.
+fn so_far(record: Record, is_paused: bool, now: &Rational) -> Verdict {
+    let now = nearest(now);
+    let words = match record {
+        Record::Ended => format!("The trace ends at {now} before the run was over."),
+        Record::Growing { .. } if is_paused => {
+            format!("The run is paused: nothing more is started. It is at {now}.")
+        }
+        Record::Growing { .. } => format!("The run goes on; it is at {now}."),
+    };
+    Verdict {
+        tone: Tone::Plain,
+        words,
     }
 }
 

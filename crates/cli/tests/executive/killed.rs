@@ -68,7 +68,8 @@ impl Asked {
         let name = format!("g{}", self.goals);
         let goal = json!({"name": name, "goal": format!("(done {job})")});
         let (status, answer) = own.ask_if_there("POST", "/v1/goals", &goal)?;
-        assert!([200, 202].contains(&status), "{answer}");
+        // It listens a moment before it knows its run again.
+        assert!([200, 202, 409].contains(&status), "{answer}");
         if answer["taken"] == true {
             self.taken.insert(name, false);
         }
@@ -135,7 +136,11 @@ fn killed(number: u64) -> (u64, usize) {
     }
     let what = format!("executive {number} after {kills} kills");
     let mut own = launched(&place, &journal, &beginning);
-    // All that are still open can be reached.
+    // It takes in nothing before it has gone through its journal. All that are still open can be reached.
+    let last = json!({"name": "last", "goal": "(done a1)"});
+    while own.post("/v1/goals", &last).0 != 200 {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
     let is_at_rest = |state: &Value| {
         state["activity"] == "resting" && state["goals"].as_array().is_some_and(Vec::is_empty)
     };
@@ -216,4 +221,59 @@ fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
         "{count} executives, killed {kills} times; their journals were begun anew {anew} times"
     );
     assert!(anew > 0, "no journal was begun anew");
+}
+
+/// Wherever a program is killed while it begins its journal anew, the next one goes on: from the old
+/// segment as long as the new one has not its name.
+#[test]
+fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped("there is no python3");
+        return;
+    }
+    let place = folder("about-to-begin-anew");
+    let journal = place.join("journal").display().to_string();
+    let (new, earlier) = (place.join("journal.new"), place.join("journal.1"));
+    let line = with_robot(&place, &journal);
+    let line: Vec<&str> = line.iter().map(String::as_str).collect();
+    let mut own = Executive::start(&place, &line);
+    own.await_state(|state| state["why"] == "reached: problem");
+    own.kill();
+    for step in 0..4 {
+        let text = fs::read(&journal).expect("a journal");
+        let written = [0, text.len() / 2, text.len(), text.len()][step];
+        fs::write(&new, &text[..written]).expect("written");
+        if step == 3 {
+            // The old segment has its second name already.
+            fs::remove_file(&earlier).expect("there is one");
+            fs::hard_link(&journal, &earlier).expect("a second name");
+        }
+        let line = ["--resume", &journal, "--journal-size", "1K"];
+        let mut own = Executive::start(&place, &line);
+        let undone = json!({"fact": "(done a3)", "becomes": false});
+        let name = format!("step-{step}");
+        let goal = json!({"name": name, "goal": "(done a3)"});
+        while own.post("/v1/facts", &undone).0 != 200 || own.post("/v1/goals", &goal).0 != 200 {
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+        let begins_with_snapshot = || {
+            let text = fs::read_to_string(&journal).expect("a journal");
+            let second = text.lines().nth(1).map(str::to_owned);
+            second.is_some_and(|it| it.contains("\"snapshot\""))
+        };
+        own.await_state(|state| {
+            state["goals"].as_array().is_some_and(Vec::is_empty) && begins_with_snapshot()
+        });
+        own.kill();
+        assert!(!new.exists(), "step {step}: half a segment is left");
+        assert!(reached(&journal).contains(&name), "step {step}");
+        for segment in segments(&journal) {
+            let replayed = command::elbowroom(&["run", "--replay", &segment]);
+            assert_eq!(replayed.status.code(), Some(0), "step {step}: {replayed:?}");
+        }
+    }
+    let begun = lines(&place, "begun");
+    let tickets: BTreeSet<_> = begun.iter().filter_map(|it| it.split(' ').next()).collect();
+    assert_eq!(tickets.len(), begun.len(), "begun twice: {begun:#?}");
+    fs::remove_dir_all(&place).expect("the folder is there");
 }

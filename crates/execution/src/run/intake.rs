@@ -96,7 +96,7 @@ impl Run<'_> {
     /// An action gives a sign of life: so long it has not been silent.
     fn heard(&mut self, ticket: Ticket, time: &Rational) -> Remark {
         match self.account.get(ticket) {
-            None => self.unknown(ticket),
+            None => Some(self.unknown(ticket)),
             Some(entry) if entry.ended.is_some() => Some("it had ended already"),
             Some(_) => {
                 self.account.note_heard(ticket, time);
@@ -106,12 +106,12 @@ impl Run<'_> {
     }
 
     /// The objection to a report on a ticket that is not known.
-    fn unknown(&self, ticket: Ticket) -> Remark {
-        Some(if self.account.is_forgotten(ticket) {
+    fn unknown(&self, ticket: Ticket) -> &'static str {
+        if self.account.is_forgotten(ticket) {
             LONG_PAST
         } else {
             NEVER_STARTED
-        })
+        }
     }
 
     /// The belief is never taken back in time, so a late report changes the present state. What is
@@ -122,7 +122,7 @@ impl Run<'_> {
 
     fn started(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) -> Remark {
         let Some(entry) = self.account.get(ticket) else {
-            return self.unknown(ticket);
+            return Some(self.unknown(ticket));
         };
         if entry.started.is_some() {
             return Some("it had started already");
@@ -167,7 +167,7 @@ impl Run<'_> {
         measured: &[Measured],
     ) -> Remark {
         let Some(entry) = self.account.get(ticket) else {
-            return self.unknown(ticket);
+            return Some(self.unknown(ticket));
         };
         if let Some((_, earlier)) = &entry.ended {
             let is_same = std::mem::discriminant(earlier) == std::mem::discriminant(ending);
