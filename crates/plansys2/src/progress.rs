@@ -39,6 +39,16 @@ impl Progress {
         &self.infos
     }
 
+    /// What is left of the plan that this is the progress of: the actions that have not ended well, as
+    /// they stand there.
+    pub fn rest_of(&self, plan: &Plan) -> Plan {
+        let with_infos = plan.items.iter().zip(&self.infos);
+        let left = with_infos.filter(|(_, info)| info.status != execution::SUCCEEDED);
+        Plan {
+            items: left.map(|(item, _)| item.clone()).collect(),
+        }
+    }
+
     /// An action is asked for.
     pub fn begin(&mut self, action: &Action) {
         let is_its = |it: &ActionExecutionInfo| {
@@ -160,6 +170,22 @@ mod tests {
             arguments,
             is_instantaneous: false,
         }
+    }
+
+    #[test]
+    fn what_is_left_of_a_plan_is_what_has_not_ended_well() {
+        let mut progress = Progress::new(&plan());
+        let now = Stamp { sec: 9, nanosec: 0 };
+        let left = |progress: &Progress| progress.rest_of(&plan()).items;
+        assert_eq!(left(&progress), plan().items);
+        for (ticket, told) in [(1, Told::Succeeded), (2, Told::Failed("it slips".into()))] {
+            progress.begin(&action(ticket, "(move r a b)"));
+            progress.tell(ticket, &told, now);
+        }
+        // An action that is no part of it changes nothing.
+        progress.begin(&action(3, "(jump r)"));
+        progress.tell(3, &Told::Succeeded, now);
+        assert_eq!(left(&progress), plan().items[1..]);
     }
 
     #[test]

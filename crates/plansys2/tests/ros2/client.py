@@ -24,6 +24,8 @@ SERVICES = {
     "planner/validate_domain": ValidateDomain,
     "planner/get_state": GetState,
     "planner/change_state": ChangeState,
+    "executor/get_plan": GetPlan,
+    "executor/get_remaining_plan": GetPlan,
     "executor/get_state": GetState,
     "executor/change_state": ChangeState,
 }
@@ -68,11 +70,16 @@ class Client:
     def change(self, node, transition):
         return self.call(f"{node}/change_state", transition=Transition(id=transition)).success
 
+    def executed(self):
+        """The plan that is executed, and what is left of it; or why there is none."""
+        answers = [self.call(f"executor/{it}", domain="", problem="") for it in ("get_plan", "get_remaining_plan")]
+        return [[it.action for it in told.plan.items] if told.success else told.error_info for told in answers]
+
     def execute(self, plan, cancel_after=None):
         """What became of it, and how often there was feedback."""
         client = self.executing
         assert client.wait_for_server(timeout_sec=PATIENCE), "execute_plan is not there"
-        feedback = []
+        feedback, asked = [], None
         goal = self.spin(client.send_goal_async(
             ExecutePlan.Goal(plan=plan), lambda it: feedback.append(it.feedback.action_execution_status)
         ))  # fmt: skip
@@ -84,6 +91,7 @@ class Client:
             until = time.monotonic() + cancel_after
             while time.monotonic() < until:
                 rclpy.spin_once(self.node, timeout_sec=0.1)
+            asked = self.executed()
             assert len(self.spin(goal.cancel_goal_async()).goals_canceling) == 1
         answer = self.spin(result)
         note(f"execute_plan: {STATUSES[answer.status]}")
@@ -92,6 +100,7 @@ class Client:
             "outcome": STATUSES[answer.status],
             "success": answer.result.success,
             "feedback": len(feedback),
+            "asked": asked,
             "was_executing": any(it.status == it.EXECUTING for told in feedback for it in told),
             "actions": {it.action_full_name: [it.status, it.message_status] for it in infos},
         }
@@ -113,6 +122,7 @@ def main():
     said["validated"] = [[it.success, it.error_info] for it in validated]
     answer = client.call("planner/get_plan", domain=domain, problem=problem)
     said["planned"] = [answer.success, [it.action for it in answer.plan.items]]
+    said["idle"] = client.executed()
     said["executed"] = client.execute(answer.plan, float(sys.argv[3]) if len(sys.argv) > 3 else None)
     said["followed"] = [client.plans == [answer.plan], sorted({it.action_full_name for it in client.infos})]
     there = client.node.get_publishers_info_by_topic("ros_discovery_info", no_mangle=True)

@@ -256,6 +256,7 @@ def a_plan_is_asked_for_and_executed(stage):
     assert executed["outcome"] == "succeeded" and executed["success"] and executed["was_executing"]
     assert set(executed["actions"]) == {"(move r1 shed gate):0", "(move r2 barn gate):0", "(signal r1 gate):2000"}
     assert all(status == 4 for status, _ in executed["actions"].values())
+    assert said["idle"] == 2 * ["no plan is being executed"]
     assert said["followed"] == [True, sorted(executed["actions"])], "tools can follow"
     # The performers' process and the client: the program does not say what nodes of another distribution cannot bear.
     publishers, nodes = said["nodes"]
@@ -265,7 +266,10 @@ def a_plan_is_asked_for_and_executed(stage):
 
 def an_executed_plan_is_cancelled(stage):
     crew = {name: dict(spec, lasts=30) for name, spec in DRIVERS.items()}
-    executed = serve(stage, crew, "2")["executed"]
+    said = serve(stage, crew, "2")
+    executed = said["executed"]
+    # Nothing of it has ended.
+    assert executed["asked"] == 2 * [said["planned"][1]]
     assert executed["outcome"] == "canceled" and not executed["success"]
     assert sorted(status for status, _ in executed["actions"].values()) == [1, 5, 5]
     assert stage.events().count("told to cancel") == 2

@@ -20,7 +20,7 @@ use elbowroom_plansys2::{
 use super::command::{self, Patience, Planned, Running};
 use super::network::Asker;
 use super::options::{ServeSettings, Settings};
-use super::services::{Asked, EXECUTOR, NODES, PLANNER, Services};
+use super::services::{Asked, EXECUTOR, NODES, PLANNER, Part, Services};
 use super::session::now;
 use super::topics::Topics;
 use super::{Input, remark};
@@ -43,6 +43,8 @@ struct Execution {
     run: Running,
     number: u64,
     world: World,
+    /// As the client has given it.
+    plan: Plan,
     progress: Progress,
     answers: Option<UnixStream>,
     told: Option<Instant>,
@@ -183,6 +185,13 @@ impl Serving {
     fn answer(&mut self, asked: Asked) {
         let sent = match asked {
             Asked::Plan(who, texts) => return self.plan(who, texts),
+            Asked::Executed(part, who) => {
+                let response = self.executed(part);
+                match part {
+                    Part::Whole => self.services.executed.answer(who, response),
+                    Part::Rest => self.services.rest.answer(who, response),
+                }
+            }
             Asked::Validate(who, request) => return self.validate(who, request.domain),
             Asked::Goal(who, request) => {
                 let stamp = stamp();
@@ -224,6 +233,25 @@ impl Serving {
             }
         };
         told(sent);
+    }
+
+    /// The plan that is being executed, or what is left of it.
+    fn executed(&self, part: Part) -> PlanResponse {
+        let Some(execution) = &self.execution else {
+            return PlanResponse {
+                success: false,
+                plan: Plan::default(),
+                error_info: "no plan is being executed".to_owned(),
+            };
+        };
+        PlanResponse {
+            success: true,
+            plan: match part {
+                Part::Whole => execution.plan.clone(),
+                Part::Rest => execution.progress.rest_of(&execution.plan),
+            },
+            error_info: String::new(),
+        }
     }
 
     /// Has a process of the command work on it, unless that is refused; what comes of it is an input.
@@ -317,6 +345,7 @@ impl Serving {
             run,
             number: self.runs,
             world: World::new("plansys2", self.speed),
+            plan: request.plan.clone(),
             progress: Progress::new(&request.plan),
             answers: None,
             told: None,

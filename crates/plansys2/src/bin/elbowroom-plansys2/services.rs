@@ -18,6 +18,8 @@ pub(super) const EXECUTOR: usize = 1;
 /// What somebody has asked for.
 pub(super) enum Asked {
     Plan(Asker, PlanRequest),
+    /// For the plan that is executed, or for what is left of it.
+    Executed(Part, Asker),
     Validate(Asker, ValidateRequest),
     Goal(Asker, GoalRequest),
     Cancel(Asker, CancelRequest),
@@ -27,9 +29,18 @@ pub(super) enum Asked {
     Change(usize, Asker, ChangeRequest),
 }
 
+/// How much of a plan somebody wants to know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    Whole,
+    Rest,
+}
+
 /// By what it is answered.
 pub(super) struct Services {
     pub(super) plan: Answers<PlanResponse>,
+    pub(super) executed: Answers<PlanResponse>,
+    pub(super) rest: Answers<PlanResponse>,
     pub(super) validate: Answers<ValidateResponse>,
     pub(super) goal: Answers<GoalResponse>,
     pub(super) cancel: Answers<CancelResponse>,
@@ -71,6 +82,16 @@ impl Services {
                 "planner/get_plan",
                 "plansys2_msgs::srv::dds_::GetPlan",
                 move |asker, it| ask(Asked::Plan(asker, it)),
+            )?,
+            executed: network.serve(
+                "executor/get_plan",
+                "plansys2_msgs::srv::dds_::GetPlan",
+                move |asker, _: PlanRequest| ask(Asked::Executed(Part::Whole, asker)),
+            )?,
+            rest: network.serve(
+                "executor/get_remaining_plan",
+                "plansys2_msgs::srv::dds_::GetPlan",
+                move |asker, _: PlanRequest| ask(Asked::Executed(Part::Rest, asker)),
             )?,
             validate: network.serve(
                 "planner/validate_domain",
@@ -120,6 +141,8 @@ impl Services {
     /// One could not be sent.
     pub(super) fn flush(&mut self) -> Result<(), String> {
         self.plan.flush()?;
+        self.executed.flush()?;
+        self.rest.flush()?;
         self.validate.flush()?;
         self.goal.flush()?;
         self.cancel.flush()?;
