@@ -38,25 +38,37 @@ pub(crate) fn task_with_sources(
     epsilon: &Rational,
     output: &mut Output,
 ) -> Result<(Task, Source, Source), Failure> {
-    let (read, warnings) = silent_task_with_sources(arguments, epsilon)?;
-    warn(&warnings, output);
-    Ok(read)
+    Ok(silently(arguments, epsilon)?.told(output))
 }
 
-/// The same, which says nothing: the warnings come along.
-pub(crate) fn silent_task_with_sources(
-    arguments: &ProblemArgs,
-    epsilon: &Rational,
-) -> Result<((Task, Source, Source), Vec<Diagnostic>), Failure> {
+/// Domain and problem as they were read, of which nobody was told yet.
+pub(crate) struct Untold {
+    read: (Task, Source, Source),
+    warnings: Vec<Diagnostic>,
+}
+
+impl Untold {
+    /// What was read, with the texts. Warnings go to standard error.
+    pub(crate) fn told(self, output: &mut Output) -> (Task, Source, Source) {
+        warn(&self.warnings, output);
+        self.read
+    }
+}
+
+/// Reads domain and problem, and says nothing.
+pub(crate) fn silently(arguments: &ProblemArgs, epsilon: &Rational) -> Result<Untold, Failure> {
     let domain = source(&arguments.domain, "domain")?;
     let problem = source(&arguments.problem, "problem")?;
     let (read, warnings) = pddl::read_problem(&domain, &problem)?;
     let task = Task::new(read).with_epsilon(epsilon.clone());
-    Ok(((task, domain, problem), warnings))
+    Ok(Untold {
+        read: (task, domain, problem),
+        warnings,
+    })
 }
 
 /// Writes warnings to standard error.
-pub(crate) fn warn(warnings: &[Diagnostic], output: &mut Output) {
+fn warn(warnings: &[Diagnostic], output: &mut Output) {
     for warning in warnings {
         output.warn_about(warning);
     }

@@ -37,7 +37,7 @@ pub(super) fn read(
     let (files, epsilon) = (arguments.problem.clone(), arguments.epsilon.clone());
     let read = move || {
         // Nobody listens any longer once time is up.
-        let _ = sender.send(input::silent_task_with_sources(&files, &epsilon));
+        let _ = sender.send(input::silently(&files, &epsilon));
     };
     thread::Builder::new()
         .stack_size(STACK)
@@ -46,9 +46,7 @@ pub(super) fn read(
     loop {
         match receiver.recv_timeout(QUESTION) {
             Ok(read) => {
-                let (read, warnings) = read?;
-                input::warn(&warnings, output);
-                return Ok(Ok(read));
+                return Ok(Ok(read?.told(output)));
             }
             Err(RecvTimeoutError::Timeout) => {
                 if let ControlFlow::Break(halt) = watch.flow() {
