@@ -33,6 +33,8 @@ pub(crate) struct Deviation {
 pub(crate) struct Amounts {
     pub(crate) readings: Vec<Reading>,
     pub(crate) deviations: Vec<Deviation>,
+    /// How many amounts there is nothing to compare with.
+    pub(crate) unread: usize,
 }
 
 impl Reading {
@@ -79,6 +81,8 @@ pub(crate) fn amounts(plan: &ParametrizedPlan, moment: &Moment<'_>) -> Amounts {
         if let Some(value) = expression(action, place.is_end, fluent) {
             let name = moment.belief.task().fluent_name(fluent);
             note(plan, &place, name, value, &mut amounts);
+        } else {
+            amounts.unread += 1;
         }
     }
     amounts
@@ -158,7 +162,10 @@ fn note(
         })
     };
     let observed = amount.measured.amount.clone();
-    let Some(constant) = at(None) else { return };
+    let Some(constant) = at(None) else {
+        amounts.unread += 1;
+        return;
+    };
     // The amount is affine in the parameters: a point for each gives the plane.
     let slope = |id: &ParameterId| Some((*id, at(Some(*id))? - &constant));
     let slopes: Vec<(ParameterId, Rational)> = open.iter().filter_map(slope).collect();

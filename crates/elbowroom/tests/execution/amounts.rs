@@ -1,8 +1,17 @@
 //! Amounts that are measured, and durations that move numbers.
 
-use elbowroom::execution::Cause;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use elbowroom::execute::WholeRegion;
+use elbowroom::execution::executors::{ExecutorSpec, Means};
 use elbowroom::execution::run::Verdict;
+use elbowroom::execution::{
+    Cause, Decided, Executor, Mission, Moment, Need, Planned, Reason, Region, StepId,
+};
+use elbowroom::model::Task;
 use elbowroom::num::Rational;
+use elbowroom::plan::{ParametrizedPlan, Valuation};
 
 use crate::scene::Scene;
 
@@ -141,6 +150,79 @@ fn a_reason_shows_all_that_bounds_a_duration() {
         assert!(
             matches!(bounds, (Some(lower), Some(upper)) if lower.is_positive() && lower <= upper),
             "{executor}: {allowed}"
+        );
+    }
+}
+
+/// Asks whether the plan works, and counts how often.
+struct Counting(Arc<AtomicUsize>);
+
+impl Region for Counting {
+    fn objection(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &ParametrizedPlan,
+        values: &Valuation,
+    ) -> Option<String> {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        WholeRegion.objection(task, plan, values)
+    }
+}
+
+/// An executor that somebody else made.
+struct Made(Box<dyn Executor>);
+
+impl Executor for Made {
+    fn need(&self) -> Need {
+        self.0.need()
+    }
+
+    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+        self.0.adopt(mission)
+    }
+
+    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        self.0.decide(moment)
+    }
+
+    fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
+        self.0.window(step, is_end)
+    }
+}
+
+#[test]
+fn live_looks_at_the_numbers_again_only_when_one_is_not_as_planned() {
+    let problem = "(define (problem p) (:domain sites) (:objects a b - site)
+        (:init (idle) (= (charge) 200)) (:goal (and (surveyed a) (surveyed b))))";
+    let plan = "0: (survey a) [20]\n20.001: (warm-up b) [20]";
+    let scene = Scene::new(DOMAIN, problem, Some(plan));
+    for (world, questions) in [
+        ("", 0),
+        (
+            "[[amount]]\naction = \"*\"\nfluent = \"charge\"\nconstant = 30\n",
+            0,
+        ),
+        (
+            "[[amount]]\naction = \"survey\"\nfluent = \"charge\"\nconstant = 40\n",
+            1,
+        ),
+        (
+            "[[amount]]\naction = \"*\"\nfluent = \"charge\"\nconstant = 40\n",
+            2,
+        ),
+    ] {
+        let asked = Arc::new(AtomicUsize::new(0));
+        let live: ExecutorSpec = "live".parse().unwrap();
+        let live = live.build(Means::from(Box::new(Counting(Arc::clone(&asked)))));
+        let model = scene.world(world);
+        let execution = scene.execution("live").decided_by(Made(live));
+        let report = execution.run_in(&mut *model.world(&scene.task, 0));
+        assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+        // What ends after the last deviation is only asked about if the plan had no envelope.
+        let count = asked.load(Ordering::Relaxed);
+        assert!(
+            count <= questions && (count > 0) == (questions > 0),
+            "{world}: {count}"
         );
     }
 }

@@ -3,6 +3,7 @@
 mod limits;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use elbowroom_model::ground::{Action, Body, Change, Effect, Expression};
 use elbowroom_num::Rational;
@@ -14,7 +15,7 @@ use crate::event::Measured;
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Planned, StepId};
 use crate::odds::{Odds, Remainder};
 use crate::preparation::{Need, Region};
-use crate::quantities::{amounts, duration_parameters, places};
+use crate::quantities::{Amounts, amounts, duration_parameters, places};
 use crate::reason::{About, Cause, Promise, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
@@ -53,13 +54,16 @@ struct Rest {
     dispatch: Dispatch,
     /// The guarantee of the rest of the plan.
     promise: Promise,
-    mission: Mission,
+    mission: Arc<Mission>,
     /// The values observed, and the nominal ones of the rest.
     values: Valuation,
     /// The parameters that are durations, by instance.
     durations: BTreeMap<InstanceId, ParameterId>,
     /// The amounts that were observed: by which instance, at its end or its start.
     amounts: Vec<(InstanceId, bool, Measured)>,
+    /// The values with which the rest was last found to work, if nothing else has deviated since. As
+    /// long as they stay so, what happens only chooses among schedules all of which work.
+    accepted: Option<Valuation>,
     /// Whether the plan needs numbers at all, and whether durations move any.
     reads_numbers: bool,
     durations_move_numbers: bool,
@@ -79,11 +83,13 @@ impl Executor for Live {
         let mut rest = Rest {
             dispatch,
             promise,
-            mission: mission.clone(),
+            mission: Arc::new(mission.clone()),
             amounts: Vec::new(),
             reads_numbers,
             durations_move_numbers: reads_numbers && plan.durations_move_numbers(),
             limits: BTreeMap::new(),
+            // What has an envelope works as planned.
+            accepted: mission.envelope.is_some().then(|| plan.nominal()),
             values: plan.nominal(),
             durations: duration_parameters(plan)
                 .map(|(parameter, instance)| (instance, parameter))
@@ -152,6 +158,9 @@ impl Rest {
     fn learn(&mut self, moment: &Moment<'_>, region: &mut dyn Region) -> Option<Box<Reason>> {
         let trouble = self.dispatch.take(moment);
         let moves_times = self.observe(moment);
+        if trouble.is_some() || moves_times {
+            self.accepted = None;
+        }
         if let Some(reason) = trouble {
             if !promise::is_about_time(&reason) {
                 return Some(reason);
@@ -167,7 +176,7 @@ impl Rest {
         }
         // Only ends and amounts can move the rest out of its envelope.
         let step = moment.news.iter().find_map(may_matter);
-        if let Some(step) = step.filter(|_| self.reads_numbers) {
+        if let Some(step) = step.filter(|_| self.reads_numbers && !self.is_accepted(moment.now)) {
             let (plan, values) = self.remainder(moment.now);
             if let Some(why) = region.objection(&self.mission.task, &plan, &values) {
                 let action = &self.dispatch.action(step.instance()).name;
@@ -176,9 +185,16 @@ impl Rest {
                     .about(About::Said(why));
                 return Some(Box::new(reason.since(moment.now.clone())));
             }
+            self.accepted = Some(values);
         }
         self.find_limits(moment.now, region);
         None
+    }
+
+    /// Whether nothing has deviated since the rest was last found to work.
+    fn is_accepted(&self, now: &Rational) -> bool {
+        let accepted = self.accepted.as_ref();
+        accepted.is_some_and(|accepted| *accepted == self.values_at(now))
     }
 
     /// Why another plan is to be preferred. Asked when an action has ended and nothing is under
@@ -239,7 +255,16 @@ impl Rest {
             self.amounts.push((place.instance, place.is_end, measured));
         }
         let mut moves_times = false;
-        for reading in amounts(&self.mission.plan, moment).readings {
+        let Amounts {
+            readings,
+            deviations,
+            unread,
+        } = amounts(&self.mission.plan, moment);
+        let is_told = readings.iter().all(|reading| reading.value().is_some());
+        if unread > 0 || !deviations.is_empty() || !is_told {
+            self.accepted = None;
+        }
+        for reading in readings {
             // Of one amount in which several stand nobody knows which it was.
             if let Some((parameter, value)) = reading.value() {
                 let bound = Bound::Parameter(parameter);
@@ -256,7 +281,7 @@ impl Rest {
     /// nothing deviates any more.
     fn remainder(&self, now: &Rational) -> (ParametrizedPlan, Valuation) {
         let mut plan = self.mission.plan.clone();
-        let mut values = self.values.clone();
+        let values = self.values_at(now);
         let now = self.dispatch.local(now);
         for (instance, is_end, measured) in &self.amounts {
             let action = &mut plan.plan.instances[instance.index()].action;
@@ -265,6 +290,13 @@ impl Rest {
         plan.plan = plan
             .plan
             .remainder(&now, |node| self.dispatch.happened(node), |_| true);
+        (plan, values)
+    }
+
+    /// The values at which nothing deviates any more.
+    fn values_at(&self, now: &Rational) -> Valuation {
+        let mut values = self.values.clone();
+        let now = self.dispatch.local(now);
         for (parameter, instance) in duration_parameters(&self.mission.plan) {
             let [start, end] = self.dispatch.nodes_of(instance);
             if let (Some(start), None) =
@@ -274,7 +306,7 @@ impl Rest {
                 values[parameter] = elapsed.max(values[parameter].clone());
             }
         }
-        (plan, values)
+        values
     }
 }
 
