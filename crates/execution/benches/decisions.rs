@@ -69,6 +69,7 @@ fn row(executor: &str, robots: usize, actions: usize) {
         likelihoods: Arc::new(likelihoods),
         odds: None,
         foresight: Foresight::default(),
+        orders: None,
         outlook: None,
         rehearsal: None,
     });

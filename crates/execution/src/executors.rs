@@ -22,6 +22,7 @@ use std::sync::Arc;
 use elbowroom_num::Rational;
 use elbowroom_probability::Likelihoods;
 
+pub use adaptable::Orders;
 pub use lookahead::Foresight;
 
 use crate::executor::{Decided, Decision, Executor};
@@ -73,6 +74,8 @@ pub struct Means {
     pub odds: Option<Box<dyn Odds>>,
     /// For `lookahead`: what it found out about the same problem and likelihoods in other runs.
     pub foresight: Foresight,
+    /// For `adaptable`: what it found out about the same plans in other samples of the same scene.
+    pub orders: Option<Orders>,
     /// For those that weigh each move ([`ExecutorSpec::asks_outlook`]); without, they go by their
     /// plan.
     pub outlook: Option<Arc<dyn Outlook>>,
@@ -97,6 +100,7 @@ impl<R: Region + 'static> From<Box<R>> for Means {
             likelihoods: Arc::new(Likelihoods::certain()),
             odds: None,
             foresight: Foresight::default(),
+            orders: None,
             outlook: None,
             rehearsal: None,
         }

@@ -54,5 +54,5 @@ pub use preparation::{Need, PrepareError, Prepared, Preparer, Region};
 pub use progression::{Progression, Standstill, Underway, Unreadable};
 pub use reason::{About, Behind, Cause, Changed, Promise, Reason};
 pub use record::{Entry, NoRecord, Recorder};
-pub use rehearsal::{Rehearsal, Rehearsed, Rehearsing, Scene, SeenChange};
+pub use rehearsal::{Rehearsal, Rehearsed, Rehearsing, Scene, SeenChange, Tells};
 pub use world::{Passage, World, WorldError};

@@ -20,8 +20,31 @@ pub trait Rehearsal: Send {
     /// The facts whose changes are to be remembered for [`Scene::seen`].
     fn watched(&self, task: &Task) -> Vec<FactId>;
 
+    /// What is learnt of the world when an action goes as it should. By default everything may be.
+    fn tells(&self, action: &str) -> Tells {
+        let _ = action;
+        Tells {
+            by_lasting: true,
+            by_ending: true,
+        }
+    }
+
+    /// Whether anything is learnt of the world by time passing alone.
+    fn tells_by_itself(&self) -> bool {
+        true
+    }
+
     /// What does best from here.
     fn rehearse(&mut self, scene: &Scene<'_>) -> Rehearsed;
+}
+
+/// What is learnt when an action goes as it should.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tells {
+    /// Whether anything is by its being still under way: it might have ended, or failed.
+    pub by_lasting: bool,
+    /// Whether anything is by its end, or by what it has changed.
+    pub by_ending: bool,
 }
 
 /// A moment of a run at which all that was told to start has started.
@@ -67,6 +90,8 @@ pub struct Rehearsed {
     pub value: Rational,
     /// The same of what would be done without any choice.
     pub present: Rational,
+    /// Whether nothing else was tried out, because going on reaches the goal in next to all samples.
+    pub is_fine: bool,
 }
 
 /// Something that can be done with a plan.

@@ -109,18 +109,19 @@ pub struct Progress {
     pub best: Option<f64>,
 }
 
-/// The search for orders of one plan. Keeps what it has found for when it is asked again.
+/// The search for orders of one plan. Keeps what it has found for when it is asked again, and shares
+/// that with its clones.
 #[doc(alias = "PGen")]
 #[derive(Clone, Debug)]
 pub struct OrderSearch {
     model: Arc<Model>,
     settings: SearchSettings,
-    separations: Separations,
-    symmetry: Symmetry,
-    bounds: Bounds,
+    separations: Arc<Separations>,
+    symmetry: Arc<Symmetry>,
+    bounds: Arc<Bounds>,
     cache: Cache,
     /// Looked at before all others.
-    first: Vec<NodeId>,
+    first: Arc<Vec<NodeId>>,
 }
 
 impl OrderSearch {
@@ -130,13 +131,13 @@ impl OrderSearch {
         let separations = Separations::of(&model, settings.keeps_interference);
         let bounds = Bounds::of(&model, &separations);
         Self {
-            symmetry: Symmetry::of(&model, &separations),
+            symmetry: Arc::new(Symmetry::of(&model, &separations)),
             model,
             settings,
-            separations,
-            bounds,
+            separations: Arc::new(separations),
+            bounds: Arc::new(bounds),
             cache: Cache::default(),
-            first: Vec::new(),
+            first: Arc::default(),
         }
     }
 
@@ -146,7 +147,9 @@ impl OrderSearch {
     /// Starts of what is under way and timed initials that have passed are left out.
     #[must_use]
     pub fn beginning_with(mut self, sequence: Vec<NodeId>) -> Self {
-        self.first = sequence;
+        self.first = Arc::new(sequence);
+        // What was found by a search that began otherwise may be another of several that are alike.
+        self.cache = Cache::default();
         self
     }
 

@@ -210,6 +210,11 @@ impl WorldModel {
 }
 
 impl Rule {
+    /// Whether it always gives the same value.
+    pub fn is_certain(&self) -> bool {
+        matches!(self.distribution, Distribution::Constant(_))
+    }
+
     /// A value, when the planned one is `planned`.
     pub fn draw(&self, planned: &Rational, resolution: &Rational, rng: &mut impl Rng) -> Rational {
         let mut value = self.distribution.draw(rng);

@@ -299,6 +299,7 @@ impl<'a> Execution<'a> {
                 likelihoods: self.likelihoods,
                 odds: self.odds,
                 foresight: self.foresight,
+                orders: None,
                 outlook: self.outlook,
                 rehearsal: rehearsal.map(|it| Box::new(it) as Box<dyn Rehearsal>),
             }),

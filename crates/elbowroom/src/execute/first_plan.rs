@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::as_timed;
 use super::candidates::{Candidate, Candidates, Limits};
-use super::race::{ROUNDS, race};
+use super::race::{Rules, race};
 use super::rollouts::{Rollouts, Tryout};
 
 /// How many plans are compared at most.
@@ -32,6 +32,9 @@ const FIRST_LOOK: u64 = 100;
 /// How many actions the plans have at most that are tried out, over all samples: what bounds the
 /// time that a choice takes among plans of hundreds of actions.
 const MOST_ACTIONS: u64 = 50_000;
+
+/// How many states may be looked at for all other plans than the first, in any case.
+const LEAST_OTHER_STATES: u64 = 10_000;
 
 /// How many partial orders are looked at for the likeliest order of a plan.
 const MOST_SEQUENCES: usize = 5_000;
@@ -164,8 +167,8 @@ impl fmt::Display for Choice {
 pub struct Chooser<'a> {
     /// How the embedded planner plans.
     pub settings: embedded::Settings,
-    /// How far it looks. As many states as for the first plan, at most, may be looked at for all
-    /// others together.
+    /// How far it looks. As many states as for the first plan, at most, and 10,000 in any case, may be
+    /// looked at for all others together.
     pub most_states: u64,
     /// See [`Embedded::improve_states`](super::Embedded::improve_states).
     pub improve_states: u64,
@@ -206,7 +209,7 @@ impl Chooser<'_> {
         let limits = Limits {
             most_states: self.most_states,
             improve_states: self.improve_states,
-            other_states: self.most_states,
+            other_states: self.most_states.max(LEAST_OTHER_STATES),
             searches: MOST_SEARCHES,
         };
         let settings = self.settings.clone();
@@ -274,7 +277,7 @@ impl Chooser<'_> {
             let samples = first.len() as u64;
             return (vec![Value::Sampled { successes, samples }], 0);
         }
-        let (tallies, best) = race(plans.len(), &ROUNDS, &mut |place, sample| {
+        let (tallies, best) = race(plans.len(), &Rules::default(), &mut |place, sample| {
             let looked = usize::try_from(sample).ok().and_then(|it| first.get(it));
             if let (0, Some(known)) = (place, looked) {
                 return Some(*known);

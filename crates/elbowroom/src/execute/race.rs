@@ -1,7 +1,9 @@
 //! Which of several plans succeeds most often, found out with few trials.
 
+use std::cmp::Reverse;
+
 /// How many samples there are at the end of each round.
-pub(super) const ROUNDS: [u64; 4] = [50, 100, 200, 400];
+const ROUNDS: [u64; 4] = [50, 100, 200, 400];
 
 /// How many standard deviations of the difference a plan may be behind.
 const BEHIND: u64 = 2;
@@ -24,15 +26,61 @@ impl Tally {
     pub(super) fn is_behind(&self, other: &Self) -> bool {
         is_behind(&self.results, &other.results)
     }
+
+    /// Whether it may be ahead of another by one sample in `margin`, as far as chance allows.
+    fn may_be_ahead(&self, other: &Self, margin: u64) -> bool {
+        let (own, theirs) = differences(&self.results, &other.results);
+        let least = self.samples().min(other.samples()) / margin;
+        // The lead that is asked for lies above what they differ by, and by more than chance.
+        let missing = (least + theirs).saturating_sub(own);
+        missing.pow(2) <= BEHIND.pow(2) * (own + theirs + 1)
+    }
 }
 
 /// Whether results are behind others by more than chance, in the samples that both have: of those
 /// in which only one of the two succeeded, too few are one's own (McNemar's test).
 pub(crate) fn is_behind(results: &[bool], others: &[bool]) -> bool {
+    let (own, theirs) = differences(results, others);
+    theirs > own && (theirs - own).pow(2) > BEHIND.pow(2) * (theirs + own)
+}
+
+/// In how many samples only one of the two succeeded: the first, and the second.
+fn differences(results: &[bool], others: &[bool]) -> (u64, u64) {
     let pairs = || results.iter().zip(others);
     let own = pairs().filter(|(own, other)| **own && !**other).count() as u64;
     let theirs = pairs().filter(|(own, other)| !**own && **other).count() as u64;
-    theirs > own && (theirs - own).pow(2) > BEHIND.pow(2) * (theirs + own)
+    (own, theirs)
+}
+
+/// How a race goes.
+pub(super) struct Rules<'a> {
+    /// How many samples there are at the end of each round.
+    pub(super) rounds: &'a [u64],
+    /// Whether half of those who are still in it are out after each round (sequential halving; Karnin,
+    /// Koren & Somekh, ICML 2013). The first is not, for that.
+    pub(super) halves: bool,
+    /// Of so many samples, one more has to succeed for anybody to be preferred to the first. Who
+    /// cannot be that far ahead of it, but for chance, is out.
+    pub(super) margin: Option<u64>,
+}
+
+impl Default for Rules<'static> {
+    fn default() -> Self {
+        Self {
+            rounds: &ROUNDS,
+            halves: false,
+            margin: None,
+        }
+    }
+}
+
+/// Leaves those who succeeded most often, half of them and the first.
+fn better_half(tallies: &[Tally], racing: &mut Vec<usize>) {
+    let most = racing.len().div_ceil(2);
+    let mut best = racing.clone();
+    best.sort_by_key(|place| Reverse(tallies[*place].successes()));
+    best.truncate(most);
+    racing.retain(|place| *place == 0 || best.contains(place));
 }
 
 /// The tallies of as many plans as there are, and the place of the one that succeeded most often;
@@ -43,13 +91,13 @@ pub(crate) fn is_behind(results: &[bool], others: &[bool]) -> bool {
 /// than chance is tried no further (racing; Maron & Moore, NIPS 1993). `None` of `try_out` ends it.
 pub(super) fn race(
     count: usize,
-    rounds: &[u64],
+    rules: &Rules<'_>,
     try_out: &mut dyn FnMut(usize, u64) -> Option<bool>,
 ) -> (Vec<Tally>, usize) {
     let mut tallies = vec![Tally::default(); count];
     let mut racing: Vec<usize> = (0..count).collect();
     let mut leader = 0;
-    for &most in rounds {
+    for &most in rules.rounds {
         for &place in &racing {
             for sample in tallies[place].samples()..most {
                 let Some(success) = try_out(place, sample) else {
@@ -61,6 +109,14 @@ pub(super) fn race(
         leader = first_of_most(&tallies, &racing);
         let best = tallies[leader].clone();
         racing.retain(|place| !tallies[*place].is_behind(&best));
+        if rules.halves {
+            better_half(&tallies, &mut racing);
+        }
+        if let Some(margin) = rules.margin {
+            let may_win =
+                |place: &usize| *place == 0 || tallies[*place].may_be_ahead(&tallies[0], margin);
+            racing.retain(may_win);
+        }
         // Nobody can be ahead of one that always succeeds.
         if racing.len() < 2 || best.successes() == best.samples() {
             break;
@@ -92,7 +148,7 @@ mod tests {
 
     #[test]
     fn the_likeliest_wins_and_who_is_far_behind_is_tried_in_one_round_only() {
-        let (tallies, leader) = race(3, &ROUNDS, &mut trials(&[60, 90, 20]));
+        let (tallies, leader) = race(3, &Rules::default(), &mut trials(&[60, 90, 20]));
         assert_eq!(leader, 1);
         assert_eq!(tallies[2].samples(), ROUNDS[0]);
         assert!(tallies[1].successes() * 100 >= 85 * tallies[1].samples());
@@ -100,7 +156,7 @@ mod tests {
 
     #[test]
     fn of_plans_alike_the_first_is_taken_after_all_rounds() {
-        let (tallies, leader) = race(3, &ROUNDS, &mut trials(&[70, 70, 70]));
+        let (tallies, leader) = race(3, &Rules::default(), &mut trials(&[70, 70, 70]));
         assert_eq!(leader, 0);
         assert_eq!(tallies[0], tallies[2]);
         assert_eq!(tallies[0].samples(), ROUNDS[3]);
@@ -108,7 +164,7 @@ mod tests {
 
     #[test]
     fn one_that_always_succeeds_ends_the_race() {
-        let (tallies, leader) = race(2, &ROUNDS, &mut trials(&[90, 100]));
+        let (tallies, leader) = race(2, &Rules::default(), &mut trials(&[90, 100]));
         assert_eq!(leader, 1);
         assert!(tallies[1].samples() < ROUNDS[3]);
     }
@@ -116,10 +172,42 @@ mod tests {
     #[test]
     fn an_interrupted_race_has_the_leader_of_its_last_round() {
         let mut left = 60;
-        let (_, leader) = race(2, &ROUNDS, &mut |place, _| {
+        let (_, leader) = race(2, &Rules::default(), &mut |place, _| {
             left -= 1;
             (left > 0).then_some(place == 1)
         });
         assert_eq!(leader, 0, "no round was over");
+    }
+
+    #[test]
+    fn half_of_them_are_out_after_each_round_but_never_the_first() {
+        let rules = Rules {
+            halves: true,
+            ..Rules::default()
+        };
+        let (tallies, leader) = race(8, &rules, &mut trials(&[70; 8]));
+        assert_eq!(leader, 0);
+        let samples: Vec<u64> = tallies.iter().map(Tally::samples).collect();
+        assert_eq!(samples, [200, 200, 100, 100, 50, 50, 50, 50]);
+        let (tallies, _) = race(4, &rules, &mut trials(&[69, 70, 70, 70]));
+        let samples: Vec<u64> = tallies.iter().map(Tally::samples).collect();
+        assert_eq!(samples, [400, 400, 400, 50]);
+    }
+
+    #[test]
+    fn who_cannot_be_far_enough_ahead_of_the_first_is_tried_no_further() {
+        let rules = Rules {
+            rounds: &[400, 800, 1600],
+            margin: Some(200),
+            ..Rules::default()
+        };
+        let (tallies, leader) = race(3, &rules, &mut trials(&[70, 70, 73]));
+        assert_eq!(leader, 2);
+        assert!(tallies[1].samples() < 1600, "it does the same");
+        let (tallies, _) = race(2, &rules, &mut trials(&[70, 70]));
+        assert!(
+            tallies[0].samples() < 1600,
+            "nothing is left to be found out"
+        );
     }
 }

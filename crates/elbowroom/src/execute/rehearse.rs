@@ -5,20 +5,20 @@ mod stage;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom_execution::executors::{ExecutorSpec, Means};
+use elbowroom_execution::executors::{ExecutorSpec, Means, Orders};
 use elbowroom_execution::run::PlanningTime;
 use elbowroom_execution::run::here::{Guess, mission, rest_of, situation_at};
 use elbowroom_execution::{
     Ending, Executor, Mission, Need, News, PlanAnswer, Planner, PlannerAnswer, Rehearsal,
-    Rehearsed, Rehearsing, Scene,
+    Rehearsed, Rehearsing, Scene, Tells,
 };
 use elbowroom_model::ground::FactId;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
-use elbowroom_sim::ExogenousChange;
+use elbowroom_sim::{ExogenousChange, Rule};
 
 use super::first_plan::renumbered;
-use super::race::{Tally, is_behind, race};
+use super::race::{Rules, Tally, is_behind, race};
 use super::rollouts::Rollouts;
 use super::{Analyst, Candidates, Embedded, Limits, RememberingPreparer, WholeRegion};
 use stage::Stage;
@@ -117,6 +117,14 @@ impl Rehearsal for SharedRehearse {
         self.get().watched(task)
     }
 
+    fn tells(&self, action: &str) -> Tells {
+        self.get().tells(action)
+    }
+
+    fn tells_by_itself(&self) -> bool {
+        self.get().tells_by_itself()
+    }
+
     fn rehearse(&mut self, scene: &Scene<'_>) -> Rehearsed {
         self.get().rehearse(scene)
     }
@@ -161,6 +169,7 @@ struct Choice {
     way: usize,
     value: Rational,
     present: Rational,
+    is_fine: bool,
 }
 
 impl Rehearsal for Rehearse {
@@ -174,6 +183,25 @@ impl Rehearsal for Rehearse {
         facts.sort_unstable();
         facts.dedup();
         facts
+    }
+
+    fn tells(&self, action: &str) -> Tells {
+        let world = &self.rollouts.world;
+        let varies = |rule: Option<&Rule>| rule.is_some_and(|rule| !rule.is_certain());
+        let by_lasting = !world.reports.is_perfect()
+            || varies(world.duration_rule(action))
+            || varies(world.delay_rule(action))
+            || world.failing(action).is_some();
+        let mut amounts = world.amounts.iter();
+        Tells {
+            by_lasting,
+            by_ending: by_lasting || amounts.any(|amount| amount.action.matches(action)),
+        }
+    }
+
+    fn tells_by_itself(&self) -> bool {
+        let world = &self.rollouts.world;
+        !world.exogenous.is_empty() || !world.hazards.is_empty()
     }
 
     fn rehearse(&mut self, scene: &Scene<'_>) -> Rehearsed {
@@ -239,7 +267,7 @@ impl Rehearse {
             Way::AsDecided => Rehearsing::AsDecided,
             Way::WaitsUntil(until) => Rehearsing::WaitsUntil(until),
             Way::TakesUp(executor, mission) => {
-                Rehearsing::HandsOver(self.built(&executor), mission)
+                Rehearsing::HandsOver(self.built(&executor, None), mission)
             }
             Way::Replans(_, plan) => {
                 self.chosen = plan;
@@ -250,11 +278,13 @@ impl Rehearse {
             choice: choice_of,
             value: choice.value.clone(),
             present: choice.present.clone(),
+            is_fine: choice.is_fine,
         }
     }
 
-    fn built(&self, executor: &ExecutorSpec) -> Box<dyn Executor> {
+    fn built(&self, executor: &ExecutorSpec, orders: Option<Orders>) -> Box<dyn Executor> {
         executor.build(Means {
+            orders,
             likelihoods: Arc::clone(&self.rollouts.likelihoods),
             ..Means::from(Box::new(WholeRegion))
         })
@@ -351,16 +381,25 @@ impl Rehearse {
                 way: 0,
                 value: share.clone(),
                 present: share,
+                is_fine: true,
             };
             return (ways, choice);
         }
         self.more_ways(scene, &mut ways);
-        let rounds: &[u64] = if scene.is_new {
-            &ROUNDS_OF_NEW
+        let rules = if scene.is_new {
+            Rules {
+                rounds: &ROUNDS_OF_NEW,
+                halves: false,
+                margin: Some(MARGIN),
+            }
         } else {
-            &ROUNDS
+            Rules {
+                rounds: &ROUNDS,
+                halves: true,
+                margin: None,
+            }
         };
-        let (tallies, leader) = race(ways.len(), rounds, &mut |place, sample| {
+        let (tallies, leader) = race(ways.len(), &rules, &mut |place, sample| {
             let looked = usize::try_from(sample).ok().and_then(|it| first.get(it));
             if let (0, Some(known)) = (place, looked) {
                 return Some(*known);
@@ -389,6 +428,7 @@ impl Rehearse {
             way,
             value: share(&tallies[way]),
             present: share(&tallies[0]),
+            is_fine: false,
         };
         (ways, choice)
     }

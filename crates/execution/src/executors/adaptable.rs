@@ -1,6 +1,7 @@
 //! `adaptable`: Olisipo, on a clock.
 
 mod initial;
+mod orders;
 mod rest;
 
 use std::collections::BTreeMap;
@@ -19,6 +20,7 @@ use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
 use crate::preparation::Need;
 use crate::reason::{About, Cause, Reason};
 use initial::Initial;
+pub use orders::Orders;
 use rest::Rest;
 
 pub(super) const REGISTERED: Registered = Registered {
@@ -34,6 +36,7 @@ pub(super) const REGISTERED: Registered = Registered {
         Box::new(Adaptable {
             initial: Initial::of(&means.likelihoods),
             likelihoods: means.likelihoods,
+            orders: means.orders,
             foresight: None,
             state: None,
         })
@@ -50,6 +53,8 @@ pub(super) struct Adaptable {
     likelihoods: Arc<Likelihoods>,
     /// What is not certain of the beginning; a new plan does not change that.
     initial: Initial,
+    /// Of plans that were taken up before.
+    orders: Option<Orders>,
     foresight: Option<Foresight>,
     state: Option<Rest>,
 }
@@ -99,6 +104,7 @@ impl Adaptable {
         Self {
             initial: Initial::of(&likelihoods),
             likelihoods,
+            orders: None,
             foresight: Some(foresight),
             state: None,
         }
@@ -138,6 +144,11 @@ impl Adaptable {
         let by_instance: BTreeMap<InstanceId, &Step> =
             by_instance.map(|(&id, step)| (id, step)).collect();
         let steps: Vec<Step> = by_instance.into_values().cloned().collect();
+        let known = self.orders.as_ref();
+        if let Some(dispatch) = known.and_then(|it| it.get(&mission.task, &plan, &steps)) {
+            return Ok((Chooser::Orders(Box::new(dispatch)), steps));
+        }
+        let kept = known.is_some().then(|| plan.clone());
         let task = Arc::clone(&mission.task);
         let semantics = if looks_ahead {
             Semantics::World
@@ -157,6 +168,9 @@ impl Adaptable {
             Reconsider::WhenNoLayerFits
         };
         let dispatch = LayerDispatch::new(search, reconsider);
+        if let (Some(orders), Some(plan)) = (known, kept) {
+            orders.put(&mission.task, plan, &steps, &dispatch);
+        }
         Ok((Chooser::Orders(Box::new(dispatch)), steps))
     }
 }

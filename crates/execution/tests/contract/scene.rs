@@ -68,6 +68,7 @@ impl Scene {
                 likelihoods: Arc::new(Likelihoods::certain()),
                 odds: None,
                 foresight: Foresight::default(),
+                orders: None,
             }),
             recorder: Box::new(recorder),
         };

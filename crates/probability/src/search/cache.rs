@@ -1,5 +1,7 @@
 //! What was found before, for when the same circumstances come again.
 
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
 use elbowroom_model::ground::FluentId;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId};
@@ -50,26 +52,33 @@ pub(super) fn key(model: &Model, circumstances: &Circumstances, has_deadlines: b
     }
 }
 
+/// What was found, shared by all clones. What is found depends on the key alone, so it does not
+/// matter who asks first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cache {
-    known: IndexMap<Key, Known>,
+    known: Arc<Mutex<IndexMap<Key, Arc<Known>>>>,
 }
 
 impl Cache {
     /// The entry, if there is one.
-    pub(super) fn get(&self, key: &Key) -> Option<&Known> {
-        self.known.get(key)
+    pub(super) fn get(&self, key: &Key) -> Option<Arc<Known>> {
+        self.known().get(key).cloned()
     }
 
-    pub(super) fn put(&mut self, key: Key, order: Option<&TotalOrderPlan>, now: &Rational) {
-        if self.known.len() >= MOST {
-            self.known.clear();
+    pub(super) fn put(&self, key: Key, order: Option<&TotalOrderPlan>, now: &Rational) {
+        let mut all = self.known();
+        if all.len() >= MOST {
+            all.clear();
         }
         let known = Known {
             order: order.cloned(),
             began: now.clone(),
         };
-        self.known.insert(key, known);
+        all.insert(key, Arc::new(known));
+    }
+
+    fn known(&self) -> MutexGuard<'_, IndexMap<Key, Arc<Known>>> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use elbowroom_execution::executors::Orders;
 use elbowroom_execution::run::{Amid, Beginning, Ports, Run, RunSettings, Verdict};
 use elbowroom_execution::{
     Cause, Decided, Decision, Executor, Mission, Moment, Need, News, NoRecord, PlanAnswer, Planner,
@@ -21,6 +22,7 @@ pub(super) struct Stage {
     seed: u64,
     settings: RunSettings,
     planner: Box<dyn Planner>,
+    orders: Orders,
 }
 
 impl Stage {
@@ -39,6 +41,7 @@ impl Stage {
             seed: SEED ^ (hash & 0xffff_ffff),
             settings: rollouts.settings.clone(),
             planner: Metered::boxed(rollouts.replanning.as_ref()),
+            orders: Orders::default(),
             belief,
         }
     }
@@ -64,12 +67,20 @@ impl Stage {
             }
             Way::TakesUp(spec, mission) => {
                 let beginning = Beginning::TakesUp(mission.clone());
-                (Some(who.built(spec)), beginning, None)
+                (
+                    Some(who.built(spec, Some(self.orders.clone()))),
+                    beginning,
+                    None,
+                )
             }
             Way::Replans(spec, plan) => {
                 let reason = Reason::new(Cause::Likelier);
                 let beginning = Beginning::Replans(reason);
-                (Some(who.built(spec)), beginning, plan.as_ref())
+                (
+                    Some(who.built(spec, Some(self.orders.clone()))),
+                    beginning,
+                    plan.as_ref(),
+                )
             }
         };
         let Some(executor) = executor else {

@@ -39,9 +39,9 @@ const MOST_LET_GO: u32 = 3;
 /// A plan, and how it stands.
 #[derive(Clone)]
 pub(super) struct Rest {
-    mission: Mission,
+    mission: Arc<Mission>,
     /// The plan's steps in the order of the model's instances.
-    steps: Vec<Step>,
+    steps: Arc<[Step]>,
     chooser: Chooser,
     /// Instances that were told to start and have not ended, with their starts on the plan's clock.
     under_way: BTreeMap<StepId, (InstanceId, Option<Rational>)>,
@@ -86,11 +86,11 @@ impl Rest {
                 .map(|(step, instance)| (step, (instance, Some(Rational::ZERO))))
                 .collect(),
             next_step: u32::try_from(steps.len()).unwrap_or(u32::MAX),
-            steps,
+            steps: steps.into(),
             chooser,
             let_go: BTreeSet::new(),
             times_let_go: BTreeMap::new(),
-            mission: mission.clone(),
+            mission: Arc::new(mission.clone()),
             recent: Vec::new(),
             failures: BTreeMap::new(),
             latest: None,

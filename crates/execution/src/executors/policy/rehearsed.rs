@@ -48,6 +48,9 @@ pub(super) struct Rehearsed {
     is_new: bool,
     /// Whether there was an occasion that could not be taken.
     is_owed: bool,
+    /// Whether nothing would come out otherwise than it did: all was tried out when nothing was under
+    /// way, or nothing had to be, and nothing was learnt of the world since.
+    is_settled: bool,
     /// When it was tried out last, and after how long to do so again.
     looked: Option<Rational>,
     period: Rational,
@@ -84,6 +87,7 @@ impl Rehearsed {
             untold: Vec::new(),
             is_new: false,
             is_owed: false,
+            is_settled: false,
             looked: None,
             period: Rational::ONE,
         }
@@ -99,6 +103,9 @@ impl Rehearsed {
     /// The news as whoever executes is told them.
     fn learn(&mut self, moment: &Moment<'_>) -> Vec<News> {
         self.watch(moment);
+        if moment.news.iter().any(|news| self.tells(news)) {
+            self.is_settled = false;
+        }
         let mut told = Vec::with_capacity(moment.news.len());
         for news in moment.news {
             match news {
@@ -117,6 +124,31 @@ impl Rehearsed {
             }
         }
         told
+    }
+
+    /// Whether anything is learnt from that.
+    fn tells(&self, news: &News) -> bool {
+        let of = |step| {
+            let step: Option<&Commanded> = self.steps.get(step);
+            step.map(|step| self.rehearsal.tells(&step.name))
+        };
+        match news {
+            // When it starts is up to chance as well where its end is.
+            News::Started { step, .. } => of(step).is_none_or(|tells| tells.by_lasting),
+            News::Ended { step, ending, .. } => {
+                *ending != Ending::Succeeded || of(step).is_none_or(|tells| tells.by_ending)
+            }
+            News::Fact(_) | News::Value(_) | News::Contradiction { .. } | News::Silence { .. } => {
+                true
+            }
+        }
+    }
+
+    /// Whether time that passes tells anything.
+    fn is_telling(&self) -> bool {
+        let mut under_way = self.steps.values();
+        self.rehearsal.tells_by_itself()
+            || under_way.any(|step| self.rehearsal.tells(&step.name).by_lasting)
     }
 
     fn note(&mut self, step: StepId, news: &News) {
@@ -168,11 +200,13 @@ impl Rehearsed {
     fn is_occasion(&mut self, moment: &Moment<'_>, kept: &Decided) -> bool {
         let may_matter = |news: &News| !matches!(news, News::Started { .. });
         let is_due = |looked: &Rational| *moment.now >= looked + &self.period;
+        let is_due = self.looked.as_ref().is_none_or(is_due);
+        // What was tried out in the same samples of the same world would come out the same.
+        let may_differ = !self.is_settled || is_due && self.is_telling();
         let is_occasion = self.is_owed
             || self.is_new
             || kept.decision == Decision::Replan
-            || moment.news.iter().any(may_matter)
-            || self.looked.as_ref().is_none_or(is_due);
+            || may_differ && (moment.news.iter().any(may_matter) || is_due);
         let mut steps = self.steps.values();
         let is_busy = steps.any(|step| step.started.is_none() || step.is_let_go);
         let is_over = matches!(kept.decision, Decision::GoalReached | Decision::Cancel(_));
@@ -218,6 +252,7 @@ impl Rehearsed {
             left: &self.left,
             replans: self.plans.saturating_sub(1),
         });
+        self.is_settled = rehearsed.is_fine || running.is_empty();
         match rehearsed.choice {
             Rehearsing::AsDecided => self.outward(kept, moment.now),
             Rehearsing::Replans => {
@@ -229,6 +264,7 @@ impl Rehearsed {
                 replan(reason.since(moment.now.clone()))
             }
             Rehearsing::WaitsUntil(until) => {
+                self.is_settled = false;
                 *self.present_box() = before;
                 self.untold = news.to_vec();
                 self.looked = None;
@@ -371,6 +407,7 @@ impl Executor for Rehearsed {
         self.next_step = u32::try_from(mission.plan.plan.instances.len()).unwrap_or(u32::MAX);
         self.plans += 1;
         self.is_new = true;
+        self.is_settled = false;
         let ends = mission.time_triggered.steps.iter().map(Step::end);
         let length = ends.max().unwrap_or_default();
         self.period = (length / Rational::from(LOOKS)).max(Rational::ONE);
