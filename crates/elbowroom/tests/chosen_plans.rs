@@ -139,6 +139,45 @@ fn candidates_are_valid_differ_from_each_other_and_are_the_same_each_time() {
     }
 }
 
+/// A workpiece draws on the battery, more often than not more than planned. The shortest plan begins
+/// with what charge there is; it can also be filled up first, at next to no time.
+#[test]
+fn where_amounts_vary_a_plan_is_made_for_less_than_planned() {
+    let folder = "experiments/table2";
+    let problem = text(&format!("{folder}/problem.pddl"))
+        .replace("{capacity}", "160")
+        .replace("{charge}", "151");
+    let domain = Source::new("domain", text(&format!("{folder}/domain.pddl")).as_str());
+    let read = pddl::read_problem(&domain, &Source::new("problem", problem.as_str()));
+    let task = Arc::new(Task::new(read.unwrap().0));
+    let source = Source::new("world", text(&format!("{folder}/world.toml")).as_str());
+    let world = WorldModel::read(source, task.problem()).unwrap();
+    let situation = Situation::initial(&task);
+    let limits = Limits {
+        most_states: 2_000,
+        improve_states: 256,
+        other_states: 10_000,
+        searches: 12,
+    };
+    let planner = elbowroom::planner::Settings::default();
+    let mut source = Candidates::new(&task, &situation, Some(&world), planner, limits);
+    let plans: Vec<_> = std::iter::from_fn(|| source.next(&mut |_| true)).collect();
+    assert!(
+        !starts(&plans[0].plan)
+            .iter()
+            .any(|it| it.contains("throw-away"))
+    );
+    let filled = plans
+        .iter()
+        .find(|it| it.made_for == "for charge as scarce as in all but 20 of 100 cases");
+    let filled = filled.expect("there is time to fill it up");
+    let first = |name: &str| {
+        let names = starts(&filled.plan);
+        names.iter().position(|it| it.contains(name)).unwrap()
+    };
+    assert!(first("throw-away") < first("make-base-1"), "{filled:?}");
+}
+
 #[test]
 fn the_estimate_agrees_with_a_count_of_other_runs() {
     for name in ["counter", "weld"] {

@@ -1,5 +1,7 @@
 //! Which actions, or which fluents, a rule is about.
 
+use std::fmt;
+
 use elbowroom_model::Problem;
 
 /// `*`, a name, or `(name object _ …)`, where `_` stands for any object.
@@ -9,6 +11,21 @@ pub struct ActionPattern {
     name: Option<String>,
     /// `None`: any arguments at all.
     arguments: Option<Vec<Option<String>>>,
+}
+
+impl fmt::Display for ActionPattern {
+    /// As it is written.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = self.name.as_deref().unwrap_or("*");
+        let Some(arguments) = &self.arguments else {
+            return f.write_str(name);
+        };
+        write!(f, "({name}")?;
+        for argument in arguments {
+            write!(f, " {}", argument.as_deref().unwrap_or("_"))?;
+        }
+        f.write_str(")")
+    }
 }
 
 /// The kind of name that a pattern matches.

@@ -7,13 +7,16 @@
 //! 1. as it is, each plan on the way to the shortest one included;
 //! 2. with actions that take long, and events that come early: as long, and as early, as in so many
 //!    of 100 cases where a world is known, by so much where none is; never shorter than planned;
-//! 3. for the plan whose actions fail least often, where a world is known;
-//! 4. without an action of a plan that was found, and so on from there.
+//! 3. in which actions take more, and bring less, than planned, where a world is known in which
+//!    amounts vary;
+//! 4. for the plan whose actions fail least often, where a world is known;
+//! 5. without an action of a plan that was found, and so on from there.
 //!
 //! Plans are of the problem as it is, whatever variant they were made for: the judge has found each
 //! of them valid, and no two have the same actions in the same order. No clock and no dice are
 //! looked at: the same problem, world and limits give the same plans.
 
+mod scarcity;
 mod variant;
 
 use std::cmp::Reverse;
@@ -27,6 +30,8 @@ use elbowroom_planner::{Counts, embedded};
 use elbowroom_sim::WorldModel;
 use elbowroom_stn::{ConsistentNetwork, NodeId};
 
+use super::first_plan::renumbered;
+use scarcity::scarcities;
 pub use variant::Pace;
 use variant::{Variant, duration_fixed_by_domain, written};
 
@@ -35,6 +40,10 @@ const PATIENCE: u64 = 8;
 
 /// How many states a search for a plan of a variant has in any case.
 const LEAST_STATES: u64 = 1_000;
+
+/// A search for a plan where things are scarce has one in so many of the states that are left: that
+/// there is none often shows only when all was looked at.
+const SCARCE_SHARE: u64 = 2;
 
 /// How far candidates are looked for.
 #[derive(Clone, Debug)]
@@ -70,6 +79,8 @@ pub struct Candidates<'a> {
     /// Found, and not yet given out.
     ready: VecDeque<Candidate>,
     known: BTreeSet<Vec<String>>,
+    /// All that were found.
+    plans: Vec<TimeTriggeredPlan>,
     states: u64,
     first_states: Option<u64>,
     answer: Option<embedded::Answer>,
@@ -85,6 +96,8 @@ impl<'a> Candidates<'a> {
         limits: Limits,
     ) -> Self {
         let paces: &[Pace] = match world {
+            // Where nothing that takes time, or comes by itself, is left to chance.
+            Some(world) if is_punctual(world) => &[],
             Some(_) => &[
                 Pace::Quantile(80),
                 Pace::Quantile(50),
@@ -105,10 +118,17 @@ impl<'a> Candidates<'a> {
         for pace in paces {
             queue.push_back(Variant::at(*pace));
         }
+        let scarce = world.map(scarcities).unwrap_or_default();
+        for (place, scarcity) in scarce.into_iter().enumerate() {
+            // By turns with those that take long.
+            let place = (2 * place + 1).min(queue.len());
+            queue.insert(place, Variant::with(scarcity));
+        }
         if fails {
             let kinds = [Pace::Planned, Pace::Quantile(80)];
             for (place, pace) in kinds.into_iter().enumerate() {
-                queue.insert(2 + place, Variant::at(pace).reliable());
+                let place = (2 + place).min(queue.len());
+                queue.insert(place, Variant::at(pace).reliable());
             }
         }
         Self {
@@ -121,6 +141,7 @@ impl<'a> Candidates<'a> {
             queue,
             ready: VecDeque::new(),
             known: BTreeSet::new(),
+            plans: Vec::new(),
             states: 0,
             first_states: None,
             answer: None,
@@ -179,7 +200,12 @@ impl<'a> Candidates<'a> {
             let first = self.first_states.unwrap_or_default();
             let left = (self.limits.other_states + first).saturating_sub(self.states);
             let most = LEAST_STATES.max(PATIENCE.saturating_mul(first)).min(left);
-            (most, most.min(self.limits.improve_states))
+            if variant.scarcity.is_some() {
+                // The first plan found makes up for what is scarce somehow: a better one does so in time.
+                (left / SCARCE_SHARE, left / SCARCE_SHARE)
+            } else {
+                (most, most.min(self.limits.improve_states))
+            }
         };
         if most == 0 {
             return;
@@ -208,6 +234,9 @@ impl<'a> Candidates<'a> {
                 state: rewritten.initial().clone(),
                 running: Vec::new(),
             };
+            if variant.scarcity.is_some() && self.has_plan_for(&rewritten, &other) {
+                return;
+            }
             (&rewritten, &other)
         };
         let mut plans: Vec<TimeTriggeredPlan> = Vec::new();
@@ -229,6 +258,9 @@ impl<'a> Candidates<'a> {
             }
         });
         self.states += states;
+        if answer.found().is_none() {
+            self.queue.retain(|next| !next.is_scarcer_than(variant));
+        }
         if let Some(found) = answer.found()
             && plans.last() != Some(&found.plan)
         {
@@ -248,14 +280,25 @@ impl<'a> Candidates<'a> {
                 self.go_without(variant, &plan);
             }
             if self.known.insert(order(&plan)) {
+                self.plans.push(plan.clone());
                 let made_for = match (own, place) {
                     (true, 0) => String::new(),
                     (true, _) => "on the way to the shortest".to_owned(),
-                    (false, _) => variant.words(),
+                    (false, _) => variant.words(self.world),
                 };
                 self.ready.push_back(Candidate { plan, made_for });
             }
         }
+    }
+
+    /// Whether a plan that is known works as well in a problem like the task, from there.
+    fn has_plan_for(&self, task: &Task, there: &Situation) -> bool {
+        let works = |plan: &TimeTriggeredPlan| {
+            let settings = validate::Settings::default();
+            renumbered(task, plan)
+                .is_some_and(|plan| validate_from(task, there, &plan, &settings).is_valid())
+        };
+        self.plans.iter().any(works)
     }
 
     /// A plan of a variant as a plan of the task: with the domain's durations, and no later than it
@@ -304,6 +347,11 @@ impl<'a> Candidates<'a> {
             }
         }
     }
+}
+
+/// Whether actions take as long as planned, and nothing happens by itself.
+fn is_punctual(world: &WorldModel) -> bool {
+    world.durations.is_empty() && world.delays.is_empty() && world.exogenous.is_empty()
 }
 
 /// What tells plans apart: their actions, in the order in which they start.

@@ -94,7 +94,12 @@ impl Setting<'_> {
         let mut firsts = Vec::with_capacity(self.experiment.executors.len());
         let mut beginnings = Vec::new();
         for (row, spec) in self.experiment.executors.iter().enumerate() {
-            let chosen = self.chosen(spec, column, (task, &world, &likelihoods), goes_on);
+            // Who tries out what can be done does so with plans to begin with, too.
+            let tries_out = spec.asks_outlook() && rehearse.is_some();
+            let chooses = tries_out || !self.experiment.first_plan.is_shortest();
+            let known = (&**task, &world, &likelihoods);
+            let chosen = chooses.then(|| self.chosen(spec, column, known, goes_on));
+            let chosen = chosen.flatten();
             let likely = (chosen.is_none() && spec.asks_outlook()).then(|| {
                 let answer = likeliest.plan(task, &Situation::initial(task)).answer;
                 match answer {
@@ -132,7 +137,7 @@ impl Setting<'_> {
         goes_on: &(dyn Fn() -> bool + Sync),
     ) -> Option<Choice> {
         let experiment = self.experiment;
-        if experiment.first_plan.is_shortest() || experiment.planner != Planning::Embedded {
+        if experiment.planner != Planning::Embedded {
             return None;
         }
         let embedded = self.embedded();

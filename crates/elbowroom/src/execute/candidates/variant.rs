@@ -14,12 +14,13 @@ use elbowroom_sim::draw::keyed;
 use elbowroom_sim::{ExogenousChange, Purpose, WorldModel};
 
 use super::super::rewrite::{add_function_of, set_durations};
+use super::scarcity::Scarcity;
 
 /// How many samples a quantile is taken from.
-const SAMPLES: u64 = 100;
+pub(super) const SAMPLES: u64 = 100;
 
 /// Where the seeds of these samples begin: far from those that people choose.
-const SEED: u64 = 0x7061_6365_0000_0000;
+pub(super) const SEED: u64 = 0x7061_6365_0000_0000;
 
 /// How long actions take in a variant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -38,6 +39,8 @@ pub enum Pace {
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Variant {
     pace: Pace,
+    /// Whether there is less of things than planned.
+    pub(super) scarcity: Option<Scarcity>,
     /// Whether plans are to have actions that seldom fail, rather than to be short.
     pub(super) is_reliable: bool,
     /// The actions that plans must do without.
@@ -48,6 +51,13 @@ impl Variant {
     pub(super) fn at(pace: Pace) -> Self {
         Self {
             pace,
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn with(scarcity: Scarcity) -> Self {
+        Self {
+            scarcity: Some(scarcity),
             ..Self::default()
         }
     }
@@ -72,11 +82,19 @@ impl Variant {
 
     /// Whether its plans are plans of the problem as they stand.
     pub(super) fn is_as_written(&self) -> bool {
-        self.pace == Pace::Planned && !self.is_reliable
+        self.pace == Pace::Planned && self.scarcity.is_none() && !self.is_reliable
+    }
+
+    /// Whether the same is scarcer in it, or as scarce.
+    pub(super) fn is_scarcer_than(&self, other: &Self) -> bool {
+        let (Some(own), Some(others)) = (self.scarcity, other.scarcity) else {
+            return false;
+        };
+        own.of == others.of && own.quantile >= others.quantile
     }
 
     /// What it is, for people; empty for the problem itself.
-    pub(super) fn words(&self) -> String {
+    pub(super) fn words(&self, world: Option<&WorldModel>) -> String {
         let mut words = Vec::new();
         match self.pace {
             Pace::Planned => {}
@@ -88,6 +106,9 @@ impl Variant {
             Pace::Slower(percent) => {
                 words.push(format!("for durations {} % longer", percent - 100));
             }
+        }
+        if let Some(scarcity) = self.scarcity {
+            words.push(scarcity.words(world));
         }
         if self.is_reliable {
             words.push("of actions that seldom fail".to_owned());
@@ -121,6 +142,9 @@ impl Variant {
                 slow_down(task, &mut problem, &|_, planned| planned * &factor);
             }
             (Pace::Quantile(_), None) => return None,
+        }
+        if let Some(scarcity) = self.scarcity {
+            scarcity.apply(task, &mut problem, world?);
         }
         if self.is_reliable {
             count_failures(task, &mut problem, world?);
@@ -164,7 +188,7 @@ fn quantile_of(
     draws[place_of(quantile)].clone()
 }
 
-fn place_of(quantile: u64) -> usize {
+pub(super) fn place_of(quantile: u64) -> usize {
     usize::try_from(quantile.min(100) * (SAMPLES - 1) / 100).unwrap_or(0)
 }
 
