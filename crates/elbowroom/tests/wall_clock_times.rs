@@ -43,7 +43,10 @@ fn situation(
             .map(|word| task.problem().object(word).expect("an object"))
             .collect();
         situation.running.push(RunningAction {
-            action: task.instantiate(schema, &objects).expect("these suit"),
+            action: task
+                .instantiate(schema, &objects)
+                .expect("these suit")
+                .into(),
             start: number(start),
             duration: Interval::closed(number(least), number(most)),
         });

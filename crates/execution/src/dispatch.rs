@@ -256,7 +256,7 @@ impl Dispatch {
             actions: at_nominal
                 .instances
                 .into_iter()
-                .map(|instance| Arc::new(instance.action))
+                .map(|instance| instance.action)
                 .collect(),
             plan,
             nominal: mission.nominal.clone(),

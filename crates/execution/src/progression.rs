@@ -344,7 +344,7 @@ impl Progression {
             decide_guards(body, underway);
         }
         RunningAction {
-            action,
+            action: Arc::new(action),
             start: underway.start.clone(),
             duration,
         }

@@ -1,5 +1,7 @@
 //! What a planner is asked, in files, and its answer in our terms.
 
+use std::sync::Arc;
+
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{ProblemText, Source, end_times, read_problem, write_problem};
@@ -95,7 +97,7 @@ impl Question {
                 .map_err(|error| error.to_string())?;
             steps.push(Step {
                 start: &step.start + &request.situation.time,
-                action,
+                action: Arc::new(action),
                 duration: step.duration.clone(),
             });
         }

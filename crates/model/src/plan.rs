@@ -1,5 +1,7 @@
 //! Plans with fixed times, as planners print them.
 
+use std::sync::Arc;
+
 use elbowroom_num::Rational;
 
 use crate::ground::Action;
@@ -17,8 +19,8 @@ pub struct TimeTriggeredPlan {
 pub struct Step {
     /// When it starts, or happens.
     pub start: Rational,
-    /// The action.
-    pub action: Action,
+    /// The action, which a plan may have many times.
+    pub action: Arc<Action>,
     /// The duration; `None` exactly for instantaneous actions.
     pub duration: Option<Rational>,
 }

@@ -53,7 +53,7 @@ impl Situation {
                     .duration
                     .as_ref()
                     .map(|duration| &running.start + duration - &self.time),
-                action: running.rest(&self.time),
+                action: Arc::new(running.rest(&self.time)),
             });
         let new = plan.new_steps(self).iter().map(|step| Step {
             start: &step.start - &self.time,

@@ -34,7 +34,7 @@ pub struct Situation {
 pub struct RunningAction {
     /// What is being done. Its guards have been decided as far as they could be: effects that
     /// will not take place are left out, and so is `Guard::at_start`.
-    pub action: Action,
+    pub action: Arc<Action>,
     /// The time at which it started; not after [`Situation::time`].
     pub start: Rational,
     /// The durations it may turn out to have had, counted from its start. Those that would have

@@ -1,5 +1,7 @@
 //! From a plan to its temporal network, and from a schedule back to a plan with fixed times.
 
+use std::sync::Arc;
+
 use elbowroom_model::ground::{Body, Expression};
 use elbowroom_model::problem::Unknown;
 use elbowroom_model::{Step, TimeTriggeredPlan};
@@ -101,12 +103,17 @@ impl StnPlan {
     pub fn at(&self, valuation: &Valuation) -> Self {
         let mut plan = self.clone();
         for instance in &mut plan.instances {
-            instance.action = instance.action.map_leaves(&mut |leaf| match leaf {
+            let mut is_open = false;
+            let action = instance.action.map_leaves(&mut |leaf| match leaf {
                 Expression::Unknown(Unknown::Parameter(index)) => {
+                    is_open = true;
                     Some(Expression::Constant(valuation[ParameterId(*index)].clone()))
                 }
                 _ => None,
             });
+            if is_open {
+                instance.action = Arc::new(action);
+            }
         }
         for constraint in &mut plan.constraints {
             for bound in [&mut constraint.lower, &mut constraint.upper] {

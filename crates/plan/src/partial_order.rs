@@ -14,6 +14,7 @@
 //! either: timed initials are in the list of nodes, and take part in an order like actions.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use elbowroom_model::ground::{Action, Body, Condition, Effect, FactId, SnapAction};
 use elbowroom_model::{Footprint, Step, Task, TimeTriggeredPlan};
@@ -67,7 +68,7 @@ impl PartialOrderPlan {
         let steps = actions.into_iter().map(|action| Step {
             start: Rational::ZERO,
             duration: action.durative().map(|_| Rational::ZERO),
-            action,
+            action: Arc::new(action),
         });
         let plan = TimeTriggeredPlan {
             steps: steps.collect(),

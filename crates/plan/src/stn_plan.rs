@@ -1,5 +1,8 @@
 //! The STN plan: time points and bounds on their differences.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use elbowroom_model::ground::{Action, Body};
 use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
@@ -64,7 +67,7 @@ pub struct Instance {
     /// `n0`, `refuel_2`, …; unique in its plan.
     pub label: String,
     /// The action. Open numbers are `Expression::Unknown(Unknown::Parameter(_))`.
-    pub action: Action,
+    pub action: Arc<Action>,
 }
 
 /// One side of a [`Constraint`].
@@ -209,8 +212,29 @@ impl StnPlan {
     /// Takes the domain's duration constraints from the instance, because something else decides
     /// how long it takes.
     pub fn free_duration(&mut self, id: InstanceId) {
-        if let Body::Durative(body) = &mut self.instances[id.index()].action.body {
+        let action = &mut self.instances[id.index()].action;
+        if action
+            .durative()
+            .is_some_and(|body| !body.duration.is_empty())
+            && let Body::Durative(body) = &mut Arc::make_mut(action).body
+        {
             body.duration.clear();
+        }
+    }
+
+    /// The same for several instances; those that share an action do so afterwards, too.
+    pub(crate) fn free_durations(&mut self, ids: impl IntoIterator<Item = InstanceId>) {
+        // The action as it was is kept, so that nothing else comes to stand in its place.
+        let mut freed: BTreeMap<*const Action, [Arc<Action>; 2]> = BTreeMap::new();
+        for id in ids {
+            let before = Arc::clone(&self.instances[id.index()].action);
+            if let Some([_, after]) = freed.get(&Arc::as_ptr(&before)) {
+                self.instances[id.index()].action = Arc::clone(after);
+                continue;
+            }
+            self.free_duration(id);
+            let after = Arc::clone(&self.instances[id.index()].action);
+            freed.insert(Arc::as_ptr(&before), [before, after]);
         }
     }
 

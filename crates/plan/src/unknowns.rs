@@ -1,6 +1,7 @@
 //! Numbers that a domain leaves open: `:synth-parameters`.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Condition, Expression};
@@ -97,9 +98,15 @@ pub(crate) fn fill(
     };
     for (position, instance) in plan.instances.iter_mut().enumerate() {
         let id = InstanceId::from(position);
-        instance.action = instance
-            .action
-            .map_leaves(&mut |leaf| filled(leaf, Some(id)));
+        let mut is_filled = false;
+        let action = instance.action.map_leaves(&mut |leaf| {
+            let filled = filled(leaf, Some(id));
+            is_filled |= filled.is_some();
+            filled
+        });
+        if is_filled {
+            instance.action = Arc::new(action);
+        }
     }
     *goal = goal.map_leaves(&mut |leaf| filled(leaf, None));
 }

@@ -61,7 +61,7 @@ fn everything_that_could_be_done_has_no_order() {
     let actions = plan
         .instances
         .iter()
-        .map(|instance| instance.action.clone());
+        .map(|instance| (*instance.action).clone());
     let all = PartialOrderPlan::unordered(&task, actions);
     assert_eq!(interference(&all), [""; 0]);
     let (least, greatest) = all.duration(InstanceId(1));

@@ -105,7 +105,7 @@ fn script(
     let steps = input::time_triggered(&task, plan, input::FIXED_TIMES, output)?.steps;
     let actions = steps.into_iter().filter_map(|step| {
         let duration = step.duration?;
-        Some((step.action.name, duration))
+        Some((step.action.name.clone(), duration))
     });
     let actions: Vec<_> = actions.take(2).collect();
     if actions.is_empty() {

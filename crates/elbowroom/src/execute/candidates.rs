@@ -22,6 +22,7 @@ mod variant;
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, VecDeque};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use elbowroom_model::validate::{self, validate_from};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
@@ -315,7 +316,7 @@ impl<'a> Candidates<'a> {
             steps.push(Step {
                 start: step.start.clone(),
                 duration: step.duration.as_ref().and(planned),
-                action,
+                action: Arc::new(action),
             });
         }
         let plan = TimeTriggeredPlan { steps };

@@ -1,12 +1,14 @@
 //! Actions as a dispatcher sees them that knows no numbers, or no durations but the planned ones.
 
+use std::sync::Arc;
+
 use elbowroom_model::ground::{Action, Body, Change, Condition, Effect, Expression, SnapAction};
 use elbowroom_model::{Step, TimeTriggeredPlan};
 
 /// The plan without conditions and effects on numbers: what `ROSPlan` orders happenings by.
 pub(super) fn facts_only(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
     let steps = plan.steps.iter().map(|step| Step {
-        action: without_numbers(&step.action),
+        action: Arc::new(without_numbers(&step.action)),
         ..step.clone()
     });
     TimeTriggeredPlan {
@@ -63,7 +65,7 @@ fn timed(step: &Step) -> Step {
         _ => None,
     };
     Step {
-        action: step.action.map_leaves(&mut planned),
+        action: Arc::new(step.action.map_leaves(&mut planned)),
         ..step.clone()
     }
 }

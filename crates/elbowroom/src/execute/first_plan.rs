@@ -358,7 +358,7 @@ pub(crate) fn renumbered(task: &Task, plan: &TimeTriggeredPlan) -> Option<TimeTr
     let steps = plan.steps.iter().map(|step| {
         let action = task.instantiate(step.action.schema, &step.action.arguments);
         Some(Step {
-            action: action.ok()?,
+            action: Arc::new(action.ok()?),
             start: step.start.clone(),
             duration: step.duration.clone(),
         })

@@ -192,7 +192,7 @@ impl<'a> Likeliest<'a> {
             steps.push(Step {
                 start: step.start.clone(),
                 duration: step.duration.as_ref().and(planned),
-                action,
+                action: Arc::new(action),
             });
         }
         let plan = TimeTriggeredPlan { steps };

@@ -130,7 +130,7 @@ impl Executor for Literal {
             };
             orders.push(Order {
                 step: id,
-                action: Arc::new(step.action),
+                action: step.action,
                 duration: step.duration,
                 planned: Planned::default(),
             });

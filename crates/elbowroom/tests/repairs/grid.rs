@@ -118,7 +118,7 @@ fn with_times(step: &Step, start: i64, duration: i64) -> Step {
     use elbowroom::model::problem::Comparison;
     let duration = Rational::new(duration, UNIT);
     let mut step = step.clone();
-    if let Body::Durative(body) = &mut step.action.body {
+    if let Body::Durative(body) = &mut std::sync::Arc::make_mut(&mut step.action).body {
         body.duration = vec![DurationConstraint {
             comparison: Comparison::Equal,
             bound: Expression::Constant(duration.clone()),

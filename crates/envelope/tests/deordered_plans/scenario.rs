@@ -1,5 +1,7 @@
 //! Random problems with a valid plan, and as many conditions as hold in it.
 
+use std::sync::Arc;
+
 use elbowroom_model::problem::{
     Atom, Body, Change, Comparison, Condition, ContinuousEffect, DurationConstraint, Effect,
     Expression, Fluent, Function, FunctionId, Guard, Predicate, PredicateId, Problem, Schema,
@@ -34,9 +36,10 @@ impl Scenario {
             .enumerate()
             .map(|(index, (start, duration))| Step {
                 start: start.clone(),
-                action: task
-                    .instantiate(SchemaId::from(index), &[])
-                    .expect("an action without arguments"),
+                action: Arc::new(
+                    task.instantiate(SchemaId::from(index), &[])
+                        .expect("an action without arguments"),
+                ),
                 duration: duration.clone(),
             });
         TimeTriggeredPlan {

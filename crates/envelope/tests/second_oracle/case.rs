@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Arc;
 
 use elbowroom_model::ground::{Action, Body, Expression};
 use elbowroom_model::problem::{FunctionId, SchemaId, Unknown};
@@ -60,7 +61,7 @@ impl Case {
                 .expect("no arguments");
             Instance {
                 label: format!("n{index}"),
-                action: action.map_leaves(&mut parameter_of),
+                action: Arc::new(action.map_leaves(&mut parameter_of)),
             }
         });
         let instances: Vec<_> = instances.collect();
@@ -130,7 +131,7 @@ impl Case {
                 .instantiate(step.action.schema, &[])
                 .expect("no arguments");
             self.free_duration(&mut action);
-            step.action = action;
+            step.action = Arc::new(action);
             step
         });
         let plan = TimeTriggeredPlan {

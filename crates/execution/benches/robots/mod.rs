@@ -106,7 +106,7 @@ pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
     let task = Arc::new(Task::new(Problem::default()));
     let instances = (0..count).map(|index| Instance {
         label: format!("n{index}"),
-        action: nothing(index),
+        action: Arc::new(nothing(index)),
     });
     let mut plan = StnPlan::unconstrained(&task, instances.collect());
     let start = |index: usize| NodeId::from(1 + 2 * index);

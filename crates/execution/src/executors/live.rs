@@ -285,7 +285,7 @@ impl Rest {
         let now = self.dispatch.local(now);
         for (instance, is_end, measured) in &self.amounts {
             let action = &mut plan.plan.instances[instance.index()].action;
-            set_amount(action, *is_end, measured);
+            set_amount(Arc::make_mut(action), *is_end, measured);
         }
         plan.plan = plan
             .plan

@@ -293,7 +293,7 @@ impl Account {
                 ticket: *ticket,
                 ending,
                 step: Step {
-                    action: as_it_was(entry, is_whole),
+                    action: Arc::new(as_it_was(entry, is_whole)),
                     start,
                     duration,
                 },

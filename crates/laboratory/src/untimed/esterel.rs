@@ -116,7 +116,7 @@ fn happenings(task: &Task, plan: &TimeTriggeredPlan, state: &State) -> Vec<Happe
             after.push(node.index() - 2);
         }
         happenings.push(Happening {
-            action: Arc::new(network.instance(id).action.clone()),
+            action: Arc::clone(&network.instance(id).action),
             start,
             after,
         });

@@ -83,7 +83,7 @@ impl Shortest {
             now = &start + duration.clone().unwrap_or_default() + self.task.epsilon();
             timed.push(Step {
                 start,
-                action,
+                action: Arc::new(action),
                 duration,
             });
         }

@@ -139,7 +139,7 @@ fn verdict(bodies: Vec<problem::Condition>, goal: problem::Condition) -> Verdict
     let action = task.instantiate(problem::SchemaId(0), &[]).expect("go");
     let steps = vec![Step {
         start: 1.into(),
-        action,
+        action: Arc::new(action),
         duration: None,
     }];
     validate(&task, &TimeTriggeredPlan { steps }, &Settings::default())

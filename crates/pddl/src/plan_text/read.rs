@@ -4,10 +4,11 @@ use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::ops::Range;
+use std::sync::Arc;
 
 use elbowroom_model::ground::{Action, Expression};
 use elbowroom_model::problem::{FunctionId, ObjectId, SchemaId, Unknown};
-use elbowroom_model::{Step, Task, TimeTriggeredPlan};
+use elbowroom_model::{InstantiateError, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use crate::plan_text::duration::{changing_functions, only_duration};
@@ -58,6 +59,8 @@ struct PlanReader<'a> {
     report: Report,
     schemas: BTreeMap<String, SchemaId>,
     objects: BTreeMap<String, ObjectId>,
+    /// Those that were made.
+    actions: BTreeMap<(SchemaId, Vec<ObjectId>), Arc<Action>>,
     /// Looked for when the first duration is missing.
     changing: OnceCell<BTreeSet<FunctionId>>,
     /// Whether it was said that a duration is missing.
@@ -76,6 +79,7 @@ impl<'a> PlanReader<'a> {
             objects: objects
                 .map(|id| (problem.objects[id.index()].name.to_ascii_lowercase(), id))
                 .collect(),
+            actions: BTreeMap::new(),
             source,
             task,
             report: Report::new(source, source),
@@ -158,8 +162,9 @@ impl<'a> PlanReader<'a> {
         let schema = schema?;
         let controls = self.controls(schema, name, chosen)?;
         let arguments = arguments.into_iter().collect::<Option<Vec<_>>>()?;
-        let action = match self.task.instantiate(schema, &arguments) {
-            Ok(action) => chosen_by_plan(action, &controls),
+        let action = match self.ground(schema, &arguments) {
+            Ok(action) if controls.is_empty() => action,
+            Ok(action) => Arc::new(chosen_by_plan(Action::clone(&action), &controls)),
             Err(error) => {
                 let end = raw.words.last().map_or(name.range.end, |w| w.range.end);
                 let expected = self.signature(schema);
@@ -209,6 +214,21 @@ impl<'a> PlanReader<'a> {
             action,
             duration,
         })
+    }
+
+    /// The action; where a plan has one many times, it is made once.
+    fn ground(
+        &mut self,
+        schema: SchemaId,
+        arguments: &[ObjectId],
+    ) -> Result<Arc<Action>, InstantiateError> {
+        let own = (schema, arguments.to_vec());
+        if let Some(known) = self.actions.get(&own) {
+            return Ok(Arc::clone(known));
+        }
+        let action = Arc::new(self.task.instantiate(schema, arguments)?);
+        self.actions.insert(own, Arc::clone(&action));
+        Ok(action)
     }
 
     /// Says at the first action without a duration what is taken instead.

@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use elbowroom_model::Step;
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
@@ -23,7 +25,7 @@ fn plan(text: &str) -> (elbowroom_model::Task, TimeTriggeredPlan) {
             .collect();
         plan.steps.push(Step {
             start: number(start.trim()),
-            action: task.instantiate(schema, &objects).unwrap(),
+            action: Arc::new(task.instantiate(schema, &objects).unwrap()),
             duration: duration.strip_suffix(']').map(number),
         });
     }

@@ -47,9 +47,7 @@ pub(super) fn free_durations(plan: &mut StnPlan, kinds: &[ParameterKind]) {
             _ => None,
         })
         .collect();
-    for id in free {
-        plan.free_duration(id);
-    }
+    plan.free_durations(free);
 }
 
 /// The parameter of each number that the domain leaves open and the file or the plan mentions.

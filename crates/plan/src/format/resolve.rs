@@ -1,6 +1,7 @@
 //! From the items of an STN plan file to a plan: names looked up in a task and in the file.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body};
@@ -144,7 +145,7 @@ fn instances(file: &File<'_>, task: &Task, mistakes: &mut Report) -> Vec<Instanc
         if let Some(action) = action(item, task, mistakes) {
             instances.push(Instance {
                 label: label.text.to_owned(),
-                action,
+                action: Arc::new(action),
             });
         }
     }

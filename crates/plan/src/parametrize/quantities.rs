@@ -1,6 +1,7 @@
 //! Opening durations, constants, initial values and the times of timed initials.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::FluentId;
@@ -77,8 +78,8 @@ impl Opening<'_> {
                 Reason::Pinned => !ends.contains(&(constraint.from, constraint.to)),
                 _ => true,
             });
+        plan.free_durations(set.iter().map(|(id, ..)| *id));
         for &(id, from, to, parameter) in set {
-            plan.free_duration(id);
             plan.constraints.push(Constraint {
                 from,
                 to,
@@ -149,7 +150,7 @@ impl Opening<'_> {
             shared = Some(value.clone());
             let parameter = self.parameter(spec, quantity, name, kind, value.clone())?;
             let opened = constants::opened(self.task, &instance.action, place, &value, parameter);
-            self.plan.plan.instances[id.index()].action = opened;
+            self.plan.plan.instances[id.index()].action = Arc::new(opened);
         }
         Ok(())
     }

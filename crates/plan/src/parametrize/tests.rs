@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use super::{ParametrizeError, VarySpec, parametrize};
 use crate::format;
 use crate::network::Schedule;
@@ -18,7 +20,8 @@ fn plan() -> (StnPlan, Schedule) {
     let task = rover();
     for instance in &mut plan.instances {
         let action = &instance.action;
-        instance.action = task.instantiate(action.schema, &action.arguments).unwrap();
+        let action = task.instantiate(action.schema, &action.arguments);
+        instance.action = Arc::new(action.unwrap());
     }
     let nominal = ["0", "1", "16", "20", "35", "0", "10", "7", "100"];
     (plan, nominal.into_iter().map(number).collect())

@@ -19,6 +19,7 @@ mod clauses;
 mod rewriting;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use elbowroom_model::problem::{Expression, Problem};
 use elbowroom_model::validate::{self, Verdict, validate};
@@ -229,7 +230,7 @@ fn judged(task: &Task, settings: &Settings, plan: &TimeTriggeredPlan) -> Option<
         let action = task.instantiate(step.action.schema, &step.action.arguments);
         Some(Step {
             start: step.start.clone(),
-            action: action.ok()?,
+            action: Arc::new(action.ok()?),
             duration: step.duration.clone(),
         })
     });

@@ -1,5 +1,7 @@
 //! From the choices of a search to a plan with times.
 
+use std::sync::Arc;
+
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Situation, Step as PlanStep, Task, TimeTriggeredPlan, validate_from};
 use elbowroom_num::Rational;
@@ -151,7 +153,7 @@ fn written(
         let ground = task.instantiate(action.schema, &action.arguments).ok()?;
         plan.steps.push(PlanStep {
             start,
-            action: ground,
+            action: Arc::new(ground),
             duration,
         });
     }

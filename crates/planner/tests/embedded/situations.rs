@@ -1,6 +1,7 @@
 //! Mid-execution starts, determinism, limits.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use elbowroom_model::{RunningAction, Situation, Task};
 use elbowroom_num::{Interval, Rational};
@@ -28,7 +29,7 @@ fn under_way(task: &Task, schema: &str, gone: &str, duration: Interval) -> Situa
     situation.state.facts.remove(&gone);
     situation.time = 6.into();
     situation.running.push(RunningAction {
-        action,
+        action: Arc::new(action),
         start: Rational::ZERO,
         duration,
     });

@@ -294,9 +294,10 @@ fn read_plan(
     let running = situation.map_or(&[][..], |situation| &situation.running);
     for (index, step) in steps.iter().enumerate() {
         let action = match running.get(index) {
-            Some(running) => running.action.clone(),
+            Some(running) => Arc::clone(&running.action),
             None => {
-                instantiate(&step.action, task).map_err(|message| TraceError { line, message })?
+                let action = instantiate(&step.action, task);
+                Arc::new(action.map_err(|message| TraceError { line, message })?)
             }
         };
         plan.steps.push(Step {

@@ -122,13 +122,13 @@ fn renumbered(
     let numbered = plan.steps.iter().enumerate();
     let steps = numbered.map(|(index, step)| {
         let action = if let Some(running) = situation.running.get(index) {
-            running.action.clone()
+            Arc::clone(&running.action)
         } else {
             let name = step.action.name.trim_matches(['(', ')']);
             let mut words = name.split_whitespace();
             let schema = problem.schema(words.next()?)?;
             let objects: Option<Vec<_>> = words.map(|word| problem.object(word)).collect();
-            task.instantiate(schema, &objects?).ok()?
+            Arc::new(task.instantiate(schema, &objects?).ok()?)
         };
         Some(Step {
             action,

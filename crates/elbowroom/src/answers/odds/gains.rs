@@ -66,7 +66,7 @@ impl GainsAnswer {
                     .iter()
                     .any(|known| known.name == instance.action.name)
                 {
-                    actions.push(instance.action.clone());
+                    actions.push((*instance.action).clone());
                 }
                 actions
             },

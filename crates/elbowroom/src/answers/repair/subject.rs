@@ -1,5 +1,7 @@
 //! What may change in a plan, as parameters of its network.
 
+use std::sync::Arc;
+
 use elbowroom_envelope::Changeable;
 use elbowroom_model::ground::{Change as Effect, DurationConstraint, Expression};
 use elbowroom_model::problem::Comparison;
@@ -282,7 +284,7 @@ impl Subject {
                 }],
             };
             let action = &mut plan.instances[instance.index()].action;
-            if let elbowroom_model::ground::Body::Durative(body) = &mut action.body {
+            if let elbowroom_model::ground::Body::Durative(body) = &mut Arc::make_mut(action).body {
                 body.duration = duration;
             }
         }

@@ -108,7 +108,7 @@ impl<'p> Process<'p> {
         let model = Arc::new(model);
         let instances = model.plan().instances();
         let actions: Vec<(InstanceId, Action)> = instances
-            .map(|(id, instance)| (id, instance.action.clone()))
+            .map(|(id, instance)| (id, (*instance.action).clone()))
             .collect();
         let names = actions
             .iter()

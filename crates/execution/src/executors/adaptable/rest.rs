@@ -346,7 +346,7 @@ impl Rest {
         let planned = &self.steps[instance.index()];
         let order = Order {
             step,
-            action: Arc::new(planned.action.clone()),
+            action: Arc::clone(&planned.action),
             duration: planned.duration.clone(),
             planned: Planned {
                 earliest: Some(world(&next.slot.earliest)),

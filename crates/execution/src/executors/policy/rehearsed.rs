@@ -1,6 +1,7 @@
 //! `policy` where there is no table: what to do with a plan is tried out at each occasion.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use elbowroom_model::Step;
 use elbowroom_model::ground::FactId;
@@ -351,7 +352,7 @@ impl Rehearsed {
             Some(place) => self.left.remove(place),
             None => Step {
                 start: now.clone(),
-                action: (*order.action).clone(),
+                action: Arc::clone(&order.action),
                 duration: order.duration.clone(),
             },
         };

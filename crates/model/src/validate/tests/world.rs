@@ -2,6 +2,8 @@
 //!
 //! `(p)` is a fact and `x` a fluent, declared by being mentioned.
 
+use std::sync::Arc;
+
 use elbowroom_num::Rational;
 
 use super::forms::{Form, forms, head, words};
@@ -189,7 +191,7 @@ impl World {
             let schema = self.problem.schema(name).expect("a schema");
             steps.push(Step {
                 start: number(time.trim()),
-                action: task.instantiate(schema, &[]).expect("no arguments"),
+                action: Arc::new(task.instantiate(schema, &[]).expect("no arguments")),
                 duration: parts
                     .next()
                     .map(|text| number(text.trim_matches(['[', ']']))),

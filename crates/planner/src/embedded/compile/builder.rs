@@ -150,7 +150,7 @@ impl<'a> Builder<'a> {
             symbols.fact(rule.head);
             symbols.formula(&rule.body);
         }
-        let running = situation.running.iter().map(|running| &running.action);
+        let running = situation.running.iter().map(|running| &*running.action);
         for action in running.clone().chain(&grounding.actions) {
             read_action(symbols, action);
         }

@@ -264,7 +264,7 @@ impl Changes {
         metric.visit_fluents(&mut |fluent| {
             changes.additions.insert(fluent, Vec::new());
         });
-        let running = situation.running.iter().map(|running| &running.action);
+        let running = situation.running.iter().map(|running| &*running.action);
         for action in running.chain(&grounding.actions) {
             match &action.body {
                 Body::Instantaneous(body) => changes.note_all(&body.effects),

@@ -1,6 +1,7 @@
 //! All sequences of happenings, scheduled by Bellman and Ford.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use elbowroom_model::ground::Action;
 use elbowroom_model::validate::{self, Settings as Strictness, Verdict};
@@ -199,7 +200,7 @@ impl Twin<'_> {
         let steps = steps.filter_map(|(place, choice)| match *choice {
             Choice::Start(action) => Some(Step {
                 start: times[place].clone(),
-                action: self.actions[action].clone(),
+                action: Arc::new(self.actions[action].clone()),
                 duration: self.actions[action]
                     .durative()
                     .map(|_| self.duration_at(place)),
