@@ -293,12 +293,11 @@ fn read_plan(
     let mut plan = TimeTriggeredPlan::default();
     let running = situation.map_or(&[][..], |situation| &situation.running);
     for (index, step) in steps.iter().enumerate() {
-        let action = match running.get(index) {
-            Some(running) => Arc::clone(&running.action),
-            None => {
-                let action = instantiate(&step.action, task);
-                Arc::new(action.map_err(|message| TraceError { line, message })?)
-            }
+        let action = if let Some(running) = running.get(index) {
+            Arc::clone(&running.action)
+        } else {
+            let action = instantiate(&step.action, task);
+            Arc::new(action.map_err(|message| TraceError { line, message })?)
         };
         plan.steps.push(Step {
             start: step.start.0.clone(),
