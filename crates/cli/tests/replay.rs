@@ -119,8 +119,9 @@ fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
         "--planning-time",
         "0",
     ];
-    // `live` begins with the planner's plan; `live:5` would begin with the likeliest.
-    let hasty = played_back("hasty", &[&common[..], &["--executor", "live"]].concat());
+    // The planner's own plan; without being asked for it, a run begins with the likeliest.
+    let shortest = ["--executor", "live", "--first-plan", "shortest"];
+    let hasty = played_back("hasty", &[&common[..], &shortest].concat());
     let plan = Temporary::new("hasty.plan", &first_plan(&hasty));
     let trace = played_back(
         "live",

@@ -102,7 +102,10 @@ fn reached(journal: &str) -> BTreeSet<String> {
     for segment in segments(journal) {
         let text = fs::read_to_string(&segment).expect("a journal");
         for line in text.lines().filter(|line| line.contains("\"resting\"")) {
-            let line: Value = serde_json::from_str(&line[9..]).expect("JSON");
+            // The last line may be in the writing.
+            let Ok(line) = serde_json::from_str::<Value>(&line[9..]) else {
+                continue;
+            };
             if line["verdict"] == "goal-reached" {
                 let names = line["goals"].as_array().expect("goals").iter();
                 reached.extend(names.filter_map(Value::as_str).map(str::to_owned));
@@ -262,11 +265,9 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
             let second = text.lines().nth(1).map(str::to_owned);
             second.is_some_and(|it| it.contains("\"snapshot\""))
         };
-        own.await_state(|state| {
-            state["goals"].as_array().is_some_and(Vec::is_empty) && begins_with_snapshot()
-        });
+        // A goal that was taken in is not among the goals at once.
+        own.await_state(|_| begins_with_snapshot() && reached(&journal).contains(&name));
         own.kill();
-        assert!(reached(&journal).contains(&name), "step {step}");
         for segment in segments(&journal) {
             let replayed = command::elbowroom(&["run", "--replay", &segment]);
             assert_eq!(replayed.status.code(), Some(0), "step {step}: {replayed:?}");
