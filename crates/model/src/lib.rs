@@ -42,7 +42,7 @@
 //! let mut plan = TimeTriggeredPlan::default();
 //! plan.steps.push(Step {
 //!     start: 2.into(),
-//!     action,
+//!     action: action.into(),
 //!     duration: None,
 //! });
 //! match validate(&task, &plan, &Settings::default()) {

@@ -6,7 +6,7 @@ mod scene;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use elbowroom_execution::executors::EXECUTORS;
+use elbowroom_execution::executors::{EXECUTORS, Orders};
 use elbowroom_execution::run::{Next, Report, Run, RunSettings, Verdict};
 use elbowroom_execution::{Command, Entry, Passage, Recorder, Ticket, World, WorldError};
 use elbowroom_num::Rational;
@@ -112,6 +112,22 @@ fn the_same_history_leads_to_the_same_decisions() {
             assert_eq!(record(), record(), "{executor}, {seed}");
         }
     }
+}
+
+#[test]
+fn orders_that_another_run_has_found_change_no_decision() {
+    let decisions = |orders: Option<Orders>| -> Vec<Vec<String>> {
+        let mut scene = Scene::new();
+        scene.orders = orders;
+        let runs = (0..20).map(|seed| {
+            let notes = Notes::default();
+            let run = scene.run("adaptable", notes.clone(), RunSettings::default());
+            drive(run, &mut Toy::new(Whims::Seeded(seed)));
+            notes.taken()
+        });
+        runs.collect()
+    };
+    assert_eq!(decisions(None), decisions(Some(Orders::default())));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means};
+use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, Orders};
 use elbowroom_execution::run::{Ports, Run, RunSettings};
 use elbowroom_execution::{
     Command, Ending, Event, Forms, Need, NoPlanner, Observation, Passage, PrepareError, Prepared,
@@ -36,6 +36,8 @@ const PLAN: &str = "0: (boil) [10]\n0: (chop) [4]\n10.001: (cook) [8]";
 pub(crate) struct Scene {
     task: Arc<Task>,
     plan: TimeTriggeredPlan,
+    /// What executors tell each other about orders, if they do.
+    pub(crate) orders: Option<Orders>,
 }
 
 impl Scene {
@@ -47,6 +49,7 @@ impl Scene {
         Self {
             task: Arc::new(task),
             plan,
+            orders: None,
         }
     }
 
@@ -68,7 +71,7 @@ impl Scene {
                 likelihoods: Arc::new(Likelihoods::certain()),
                 odds: None,
                 foresight: Foresight::default(),
-                orders: None,
+                orders: self.orders.clone(),
             }),
             recorder: Box::new(recorder),
         };
