@@ -7,6 +7,8 @@ last is the best. Times are exact, as `21/10`. How it ended without one is said 
 begins with `elbowroom: unsolvable`, `elbowroom: gave up`, `elbowroom: unsupported` or
 `elbowroom: missing`.
 
+ENGINE is the name of an engine that unified-planning lists, or MODULE:CLASS for one that it does not.
+
 PDDL's numbers are reals. For an engine that only knows integers they are read as integers; where a
 number is none, the problem is unsupported.
 """
@@ -90,7 +92,14 @@ def main():
     environment.credits_stream = None
     # In PDDL an object may be called as its type is.
     environment.error_used_name = False
-    if engine not in environment.factory.engines:
+    if ":" in engine:
+        module, _, name = engine.partition(":")
+        try:
+            environment.factory.add_engine(engine, module, name)
+        except (ImportError, AttributeError) as error:
+            print(f"elbowroom: missing: {error} ({sys.executable})", flush=True)
+            sys.exit(MISSING)
+    elif engine not in environment.factory.engines:
         known = ", ".join(sorted(environment.factory.engines))
         print(f"elbowroom: missing: there is no engine `{engine}`, only {known}", flush=True)
         sys.exit(MISSING)

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! planner_coverage run --data FOLDER --planner NAME … -o FILE.csv
-//!                      [--time S] [--memory MB] [--jobs N] [--only TEXT] [--every K]
+//!                      [--time S] [--memory MB] [--jobs N] [--only TEXT] [--every K] [--first]
+//!                      [--val PROGRAM]
 //! planner_coverage table FILE.csv
 //! ```
 //!
@@ -12,7 +13,8 @@
 //! `problem_file` must be among them; `collection`, `durative_actions`, `domain_features` and
 //! `problem_features` may. Lines that are there already are not run again, so an interrupted run
 //! goes on where it was. `--only` keeps instances whose line in the manifest has the text in it;
-//! `--every` each Kth of a domain. `table` makes Markdown of the file.
+//! `--every` each Kth of a domain; `--first` ends a planner at its first plan; `--val` has VAL's `Validate` judge the
+//! last plan, too. `table` makes Markdown of the file.
 //!
 //! `--time` is processor time, so that a busy machine does not change the results.
 //!
@@ -30,6 +32,7 @@ mod manifest;
 mod row;
 mod run;
 mod table;
+mod val;
 
 use std::process::ExitCode;
 

@@ -27,6 +27,15 @@ pub(crate) struct Row {
     /// Processor time of all its processes.
     pub(crate) seconds: String,
     pub(crate) megabytes: String,
+    /// The value of the problem's metric in the best plan by it, where there is one that is not the makespan.
+    #[serde(default)]
+    pub(crate) best_metric: String,
+    /// `less` or `more`: what is better of the metric.
+    #[serde(default)]
+    pub(crate) better: String,
+    /// What VAL says of the last plan: `valid`, `failed`, `error`; empty where it was not asked.
+    #[serde(default)]
+    pub(crate) val: String,
     /// What else is to be said.
     pub(crate) note: String,
 }

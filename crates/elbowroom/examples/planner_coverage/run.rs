@@ -11,12 +11,14 @@ use std::time::Duration;
 
 use elbowroom::external::{Event, Outcome, Planner, Report, Request, Settings, plan};
 use elbowroom::flow;
+use elbowroom::model::expression::Expression;
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
-use elbowroom::pddl::{Source, read_problem};
+use elbowroom::pddl::{Source, read_problem, write_plan};
 
 use crate::manifest;
 use crate::row::{self, Row};
+use crate::val;
 
 struct Options {
     data: PathBuf,
@@ -28,6 +30,10 @@ struct Options {
     jobs: usize,
     only: Option<String>,
     every: usize,
+    /// Whether a planner is ended at its first plan.
+    first: bool,
+    /// VAL's `Validate`, to judge the last plan, too.
+    val: Option<PathBuf>,
 }
 
 /// One planner on one instance.
@@ -98,9 +104,15 @@ fn options(arguments: &[String]) -> Result<Options, String> {
         jobs: 1,
         only: None,
         every: 1,
+        first: false,
+        val: None,
     };
     let mut arguments = arguments.iter();
     while let Some(option) = arguments.next() {
+        if option == "--first" {
+            options.first = true;
+            continue;
+        }
         let value = arguments
             .next()
             .ok_or_else(|| format!("{option} takes a value"))?;
@@ -115,6 +127,7 @@ fn options(arguments: &[String]) -> Result<Options, String> {
             "--time" => options.seconds = number()? as u64,
             "--memory" => options.megabytes = number()? as u64,
             "--jobs" => options.jobs = number()?.max(1),
+            "--val" => options.val = Some(PathBuf::from(value)),
             "--only" => options.only = Some(value.clone()),
             "--every" => options.every = number()?.max(1),
             _ => return Err(format!("unknown option {option}")),
@@ -217,7 +230,10 @@ fn run(job: &Job, options: &Options) -> Row {
         ..Settings::default()
     };
     let situation = Situation::initial(&task);
+    let metric = task.problem().metric.as_ref();
+    let better_metric = metric.filter(|metric| metric.expression != Expression::TotalTime);
     let mut makespans = Vec::new();
+    let mut metrics = Vec::new();
     let report = plan(
         &planner,
         &mut Request {
@@ -231,6 +247,10 @@ fn run(job: &Job, options: &Options) -> Row {
         &mut |event| {
             if let Event::Plan { found, .. } = event {
                 makespans.push(found.makespan.clone());
+                metrics.extend(found.metric.clone());
+                if options.first {
+                    return ControlFlow::Break(());
+                }
             }
             ControlFlow::Continue(())
         },
@@ -243,6 +263,19 @@ fn run(job: &Job, options: &Options) -> Row {
     row.first_makespan = shown(makespans.first());
     // Not the last plan's: planners can go on for a metric that has nothing to do with time.
     row.best_makespan = shown(makespans.iter().min());
+    if let Some(metric) = better_metric {
+        let best = if metric.maximize {
+            metrics.iter().max()
+        } else {
+            metrics.iter().min()
+        };
+        row.best_metric = shown(best);
+        row.better = if metric.maximize { "more" } else { "less" }.to_owned();
+    }
+    if let (Some(val), Some(found)) = (&options.val, report.outcome.found()) {
+        let plan = write_plan(&task, &found.plan);
+        row.val = val::verdict(val, &job.domain, &job.problem, &plan);
+    }
     filled(row, &report)
 }
 

@@ -54,7 +54,7 @@ fn table(rows: &[Row]) -> String {
     let results = Results::of(rows);
     let mut text = String::from("| domain | instances |");
     for planner in &results.planners {
-        let _ = write!(text, " {planner}: solved | first plan | makespans |");
+        let _ = write!(text, " {planner}: solved | first plan | score |");
     }
     text.push_str("\n|---|--:|");
     text.push_str(&"--:|--:|--:|".repeat(results.planners.len()));
@@ -81,8 +81,9 @@ fn table(rows: &[Row]) -> String {
     }
     text.push_str(
         "\nSolved: instances with a plan that the judge accepts. First plan: the median of the \
-         seconds to it,\nprocess start included. Makespans: the sum, over the instances it \
-         solved, of the least makespan that any\nplanner here found divided by its own.\n\n",
+         seconds to it,\nprocess start included. Score: the sum, over the instances it \
+         solved, of the best value of the metric\n(the makespan, where there is none) that any planner \
+         here found divided by its own, or the other way round\nwhere more is better.\n\n",
     );
     text.push_str(&outcomes(&results));
     text.push_str(&contradictions(&results));
@@ -112,16 +113,31 @@ fn line(title: &str, planners: &[&str], instances: &[&BTreeMap<&str, &Row>]) -> 
     text
 }
 
-/// The least makespan of all planners, divided by this one's.
+/// The score of the planning competitions: the best value of all planners, divided by this one's (the other way round where
+/// more is better). The value is that of the problem's metric, and the makespan where it has none.
 fn score(runs: &BTreeMap<&str, &Row>, planner: &str) -> f64 {
-    let makespan = |row: &Row| row.best_makespan.parse::<f64>().ok();
-    let least = runs
-        .values()
-        .filter_map(|row| makespan(row))
-        .reduce(f64::min);
-    match (least, makespan(runs[planner])) {
-        (Some(least), Some(own)) if own > 0.0 => least / own,
-        (Some(_), Some(_)) => 1.0,
+    let row = runs[planner];
+    let by_metric = !row.better.is_empty();
+    let value = |row: &Row| {
+        let text = if by_metric {
+            &row.best_metric
+        } else {
+            &row.best_makespan
+        };
+        text.parse::<f64>().ok()
+    };
+    let values = runs.values().filter_map(|row| value(row));
+    let more = row.better == "more";
+    let best = values.reduce(if more { f64::max } else { f64::min });
+    match (best, value(row)) {
+        (Some(best), Some(own)) if best.total_cmp(&own).is_eq() => 1.0,
+        (Some(best), Some(own)) if best > 0.0 && own > 0.0 => {
+            if more {
+                own / best
+            } else {
+                best / own
+            }
+        }
         _ => 0.0,
     }
 }
@@ -157,6 +173,11 @@ fn outcomes(results: &Results<'_>) -> String {
     count_line("plans whose times were repaired", &|row| {
         usize::from(row.repaired == "yes")
     });
+    for word in ["valid", "failed", "error"] {
+        count_line(&format!("last plan, by VAL: {word}"), &|row| {
+            usize::from(row.val == word)
+        });
+    }
     text
 }
 
