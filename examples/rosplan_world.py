@@ -12,11 +12,17 @@ way to be cancelled, so this world does not claim to cancel anything.
 import os
 import re
 import sys
+import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "clients", "python"))
 from elbowroom_world import World  # noqa: E402
 
 TOPICS = "/rosplan_plan_dispatcher/action_dispatch", "/rosplan_plan_dispatcher/action_feedback"
+MEANINGS = {
+    "started": ("enabled", "dispatched to goal"),
+    "succeeded": ("achieved", "succeeded to goal"),
+    "failed": ("failed", "preempted", "precondition false"),
+}
 
 
 def parameters(domain):
@@ -27,22 +33,24 @@ def parameters(domain):
 
 
 def kind(status, constants):
-    """What a status means. Older versions have texts, newer ones numbers with names."""
-    word = constants.get(status, str(status)).lower().replace("_", " ")
-    if "enabled" in word:
-        return "started"
-    if "achieved" in word or "succeeded to goal" in word:
-        return "succeeded"
-    if "failed" in word or "preempted" in word:
-        return "failed"
+    """What a status means. Older versions have texts, newer ones numbers, some of which have several names."""
+    names = [name for name, number in constants.items() if number == status] or [str(status)]
+    words = " ".join(names).lower().replace("_", " ")
+    for meaning, signs in MEANINGS.items():
+        if any(sign in words for sign in signs):
+            return meaning
     return None
 
 
 class Dispatcher:
-    """Dispatches actions, and takes the feedback. `publish(id, name, pairs, duration)` dispatches."""
+    """Dispatches actions, and takes the feedback. `publish(id, name, pairs, duration)` dispatches.
 
-    def __init__(self, publish, names, constants=None):
-        self._publish, self._names, self._constants = publish, names, constants or {}
+    Action interfaces repeat their last word to whoever comes later, also that about an earlier run: so the numbers of
+    each run begin elsewhere, with `first`.
+    """
+
+    def __init__(self, publish, names, constants=None, first=0):
+        self._publish, self._names, self._constants, self._first = publish, names, constants or {}, first
         self._actions = {}
 
     def begin(self, action):
@@ -50,8 +58,9 @@ class Dispatcher:
         if names is None or len(names) != len(action.arguments):
             action.failed(f"the domain has no action {action.name} with {len(action.arguments)} parameters")
             return
-        self._actions[action.ticket] = action
-        self._publish(action.ticket, action.name, list(zip(names, action.arguments)), action.duration or 0.0)
+        number = self._first + action.ticket
+        self._actions[number] = action
+        self._publish(number, action.name, list(zip(names, action.arguments)), action.duration or 0.0)
 
     def feedback(self, message):
         action = self._actions.get(message.action_id)
@@ -72,6 +81,19 @@ class Dispatcher:
             action.succeeded()
 
 
+def wait_for_interfaces(connected):
+    """Nothing is dispatched twice, so that all who are up must have been found: for a second nobody new has come."""
+    begun = changed = time.monotonic()
+    within = float(os.environ.get("ELBOWROOM_PERFORMERS_WITHIN", "10"))
+    known = connected()
+    while time.monotonic() - begun < within and not (all(known) and time.monotonic() - changed >= 1):
+        time.sleep(0.05)
+        if known != (known := connected()):
+            changed = time.monotonic()
+    if not all(known):
+        print(f"rosplan: no action interface was found within {within:g} s", file=sys.stderr)
+
+
 def main():
     import rospy
     from diagnostic_msgs.msg import KeyValue
@@ -90,15 +112,14 @@ def main():
         ))  # fmt: skip
 
     constants = {
-        value: word
+        word: value
         for word, value in vars(ActionFeedback).items()
         if word.isupper() and isinstance(value, int)
     }
-    dispatcher = Dispatcher(publish, names, constants)
-    rospy.Subscriber(TOPICS[1], ActionFeedback, dispatcher.feedback)
-    begun = rospy.get_time()
-    while publisher.get_num_connections() == 0 and rospy.get_time() - begun < 10:
-        rospy.sleep(0.1)
+    # More than a thousand starts a second is nothing that ROSPlan's action interfaces could follow.
+    dispatcher = Dispatcher(publish, names, constants, first=int(time.time()) % 1_000_000 * 1000)
+    subscriber = rospy.Subscriber(TOPICS[1], ActionFeedback, dispatcher.feedback)
+    wait_for_interfaces(lambda: (publisher.get_num_connections(), subscriber.get_num_connections()))
     world = World("rosplan", speed=float(os.environ.get("ELBOWROOM_SPEED", "1")))
     world.capabilities = ("facts",)
     world.starter("*")(dispatcher.begin)

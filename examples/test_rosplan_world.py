@@ -3,14 +3,21 @@
 import unittest
 from types import SimpleNamespace
 
-from rosplan_world import Dispatcher, parameters
+from rosplan_world import Dispatcher, kind, parameters
 from test_plansys2_world import Asked
 
 DOMAIN = """(define (domain d) ; (:action commented :parameters (?x))
   (:durative-action MOVE :parameters (?r - robot ?from ?to - place) :duration (= ?duration 5))
   (:action beep
     :parameters () :effect (done)))"""
-NUMBERS = {1: "ACTION_ENABLED", 2: "ACTION_SUCCEEDED_TO_GOAL_STATE", 3: "ACTION_FAILED"}
+NUMBERS = {
+    "ACTION_PRECONDITION_FALSE": 0,
+    "ACTION_ENABLED": 1,
+    "ACTION_DISPATCHED_TO_GOAL_STATE": 1,
+    "ACTION_SUCCEEDED_TO_GOAL_STATE": 2,
+    "ACTION_DISPATCHED_TO_START_STATE": 3,
+    "ACTION_FAILED": 10,
+}
 
 
 class Interfaces(unittest.TestCase):
@@ -42,6 +49,20 @@ class Interfaces(unittest.TestCase):
             for word in words:
                 self.says(7, word)
             self.assertEqual(action.told, ["started", "succeeded"])
+
+    def test_each_number_means_what_one_of_its_names_says(self):
+        meant = {number: kind(number, NUMBERS) for number in NUMBERS.values()}
+        self.assertEqual(meant, {0: "failed", 1: "started", 2: "succeeded", 3: None, 10: "failed"})
+
+    def test_the_last_word_of_an_earlier_run_counts_for_nothing(self):
+        self.dispatcher = Dispatcher(lambda *sent: self.sent.append(sent), self.names, first=5000)
+        action = self.begin(7)
+        self.assertEqual(self.sent[0][0], 5007)
+        self.says(4007, "action achieved")
+        self.says(7, "action achieved")
+        self.assertEqual(action.told, [])
+        self.says(5007, "action achieved")
+        self.assertEqual(action.told, ["succeeded"])
 
     def test_two_actions_at_once_do_not_mix(self):
         first, second = self.begin(1), self.begin(2)
