@@ -6,7 +6,8 @@
 //! program `elbowroom-plansys2` connects the two with standard input and output and with DDS; it is built
 //! with the feature `dds`.
 //!
-//! [`Goals`], [`Lifecycle`] and [`Progress`] are what it takes to stand in for `PlanSys2`'s planner and executor.
+//! [`Mirror`] is the side of `PlanSys2`'s problem expert: what a run changes is told there, and what others change there is
+//! seen by the run. [`Goals`], [`Lifecycle`], [`Progress`] and [`sub_goal`] are what it takes to stand in for `PlanSys2`'s planner and executor.
 //!
 //! Nothing here has a clock, a thread or a socket: time comes in as an argument, and what is to be said
 //! comes out as a value. `docs/plansys2.md` has the table of what happens when; each row is a test, and
@@ -27,18 +28,23 @@
 //! ```
 
 pub mod interface;
+pub mod knowledge;
 pub mod message;
 
 mod census;
 mod goals;
 mod hub;
 mod lifecycle;
+mod mirror;
 mod progress;
+mod tree;
 mod world;
 
 pub use census::Census;
 pub use goals::Goals;
 pub use hub::{Action, Effect, Hub, Ticket, Told};
 pub use lifecycle::Lifecycle;
+pub use mirror::{Answer, Call, CallId, Key, Mirror, Seen};
 pub use progress::{Progress, plan_text};
+pub use tree::sub_goal;
 pub use world::{Command, World};

@@ -5,15 +5,22 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::{Action, Ticket, Told};
+use crate::{Action, Seen, Ticket, Told};
 
 /// What Elbowroom wants to be done.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Command {
     /// This action is to begin.
     Begin(Action),
     /// It is to stop.
     Cancel(Ticket),
+    /// This is believed: at first all that is so, later what has changed. Names are in brackets.
+    Believe {
+        /// Facts.
+        facts: Vec<(String, bool)>,
+        /// Fluents, and their values.
+        values: Vec<(String, Option<f64>)>,
+    },
     /// The run is over.
     Stop,
 }
@@ -30,6 +37,8 @@ pub struct World {
     begun: BTreeMap<Ticket, Begun>,
     news: Vec<Value>,
     question: Option<Question>,
+    /// Whether it wants to hear what is believed.
+    is_following: bool,
 }
 
 #[derive(Debug)]
@@ -57,6 +66,16 @@ impl World {
             begun: BTreeMap::new(),
             news: Vec::new(),
             question: None,
+            is_following: false,
+        }
+    }
+
+    /// The same, which is told what is believed, and sees things by itself.
+    #[must_use]
+    pub fn following(self) -> Self {
+        Self {
+            is_following: true,
+            ..self
         }
     }
 
@@ -80,6 +99,7 @@ impl World {
                 None
             }
             Some("stop") => Some(Command::Stop),
+            Some("believed") => Some(believed(&message)),
             Some("start") => self
                 .begin_time(now)
                 .start(ticket, &message)
@@ -107,7 +127,10 @@ impl World {
         let versions = message.get("versions").and_then(Value::as_array);
         if versions.is_some_and(|all| all.iter().any(|it| it.as_u64() == Some(2))) {
             self.speaks = 2;
-            let can = ["cancel", "feedback"];
+            let mut can = vec!["cancel", "feedback"];
+            if self.is_following {
+                can.extend(["facts", "beliefs"]);
+            }
             said.push(
                 json!({"type": "hello", "version": 2, "name": self.name, "can": can}).to_string(),
             );
@@ -190,6 +213,19 @@ impl World {
         begun.has_ended = true;
     }
 
+    /// Something was seen that others have changed.
+    pub fn see(&mut self, seen: &Seen, now: Duration) {
+        let time = self.time(now);
+        self.news.push(match seen {
+            Seen::Fact(fact, becomes) => {
+                json!({"type": "fact", "fact": fact, "becomes": becomes, "time": time})
+            }
+            Seen::Value(fluent, value) => {
+                json!({"type": "value", "fluent": fluent, "value": value, "time": time})
+            }
+        });
+    }
+
     /// The answer to the open question, line by line, if it is due.
     pub fn answer(&mut self, now: Duration) -> Vec<String> {
         if self.due_in(now) != Some(Duration::ZERO) {
@@ -233,6 +269,20 @@ impl World {
         self.zero.map_or(0.0, |zero| {
             now.saturating_sub(zero).as_secs_f64() * self.speed
         })
+    }
+}
+
+fn believed(message: &serde_json::Map<String, Value>) -> Command {
+    let entries = |name: &str| message.get(name).and_then(Value::as_object);
+    let facts = entries("facts").into_iter().flatten();
+    let values = entries("values").into_iter().flatten();
+    Command::Believe {
+        facts: facts
+            .filter_map(|(fact, truth)| Some((fact.clone(), truth.as_bool()?)))
+            .collect(),
+        values: values
+            .map(|(fluent, value)| (fluent.clone(), number(value)))
+            .collect(),
     }
 }
 

@@ -104,6 +104,7 @@ fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {
                 values,
                 margins,
                 preferences,
+                ..
             } => {
                 let mut text = format!(
                     "{}: {} reaches the goal at {}\n",

@@ -1,6 +1,7 @@
 //! `elbowroom run`: execute a plan in a world.
 
 mod ahead;
+mod believed;
 mod journaled;
 pub(super) mod live;
 pub(super) mod process;
@@ -21,7 +22,7 @@ use elbowroom::answers::run::{RunOutcome, run as execute};
 use elbowroom::answers::{Halt, RunRequest, Watcher};
 use elbowroom::execute::{RunSpec, SpecError, check_vary};
 use elbowroom::execution::run::Verdict;
-use elbowroom::execution::{Planner, Recorder, World};
+use elbowroom::execution::{Planner, Progression, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::report::trace;
@@ -40,6 +41,7 @@ use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 use crate::words::tame;
 use ahead::Ahead;
+use believed::Believed;
 use journaled::{Careful, JournalWriter, Kept};
 use realtime::{Pace, PacedPlanner, Realtime};
 use shown::Views;
@@ -148,6 +150,17 @@ pub(super) fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure>
     Ok(Task::new(problem).with_epsilon(spec.epsilon.clone()))
 }
 
+/// Tells both what the run believes.
+fn both(
+    mut one: impl FnMut(&Progression) + Send,
+    mut other: impl FnMut(&Progression) + Send,
+) -> impl FnMut(&Progression) + Send {
+    move |belief| {
+        one(belief);
+        other(belief);
+    }
+}
+
 /// Everything that a run needs but the world.
 pub(super) struct Job<'a> {
     pub(super) spec: &'a RunSpec,
@@ -185,8 +198,10 @@ impl Job<'_> {
                     };
                     let interrupt = interrupt.clone();
                     let world = process::ProcessWorld::start(command, task, manners, interrupt)?;
+                    let believed = Believed::default();
+                    let world = world.telling(believed.clone());
                     let mut world = self.attended(world, &Rational::ONE);
-                    let outcome = self.run(&mut world, &mut writer);
+                    let outcome = self.run(&mut world, &mut writer, believed.listener());
                     world.into_inner().stop();
                     outcome.map_err(contradiction)?
                 }
@@ -213,6 +228,7 @@ impl Job<'_> {
         self,
         world: &mut dyn World,
         recorder: &mut dyn Recorder,
+        mut believes: impl FnMut(&Progression) + Send,
     ) -> Result<RunOutcome, SpecError> {
         let begun = Clock::start();
         let clock = || begun.seconds();
@@ -225,7 +241,7 @@ impl Job<'_> {
         let request = RunRequest::new(self.spec, self.task)
             .beginning_with(self.first)
             .planned_by(Ahead::new(planner, self.spec, self.interrupt))
-            .told_to(self.attendance.listener())
+            .told_to(both(self.attendance.listener(), &mut believes))
             .recorded_by(recorder);
         execute(request, world, &mut Stopwatch::start(self.interrupt))
     }
@@ -259,8 +275,9 @@ impl Job<'_> {
         let interrupt = self.interrupt;
         let views = Views::open(arguments, self.spec, self.task, interrupt, self.attendance)?;
         let world = process::ProcessWorld::start(command, self.task, manners, interrupt.clone())?;
+        let believed = Believed::default();
         let world = Careful {
-            inner: world,
+            inner: world.telling(believed.clone()),
             kept: kept.clone(),
             refused: Vec::new(),
         };
@@ -282,7 +299,7 @@ impl Job<'_> {
             let request = RunRequest::new(self.spec, self.task)
                 .beginning_with(self.first)
                 .planned_by(Ahead::new(planner, self.spec, interrupt))
-                .told_to(self.attendance.listener())
+                .told_to(both(self.attendance.listener(), believed.listener()))
                 .recorded_by(live::Live::new(&mut writer));
             let mut watch = Attentive {
                 inner: Stopwatch::start(interrupt),
@@ -303,7 +320,7 @@ impl Job<'_> {
         let model = model.unwrap_or_default();
         let mut world = spec.world(&model, task, self.first.as_ref())?;
         let Some(factor) = &spec.realtime else {
-            return self.run(world.as_mut(), recorder);
+            return self.run(world.as_mut(), recorder, |_: &Progression| {});
         };
         let pace = Pace::new(factor);
         let begun = Clock::start();

@@ -41,6 +41,8 @@ pub(crate) enum Ability {
     Cancel,
     /// To go on after it was started again, and to say what became of what was under way.
     Resume,
+    /// To make something of what is believed.
+    Beliefs,
 }
 
 impl Ability {
@@ -49,6 +51,7 @@ impl Ability {
             Self::Look => "look",
             Self::Cancel => "cancel",
             Self::Resume => "resume",
+            Self::Beliefs => "beliefs",
         }
     }
 }
@@ -113,6 +116,12 @@ impl Listener {
         self.greeting
             .as_ref()
             .is_none_or(|greeting| greeting.can.iter().any(|word| word == ability.name()))
+    }
+
+    /// Whether the program wants to hear what is believed; not known before it has said anything.
+    pub(crate) fn wants_beliefs(&self) -> Option<bool> {
+        self.has_spoken
+            .then(|| self.greeting.is_some() && self.can(Ability::Beliefs))
     }
 
     /// Reads a line.

@@ -1,5 +1,7 @@
 //! Is a plan valid?
 
+mod goals;
+
 use std::collections::BTreeSet;
 
 use elbowroom_model::ground::FluentId;
@@ -8,6 +10,8 @@ use elbowroom_model::validate::{self, Margin, Preferences, Report, Settings, Ver
 use elbowroom_model::{Footprint, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
+
+pub use goals::GoalReached;
 
 use super::{Exact, RequestError, Version, ViolationAnswer, exact};
 
@@ -81,6 +85,9 @@ pub enum CheckFinding {
         values: Vec<FluentValue>,
         /// How close each comparison came to failing.
         margins: Vec<MarginAnswer>,
+        /// The parts of the goal, in the order in which the plan reaches them.
+        #[serde(default)]
+        goals: Vec<GoalReached>,
         /// The preferences that are violated, or may be.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         preferences: Vec<PreferenceAnswer>,
@@ -206,6 +213,7 @@ fn valid(task: &Task, plan: &TimeTriggeredPlan, report: &Report) -> CheckFinding
             })
             .collect(),
         margins: report.margins.iter().map(margin).collect(),
+        goals: goals::reached(task, plan),
         preferences: preferences(task, &report.preferences),
     }
 }

@@ -137,3 +137,34 @@ fn what_is_not_known_is_passed_over_and_what_is_no_json_is_an_error() {
         Some(Command::Stop)
     );
 }
+
+#[test]
+fn what_is_believed_is_heard_and_what_others_change_is_reported() {
+    let mut world = World::new("plansys2", 1.0).following();
+    let mut said = vec![];
+    let hello = r#"{"type":"hello","protocol":"elbowroom-world","version":1,"versions":[1,2]}"#;
+    world.hear(hello, at(0.0), &mut said).expect("JSON");
+    assert!(said[0].contains(r#""can":["cancel","feedback","facts","beliefs"]"#));
+    let told = r#"{"type":"believed","now":{"exact":"0","decimal":0.0},"facts":{"(at r a)":false},"values":{"(charge r)":{"exact":"7/2","decimal":3.5},"(driven r)":null}}"#;
+    let facts = vec![("(at r a)".to_owned(), false)];
+    let values = vec![
+        ("(charge r)".to_owned(), Some(3.5)),
+        ("(driven r)".to_owned(), None),
+    ];
+    assert_eq!(
+        hears(&mut world, told, 0.0),
+        Some(Command::Believe { facts, values })
+    );
+    hears(&mut world, WAIT, 1.0);
+    assert!(world.answer(at(1.5)).is_empty());
+    world.see(&Seen::Fact("(blocked b)".to_owned(), true), at(1.5));
+    world.see(&Seen::Value("(charge r)".to_owned(), 2.0), at(1.5));
+    assert_eq!(
+        world.answer(at(1.5)),
+        [
+            r#"{"type":"fact","fact":"(blocked b)","becomes":true,"time":0.5}"#,
+            r#"{"type":"value","fluent":"(charge r)","value":2.0,"time":0.5}"#,
+            r#"{"type":"time","now":0.5,"question":9}"#
+        ]
+    );
+}

@@ -11,6 +11,7 @@ use elbowroom::num::Rational;
 use elbowroom::report::wire;
 use serde_json::{Value, json};
 
+use super::believed::Believed;
 use crate::clock::Clock;
 use crate::conversation::{
     Ability, Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Listener, Mouth, Said, Told, ended, hello,
@@ -58,6 +59,8 @@ pub(super) struct ProcessWorld {
     is_deaf: bool,
     task: Arc<Task>,
     listener: Listener,
+    /// What it is told of what the run believes, if it wants to hear of it.
+    believed: Option<Believed>,
 }
 
 impl ProcessWorld {
@@ -126,6 +129,7 @@ impl ProcessWorld {
             is_deaf: false,
             task: Arc::clone(task),
             listener: Listener::new(task),
+            believed: None,
         };
         match world.tell(hello) {
             Ok(()) => Ok(world),
@@ -136,8 +140,29 @@ impl ProcessWorld {
         }
     }
 
+    /// The same, which tells the program what is believed.
+    pub(super) fn telling(self, believed: Believed) -> Self {
+        let believed = Some(believed);
+        Self { believed, ..self }
+    }
+
+    /// Tells the program what is believed, if it wants to hear of it, and nothing else is in its way.
+    fn tell_beliefs(&mut self) -> Result<(), WorldError> {
+        let (Some(believed), Some(is_wanted)) = (&self.believed, self.listener.wants_beliefs())
+        else {
+            return Ok(());
+        };
+        for message in believed.fetch(is_wanted, &self.task) {
+            self.tell(&message)?;
+        }
+        Ok(())
+    }
+
     /// Says good-bye, and ends the program if it does not end by itself.
     pub(super) fn stop(mut self) {
+        if !self.is_deaf {
+            let _ = self.tell_beliefs();
+        }
         if !self.is_deaf {
             let _ = self.tell_within(&json!({ "type": "stop" }), FAREWELL);
         }
@@ -178,6 +203,7 @@ impl ProcessWorld {
     /// Asks a question, unless one is open already, and listens.
     fn ask(&mut self, mut question: Value) -> Result<Passage, WorldError> {
         if !self.is_asked {
+            self.tell_beliefs()?;
             question["question"] = self.listener.next_question().into();
             self.tell(&question)?;
             self.is_asked = true;

@@ -23,6 +23,7 @@ use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, ReplayPlanner, ReplayWorld, Stored};
 
 use super::ahead::Ahead;
+use super::believed::Believed;
 use super::journaled::{Careful, JournalWriter, Kept};
 use super::process::{Manners, ProcessWorld};
 use super::shown::Views;
@@ -185,6 +186,7 @@ pub(in crate::commands) fn run(
         attendance.begin_at_rest(snapshot);
     }
     let kept = Kept::default();
+    let believed = Believed::default();
     let past = Arc::new(Past::new(&stored));
     let views = Views::open(arguments, &spec, &task, &interrupt, &attendance)?;
     let outcome = {
@@ -217,7 +219,7 @@ pub(in crate::commands) fn run(
                 past: ReplayPlanner::new(&stored),
                 present: Box::new(Ahead::new(planner, &spec, &interrupt)),
             })
-            .told_to(attendance.listener())
+            .told_to(super::both(attendance.listener(), believed.listener()))
             .recorded_by(views.shown(attendance.witnessed(recorder, &task, true), &task));
         let world = Careful {
             inner: PastWorld {
@@ -233,6 +235,7 @@ pub(in crate::commands) fn run(
                     interrupt: interrupt.clone(),
                 },
                 present: None,
+                believed,
                 last: now.unwrap_or_default(),
                 shift: Rational::ZERO,
                 news: None,
@@ -289,6 +292,8 @@ struct PastWorld<'a> {
     under_way: UnderWay,
     launch: Launch<'a>,
     present: Option<ProcessWorld>,
+    /// What it is told of what the run believes.
+    believed: Believed,
     /// What time it is, for the run.
     last: Rational,
     /// What is added to the times of a world that begins anew.
@@ -319,7 +324,7 @@ impl PastWorld<'_> {
                 (&resumed, self.under_way.given),
             );
             let world = world.map_err(|failure| WorldError::new(failure.message()))?;
-            self.present = Some(world);
+            self.present = Some(world.telling(self.believed.clone()));
             self.reconcile()?;
         }
         self.present

@@ -1,0 +1,86 @@
+//! When a plan reaches each part of the goal.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_execution::{Progression, Ticket};
+use elbowroom_model::ground::Condition;
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use serde::{Deserialize, Serialize};
+
+use crate::answers::exact;
+
+/// A part of the goal, and when the plan reaches it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GoalReached {
+    /// The condition, as PDDL writes it.
+    pub goal: String,
+    /// The first time at which it holds: 0 if it does so at the beginning.
+    #[serde(with = "exact")]
+    pub time: Rational,
+}
+
+/// What happens at a time: which steps start, and which end.
+#[derive(Default)]
+struct Group {
+    ends: Vec<usize>,
+    starts: Vec<usize>,
+}
+
+/// The parts of the goal in the order in which a valid plan reaches them. Parts that are never seen to
+/// hold at a happening are left out: there are none but those that hold by time alone, after it.
+pub(super) fn reached(task: &Task, plan: &TimeTriggeredPlan) -> Vec<GoalReached> {
+    let mut groups: BTreeMap<Rational, Group> = BTreeMap::new();
+    for (index, step) in plan.steps.iter().enumerate() {
+        let group = groups.entry(step.start.clone()).or_default();
+        group.starts.push(index);
+        if step.duration.is_some() {
+            groups.entry(step.end()).or_default().ends.push(index);
+        }
+    }
+    for timed in task.timed() {
+        groups.entry(timed.time.clone()).or_default();
+    }
+    let mut open = task.goal().conjuncts();
+    let mut reached = Vec::new();
+    let mut state = Progression::new(Arc::new(task.clone()));
+    note(task, &state, &Rational::ZERO, &mut open, &mut reached);
+    for (time, group) in &groups {
+        // The judge has accepted the plan: what cannot be computed here is no part of why.
+        let _ = state.arrive(time);
+        for index in &group.ends {
+            let _ = state.end(ticket(*index), &[]);
+        }
+        for index in &group.starts {
+            let step = &plan.steps[*index];
+            let duration = step.duration.clone().unwrap_or_default();
+            let _ = state.start(ticket(*index), &step.action, &duration, &[]);
+        }
+        note(task, &state, time, &mut open, &mut reached);
+    }
+    reached
+}
+
+fn ticket(index: usize) -> Ticket {
+    Ticket(index as u64)
+}
+
+fn note(
+    task: &Task,
+    state: &Progression,
+    time: &Rational,
+    open: &mut Vec<&Condition>,
+    reached: &mut Vec<GoalReached>,
+) {
+    open.retain(|goal| {
+        let holds = state.holds(goal, None) == Ok(true);
+        if holds {
+            reached.push(GoalReached {
+                goal: task.describe_condition(goal),
+                time: time.clone(),
+            });
+        }
+        !holds
+    });
+}

@@ -1,0 +1,472 @@
+use rand::{Rng as _, SeedableRng as _, seq::IndexedRandom as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+use crate::knowledge::{Param, node};
+
+fn at(seconds: u64) -> Duration {
+    Duration::from_secs(seconds)
+}
+
+fn node(name: &str, value: f64) -> Node {
+    let mut words = name.split_whitespace().map(str::to_owned);
+    let name = words.next().expect("a name");
+    let parameter = |name| Param {
+        name,
+        ..Param::default()
+    };
+    Node {
+        node_type: if value.to_bits() == 0 {
+            node::PREDICATE
+        } else {
+            node::FUNCTION
+        },
+        name,
+        parameters: words.map(parameter).collect(),
+        value,
+        ..Node::default()
+    }
+}
+
+fn name(node: &Node) -> String {
+    let objects = node.parameters.iter().map(|it| it.name.clone());
+    std::iter::once(node.name.clone())
+        .chain(objects)
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+/// As `PlanSys2` has it: spelled as it was told, case and all.
+#[derive(Default)]
+struct Expert {
+    facts: BTreeSet<String>,
+    numbers: BTreeMap<String, f64>,
+    /// What it was told, in order.
+    told: Vec<String>,
+    refuses: Option<&'static str>,
+    /// Since the last time that this was asked.
+    has_changed: bool,
+}
+
+impl Expert {
+    fn with(facts: &[&str], numbers: &[(&str, f64)]) -> Self {
+        Self {
+            facts: facts.iter().map(ToString::to_string).collect(),
+            numbers: numbers
+                .iter()
+                .map(|(name, value)| ((*name).to_owned(), *value))
+                .collect(),
+            ..Self::default()
+        }
+    }
+
+    fn answer(&mut self, call: &Call) -> Answer {
+        let (what, node) = match call {
+            Call::Predicates => {
+                return Answer::States(Ok(self.facts.iter().map(|it| node(it, 0.0)).collect()));
+            }
+            Call::Functions => {
+                return Answer::States(Ok(self
+                    .numbers
+                    .iter()
+                    .map(|(it, value)| Node {
+                        node_type: node::FUNCTION,
+                        value: *value,
+                        ..node(it, 0.0)
+                    })
+                    .collect()));
+            }
+            Call::Add(node) => ("add", node),
+            Call::Remove(node) => ("remove", node),
+            Call::Define(node) => ("define", node),
+            Call::Update(node) => ("update", node),
+            Call::Forget(node) => ("forget", node),
+        };
+        let name = name(node);
+        if self.refuses == Some(name.as_str()) {
+            return Answer::Done(Err("it is not valid".to_owned()));
+        }
+        self.told.push(match what {
+            "define" | "update" => format!("{what} {name} {}", node.value),
+            _ => format!("{what} {name}"),
+        });
+        let is_known = self.numbers.contains_key(&name);
+        match what {
+            "add" => {
+                self.facts.insert(name);
+            }
+            "remove" => {
+                self.facts.remove(&name);
+            }
+            // What was not defined cannot be updated.
+            "update" if !is_known => return Answer::Done(Err("function not valid".to_owned())),
+            "define" | "update" => {
+                self.numbers.insert(name, node.value);
+            }
+            _ => {
+                self.numbers.remove(&name);
+            }
+        }
+        self.has_changed = true;
+        Answer::Done(Ok(()))
+    }
+
+    /// Answers until nothing is asked any more.
+    fn talk(&mut self, mirror: &mut Mirror, now: Duration) {
+        loop {
+            if std::mem::take(&mut self.has_changed) {
+                mirror.notified();
+            }
+            mirror.tick(now);
+            let calls = mirror.calls();
+            if calls.is_empty() {
+                return;
+            }
+            for (id, call) in calls {
+                let answer = self.answer(&call);
+                mirror.answered(id, answer);
+            }
+        }
+    }
+}
+
+fn fact(name: &str, truth: bool) -> (String, bool) {
+    (name.to_owned(), truth)
+}
+
+fn number(name: &str, value: f64) -> (String, Option<f64>) {
+    (name.to_owned(), Some(value))
+}
+
+/// A run that believes that a robot is at a, with a charge of 5.
+fn begun(expert: &mut Expert) -> Mirror {
+    let mut mirror = Mirror::default();
+    mirror.found(true);
+    mirror.begin("");
+    mirror.believe(&[fact("(at r a)", true)], &[number("(charge r)", 5.0)]);
+    expert.talk(&mut mirror, at(0));
+    mirror
+}
+
+#[test]
+fn what_a_run_changes_is_told_once_and_in_order_and_does_not_come_back() {
+    let mut expert = Expert::with(&["at r a"], &[("charge r", 5.0)]);
+    let mut mirror = begun(&mut expert);
+    mirror.believe(&[fact("(at r a)", false)], &[]);
+    mirror.believe(
+        &[fact("(at r b)", true)],
+        &[number("(charge r)", 3.5), number("(driven r)", 1.0)],
+    );
+    expert.talk(&mut mirror, at(1));
+    assert_eq!(
+        expert.told,
+        [
+            "remove at r a",
+            "add at r b",
+            "update charge r 3.5",
+            "define driven r 1"
+        ]
+    );
+    assert_eq!(mirror.seen(), []);
+    assert!(mirror.is_idle() && mirror.remarks().is_empty());
+    mirror.believe(&[], &[("(driven r)".to_owned(), None)]);
+    expert.talk(&mut mirror, at(2));
+    assert_eq!(
+        expert.told.last().map(String::as_str),
+        Some("forget driven r")
+    );
+}
+
+#[test]
+fn what_others_change_is_seen_once_and_not_told_back() {
+    let mut expert = Expert::with(&["at r a"], &[("charge r", 5.0)]);
+    let mut mirror = begun(&mut expert);
+    expert.facts.insert("blocked b".to_owned());
+    expert.facts.remove("at r a");
+    expert.numbers.insert("charge r".to_owned(), 1.0);
+    mirror.notified();
+    expert.talk(&mut mirror, at(1));
+    let seen = [
+        Seen::Fact("(at r a)".to_owned(), false),
+        Seen::Fact("(blocked b)".to_owned(), true),
+        Seen::Value("(charge r)".to_owned(), 1.0),
+    ];
+    assert_eq!(mirror.seen(), seen);
+    // The run says that it believes so now.
+    mirror.believe(
+        &[fact("(at r a)", false), fact("(blocked b)", true)],
+        &[number("(charge r)", 1.0)],
+    );
+    mirror.notified();
+    expert.talk(&mut mirror, at(2));
+    assert_eq!(mirror.seen(), []);
+    assert!(expert.told.is_empty(), "{:?}", expert.told);
+}
+
+#[test]
+fn at_the_beginning_the_problem_expert_wins_but_not_over_what_the_run_has_done_since() {
+    let mut expert = Expert::with(&["at r a", "blocked b"], &[("charge r", 4.0)]);
+    let mut mirror = Mirror::default();
+    mirror.found(true);
+    mirror.begin("");
+    mirror.believe(
+        &[fact("(at r a)", true), fact("(open b)", true)],
+        &[number("(charge r)", 5.0)],
+    );
+    mirror.believe(&[fact("(at r a)", false)], &[]);
+    expert.talk(&mut mirror, at(0));
+    let seen = [
+        Seen::Fact("(blocked b)".to_owned(), true),
+        Seen::Fact("(open b)".to_owned(), false),
+        Seen::Value("(charge r)".to_owned(), 4.0),
+    ];
+    assert_eq!(mirror.seen(), seen);
+    assert_eq!(expert.told, ["remove at r a"]);
+}
+
+#[test]
+fn what_is_changed_while_it_is_read_is_not_taken_back_by_what_was_read() {
+    let mut expert = Expert::with(&["at r a"], &[]);
+    let mut mirror = begun(&mut expert);
+    mirror.notified();
+    mirror.tick(at(1));
+    // It answers with what it has; meanwhile the run changes that.
+    let asked = mirror.calls();
+    let answers: Vec<_> = asked
+        .iter()
+        .map(|(id, call)| (*id, expert.answer(call)))
+        .collect();
+    assert_eq!(answers.len(), 2);
+    mirror.believe(&[fact("(at r a)", false)], &[]);
+    mirror.tick(at(1));
+    let told = mirror.calls();
+    assert_eq!(told.len(), 1, "nothing waits for what is read");
+    for (id, answer) in answers {
+        mirror.answered(id, answer);
+    }
+    assert_eq!(mirror.seen(), []);
+    let answer = expert.answer(&told[0].1);
+    mirror.answered(told[0].0, answer);
+    expert.talk(&mut mirror, at(1));
+    assert_eq!((mirror.seen(), expert.facts.len()), (vec![], 0));
+}
+
+#[test]
+fn a_problem_expert_with_another_problem_is_left_alone() {
+    let mut expert = Expert::with(&["cooked rice"], &[]);
+    let mut mirror = begun(&mut expert);
+    mirror.believe(&[fact("(at r a)", false)], &[]);
+    mirror.notified();
+    expert.talk(&mut mirror, at(1));
+    assert!(expert.told.is_empty() && mirror.seen().is_empty() && mirror.is_idle());
+    assert_eq!(
+        mirror.remarks(),
+        ["the problem expert has nothing of this problem, and is left alone"]
+    );
+}
+
+#[test]
+fn what_is_refused_is_said_and_neither_repeated_nor_taken_back() {
+    let mut expert = Expert::with(&["at r a"], &[("charge r", 5.0)]);
+    let mut mirror = begun(&mut expert);
+    expert.refuses = Some("at r b");
+    mirror.believe(&[fact("(at r b)", true)], &[number("(charge r)", 2.0)]);
+    expert.talk(&mut mirror, at(1));
+    mirror.notified();
+    expert.talk(&mut mirror, at(2));
+    assert_eq!(
+        mirror.remarks(),
+        ["the problem expert does not take (at r b): it is not valid"]
+    );
+    assert_eq!(expert.told, ["update charge r 2"]);
+    assert_eq!(mirror.seen(), []);
+}
+
+#[test]
+fn who_does_not_answer_is_asked_again_and_that_is_said_once() {
+    let mut expert = Expert::with(&["at r a"], &[]);
+    let mut mirror = begun(&mut expert);
+    mirror.believe(&[fact("(at r b)", true)], &[]);
+    let mut asked = 0;
+    for second in 1..=21 {
+        mirror.tick(at(second));
+        asked += mirror.calls().len();
+    }
+    assert_eq!(asked, 5, "each 5 s");
+    assert_eq!(mirror.remarks().len(), 1);
+    assert!(!mirror.is_idle());
+    expert.talk(&mut mirror, at(26));
+    assert_eq!(expert.told, ["add at r b"]);
+    assert!(mirror.is_idle());
+}
+
+#[test]
+fn that_there_is_none_is_said_once_and_who_comes_later_is_told_then() {
+    let mut mirror = Mirror::default();
+    mirror.begin("");
+    mirror.believe(&[fact("(at r a)", true)], &[]);
+    mirror.believe(&[fact("(at r a)", false)], &[]);
+    for second in 0..3 {
+        mirror.tick(at(second));
+        assert!(mirror.calls().is_empty() && mirror.is_idle());
+    }
+    assert_eq!(
+        mirror.remarks(),
+        ["no problem expert is there: what runs change is told to none"]
+    );
+    let mut expert = Expert::with(&["at r a"], &[]);
+    mirror.found(true);
+    expert.talk(&mut mirror, at(3));
+    assert_eq!((expert.told.len(), mirror.seen()), (1, vec![]));
+}
+
+#[test]
+fn what_a_run_has_changed_last_is_told_after_its_end() {
+    let mut expert = Expert::with(&["at r a"], &[]);
+    let mut mirror = begun(&mut expert);
+    mirror.believe(&[fact("(at r a)", false)], &[]);
+    mirror.end();
+    assert!(!mirror.is_idle());
+    expert.facts.insert("blocked b".to_owned());
+    mirror.notified();
+    expert.talk(&mut mirror, at(1));
+    assert!(mirror.is_idle() && mirror.seen().is_empty());
+    assert_eq!(expert.told, ["remove at r a"]);
+}
+
+#[test]
+fn words_are_told_as_the_problem_and_the_problem_expert_write_them() {
+    let mut expert = Expert::with(&["robot_At R2D2 hall"], &[]);
+    let mut mirror = Mirror::default();
+    mirror.found(true);
+    mirror.begin("(define (problem p) (:objects R2D2 - robot hall Kitchen - room))");
+    mirror.believe(&[fact("(robot_at r2d2 hall)", true)], &[]);
+    expert.talk(&mut mirror, at(0));
+    assert_eq!(mirror.seen(), []);
+    mirror.believe(
+        &[
+            fact("(robot_at r2d2 hall)", false),
+            fact("(robot_at r2d2 kitchen)", true),
+        ],
+        &[],
+    );
+    expert.talk(&mut mirror, at(1));
+    assert_eq!(
+        expert.told,
+        ["remove robot_At R2D2 hall", "add robot_At R2D2 Kitchen"]
+    );
+}
+
+/// Run and others change the same facts and numbers at random, while messages are late and lost. When all is quiet, both
+/// sides have the same; and as long as others change nothing, nothing is seen.
+#[test]
+fn both_sides_come_to_the_same_whoever_changes_what_and_when() {
+    let names = ["p a", "p b", "q"];
+    let (mut seen_of_others, mut conflicts) = (0, 0);
+    for seed in 0..400 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let others_act = seed % 2 == 0;
+        let mut expert = Expert::with(&["p a", "here"], &[("n", 1.0)]);
+        let mut mirror = Mirror::default();
+        mirror.found(true);
+        mirror.begin("");
+        // What the run believes: what it was told, and what it does.
+        let mut facts: BTreeMap<String, bool> = [("p a", true), ("here", true)]
+            .map(|(it, truth)| (it.to_owned(), truth))
+            .into();
+        let mut value = 1.0;
+        let all: Vec<_> = facts
+            .iter()
+            .map(|(it, truth)| fact(&format!("({it})"), *truth))
+            .collect();
+        mirror.believe(&all, &[number("(n)", value)]);
+        let mut open: Vec<(CallId, Call)> = Vec::new();
+        let mut answers: Vec<(CallId, Answer)> = Vec::new();
+        for step in 0..400_u64 {
+            let now = Duration::from_millis(step * 200);
+            let is_busy = step < 200;
+            match rng.random_range(0..8) {
+                0 if is_busy => {
+                    let it = *names.choose(&mut rng).expect("some");
+                    let truth = rng.random();
+                    if facts.insert(it.to_owned(), truth) != Some(truth) {
+                        mirror.believe(&[fact(&format!("({it})"), truth)], &[]);
+                    }
+                }
+                1 if is_busy => {
+                    value += 1.0;
+                    mirror.believe(&[], &[number("(n)", value)]);
+                }
+                2 if is_busy && others_act => {
+                    let it = (*names.choose(&mut rng).expect("some")).to_owned();
+                    let has_changed = if rng.random() {
+                        expert.facts.insert(it)
+                    } else {
+                        expert.facts.remove(&it)
+                    };
+                    expert.has_changed |= has_changed;
+                }
+                3 if is_busy && others_act => {
+                    let number = f64::from(rng.random_range(100..900));
+                    expert.numbers.insert("n".to_owned(), number);
+                    expert.has_changed = true;
+                }
+                4..6 if !open.is_empty() => {
+                    let (id, call) = open.remove(0);
+                    let answer = expert.answer(&call);
+                    // Lost is lost, but not once all is quiet.
+                    if !is_busy || rng.random_bool(0.8) {
+                        answers.push((id, answer));
+                    }
+                }
+                6..8 if !answers.is_empty() => {
+                    let (id, answer) = answers.remove(rng.random_range(0..answers.len()));
+                    mirror.answered(id, answer);
+                }
+                _ => {}
+            }
+            if std::mem::take(&mut expert.has_changed) {
+                mirror.notified();
+            }
+            mirror.tick(now);
+            for (id, call) in mirror.calls() {
+                if !is_busy || rng.random_bool(0.9) {
+                    open.push((id, call));
+                }
+            }
+            for seen in mirror.seen() {
+                assert!(others_act, "seed {seed}, step {step}: {seen:?} is an echo");
+                seen_of_others += 1;
+                match seen {
+                    Seen::Fact(it, truth) => {
+                        let it = it.trim_matches(['(', ')']).to_owned();
+                        facts.insert(it.clone(), truth);
+                        mirror.believe(&[fact(&format!("({it})"), truth)], &[]);
+                    }
+                    Seen::Value(_, seen) => {
+                        value = seen;
+                        mirror.believe(&[], &[number("(n)", value)]);
+                    }
+                }
+            }
+            conflicts += usize::from(!mirror.is_idle() && mirror.reading.is_some());
+        }
+        let believed: BTreeSet<_> = facts
+            .iter()
+            .filter(|(_, truth)| **truth)
+            .map(|(it, _)| it.clone())
+            .collect();
+        assert_eq!(believed, expert.facts, "seed {seed}");
+        assert_eq!(
+            expert.numbers.get("n").map(|it| it.to_bits()),
+            Some(value.to_bits()),
+            "seed {seed}"
+        );
+        assert!(mirror.is_idle(), "seed {seed}");
+    }
+    // Scripts in which nothing happens would show nothing.
+    assert!(
+        seen_of_others > 200 && conflicts > 500,
+        "{seen_of_others}, {conflicts}"
+    );
+}
