@@ -12,6 +12,8 @@ use std::thread;
 use std::time::Duration;
 
 use elbowroom_plansys2::interface::{Plan, PlanItem, PlanRequest};
+use elbowroom_plansys2::knowledge::Tree;
+use elbowroom_plansys2::sub_goal;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -84,6 +86,41 @@ pub(super) fn validate(elbowroom: &str, domain: String, patience: &Patience) -> 
     }
 }
 
+/// Has the command find the order in which a plan reaches the parts of its goal.
+///
+/// # Errors
+/// It does not reach the goal, or that cannot be said; the text says why.
+pub(super) fn sub_goals(
+    elbowroom: &str,
+    texts: &PlanRequest,
+    plan: String,
+    patience: &Patience,
+) -> Result<Vec<Tree>, String> {
+    let folder = folder_with(texts)?;
+    let path = folder.path().join("plan.plan");
+    fs::write(&path, plan).map_err(|e| unusable(&path, &e))?;
+    let line = [
+        "check",
+        "domain.pddl",
+        "problem.pddl",
+        "plan.plan",
+        "--json",
+    ];
+    let said = ask_in(&folder, elbowroom, &line, patience)?;
+    match said.status.code() {
+        Some(0) => ordered(&said.out)
+            .ok_or_else(|| format!("{elbowroom} has not said when goals are reached")),
+        Some(1) => Err("the plan does not reach its goal".to_owned()),
+        _ => Err(said.errors.trim().to_owned()),
+    }
+}
+
+fn ordered(document: &str) -> Option<Vec<Tree>> {
+    let document: Value = serde_json::from_str(document).ok()?;
+    let goals = document["goals"].as_array()?.iter();
+    goals.map(|it| sub_goal(it["goal"].as_str()?)).collect()
+}
+
 /// The name of a domain, as far as it has one.
 fn name_of(domain: &str) -> String {
     let code = domain
@@ -117,7 +154,16 @@ fn ask(
     texts: &PlanRequest,
     patience: &Patience,
 ) -> Result<Said, String> {
-    let folder = folder_with(texts)?;
+    ask_in(&folder_with(texts)?, elbowroom, line, patience)
+}
+
+/// The same in a folder that is there.
+fn ask_in(
+    folder: &TempDir,
+    elbowroom: &str,
+    line: &[&str],
+    patience: &Patience,
+) -> Result<Said, String> {
     let [out, errors] = ["out", "errors"].map(|name| folder.path().join(name));
     let create = |path: &Path| File::create(path).map_err(|e| unusable(path, &e));
     let mut child = Command::new(elbowroom)
@@ -271,6 +317,7 @@ fn listen(listener: &UnixListener, inputs: &Sender<Input>) {
             break;
         }
     }
+    let _ = inputs.send(Input::Closed);
 }
 
 /// Passes on what Elbowroom says to the program that started it, and back.
@@ -337,6 +384,16 @@ mod tests {
         ] {
             assert_eq!(name_of(text), name, "{text}");
         }
+    }
+
+    #[test]
+    fn parts_of_a_goal_are_read_in_their_order() {
+        let document =
+            r#"{"goals":[{"goal":"(done b)","time":{}},{"goal":"(>= (n) 2)","time":{}}]}"#;
+        let trees = ordered(document).expect("an order");
+        let expected = ["(done b)", "(>= (n) 2)"].map(|it| sub_goal(it).expect("a condition"));
+        assert_eq!(trees, expected);
+        assert!(ordered("{}").is_none() && ordered("nonsense").is_none());
     }
 
     #[test]

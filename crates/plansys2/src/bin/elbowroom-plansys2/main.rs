@@ -1,6 +1,7 @@
 //! Elbowroom on standard input and output, the action performers of `PlanSys2` over DDS.
 
 mod command;
+mod expert;
 mod network;
 mod options;
 mod serve;
@@ -16,11 +17,13 @@ use std::thread;
 
 use clap::Parser as _;
 use elbowroom_plansys2::interface::PlanRequest;
+use elbowroom_plansys2::knowledge::Tree;
 use elbowroom_plansys2::message::{ActionExecution, ActionPerformerStatus};
 
 use command::Planned;
+use expert::{Expert, Heard};
 use network::{Asker, Network};
-use options::{Mode, Options, ServeOptions};
+use options::{Mode, Options, ProblemExpert, ServeOptions};
 use services::{Asked, Services};
 use topics::Topics;
 
@@ -42,6 +45,10 @@ pub(crate) enum Input {
     Planned(Asker, PlanRequest, Result<Planned, String>),
     /// A domain was read: for whom, and what is wrong with it.
     Validated(Asker, Result<(), String>),
+    /// The order was found in which the plan of that run reaches the parts of its goal; or why not.
+    Ordered(u64, Result<Vec<Tree>, String>),
+    /// The problem expert has said something.
+    Expert(Heard),
     /// A run has begun to talk; it is answered there.
     Talks(UnixStream),
     /// A run is over, with that exit code.
@@ -71,9 +78,11 @@ fn world(options: Options) -> Result<(), String> {
     let (inputs, received) = mpsc::channel();
     let mut network = Network::join(&settings)?;
     let topics = Topics::join(&mut network)?;
+    let follows = settings.problem_expert == Some(ProblemExpert::Follow);
+    let expert = follows.then(|| Expert::join(&mut network)).transpose()?;
     network.listen(inputs.clone())?;
     thread::spawn(move || read(&inputs));
-    session::Session::new(&settings, topics, received).run()
+    session::Session::new(&settings, topics, expert, received).run()
 }
 
 fn serve(options: Options, serving: ServeOptions) -> Result<(), String> {
@@ -83,13 +92,20 @@ fn serve(options: Options, serving: ServeOptions) -> Result<(), String> {
     let mut network = Network::join(&settings)?;
     let topics = Topics::join(&mut network)?;
     let services = Services::offer(&mut network)?;
+    let follows = settings.problem_expert != Some(ProblemExpert::Ignore);
+    let expert = follows.then(|| Expert::join(&mut network)).transpose()?;
     network.listen(inputs.clone())?;
     let ends = inputs.clone();
     let ended = ctrlc::set_handler(move || {
         let _ = ends.send(Input::End);
     });
     ended.map_err(|e| format!("cannot listen to signals: {e}"))?;
-    serve::Serving::new(&settings, serving, topics, services, inputs).run(&received);
+    let sides = serve::Sides {
+        topics,
+        services,
+        expert,
+    };
+    serve::Serving::new(&settings, serving, sides, inputs).run(&received);
     Ok(())
 }
 

@@ -172,6 +172,32 @@ impl Network {
         })
     }
 
+    /// Asks a service; `kind` is its type, and its answers are inputs, those to others too.
+    ///
+    /// # Errors
+    /// DDS refuses; the text says what.
+    pub(super) fn ask<Request, Response>(
+        &mut self,
+        name: &str,
+        kind: &str,
+        input: impl Fn(Asker, Response) -> Input + Send + 'static,
+    ) -> Result<Requests<Request>, String>
+    where
+        Request: Serialize,
+        Response: DeserializeOwned + Send + 'static,
+    {
+        let qos = reliable(10);
+        let (reply, request) = (format!("{name}Reply"), format!("{name}Request"));
+        let replies = self.topic("rr", &reply, &format!("{kind}_Response_"), &qos)?;
+        self.hear(&replies, input)?;
+        let requests = self.topic("rq", &request, &format!("{kind}_Request_"), &qos)?;
+        let writer = self.publisher.create_datawriter_no_key_cdr(&requests, None);
+        Ok(Requests {
+            writer: writer.map_err(|e| format!("cannot ask {name}: {e}"))?,
+            found: BTreeSet::new(),
+        })
+    }
+
     /// Begins to listen, in a thread of its own; what is heard goes to `inputs`.
     ///
     /// # Errors
@@ -235,6 +261,47 @@ impl<T: Serialize> Mouth<T> {
     }
 }
 
+/// By what a service is asked.
+pub(super) struct Requests<T: Serialize> {
+    writer: DataWriterCdr<T>,
+    /// Who serves it.
+    found: BTreeSet<GUID>,
+}
+
+impl<T: Serialize> Requests<T> {
+    /// Asks; the answer says to which request it belongs.
+    ///
+    /// # Errors
+    /// It could not be sent.
+    pub(super) fn say(&self, request: T) -> Result<SampleIdentity, String> {
+        let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
+        let written = self.writer.write_with_options(request, options.build());
+        written.map_err(|e| format!("a request was not sent: {e}"))
+    }
+
+    /// Whether anybody serves it. To be called a few times a second.
+    pub(super) fn is_served(&mut self) -> bool {
+        note_readers(&self.writer, &mut self.found);
+        !self.found.is_empty()
+    }
+}
+
+/// Notes who has begun or ceased to listen.
+fn note_readers<T: Serialize>(writer: &DataWriterCdr<T>, found: &mut BTreeSet<GUID>) {
+    while let Some(status) = writer.try_recv_status() {
+        if let DataWriterStatus::PublicationMatched {
+            current, reader, ..
+        } = status
+        {
+            if current.count_change() < 0 {
+                found.remove(&reader);
+            } else {
+                found.insert(reader);
+            }
+        }
+    }
+}
+
 /// An answer to somebody who may not have been found yet is kept for so long, and then sent all the same.
 const FOUND_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
 
@@ -261,18 +328,7 @@ impl<T: Serialize> Answers<T> {
     /// # Errors
     /// One could not be sent.
     pub(super) fn flush(&mut self) -> Result<(), String> {
-        while let Some(status) = self.writer.try_recv_status() {
-            if let DataWriterStatus::PublicationMatched {
-                current, reader, ..
-            } = status
-            {
-                if current.count_change() < 0 {
-                    self.found.remove(&reader);
-                } else {
-                    self.found.insert(reader);
-                }
-            }
-        }
+        note_readers(&self.writer, &mut self.found);
         let clock = now();
         let is_due = |(asker, _, since): &mut (Asker, T, Instant)| {
             let reader = asker.writer_guid;

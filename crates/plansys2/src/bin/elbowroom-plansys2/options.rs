@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 const ABOUT: &str = "\
 A world for `elbowroom run … --world-process elbowroom-plansys2`: the action performers of PlanSys2, over DDS and without ROS.
@@ -114,6 +114,19 @@ pub(super) struct NetworkOptions {
     /// [default: all; with `ROS_LOCALHOST_ONLY=1` in the environment, 127.0.0.1]
     #[arg(long, global = true, value_name = "ADDRESS")]
     interface: Vec<IpAddr>,
+    /// Whether what a run changes is told to PlanSys2's problem expert, and what others change there to the run
+    /// [default: follow with `serve`, else ignore]
+    #[arg(long, global = true, value_name = "HOW")]
+    problem_expert: Option<ProblemExpert>,
+}
+
+/// What the problem expert is to the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum ProblemExpert {
+    /// It is told, and heard
+    Follow,
+    /// Nothing
+    Ignore,
 }
 
 /// The same, complete and checked.
@@ -126,6 +139,8 @@ pub(super) struct Settings {
     pub(super) namespace: String,
     /// Empty: all.
     pub(super) interfaces: Vec<IpAddr>,
+    /// As it was asked for.
+    pub(super) problem_expert: Option<ProblemExpert>,
 }
 
 impl Options {
@@ -156,6 +171,7 @@ impl Options {
             domain_id,
             namespace: namespace(&network.namespace)?,
             interfaces,
+            problem_expert: network.problem_expert,
         })
     }
 }

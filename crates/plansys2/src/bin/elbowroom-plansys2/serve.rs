@@ -1,5 +1,8 @@
 //! In place of `PlanSys2`'s planner and executor: plans for who asks, and executes one plan at a time.
 
+mod order;
+mod planning;
+
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
@@ -17,22 +20,24 @@ use elbowroom_plansys2::{
     Command, Effect, Goals, Hub, Lifecycle, Progress, Ticket, World, plan_text,
 };
 
-use super::command::{self, Patience, Planned, Running};
+use super::command::{Planned, Running};
+use super::expert::Expert;
 use super::network::Asker;
 use super::options::{ServeSettings, Settings};
-use super::services::{Asked, EXECUTOR, NODES, PLANNER, Part, Services};
+use super::services::{Asked, EXECUTOR, NODES, Part, Services};
 use super::session::now;
 use super::topics::Topics;
 use super::{Input, remark};
+use order::Order;
 
 /// How often the hub looks whether somebody is lost.
 const TICK: Duration = Duration::from_millis(200);
 /// How often it is told how a plan stands, at least.
 const TELL_EVERY: Duration = Duration::from_secs(1);
-/// How many plans are made at a time.
-const MOST_PLANNERS: usize = 4;
 /// How long a run may take to end when it was asked to.
 const FAREWELL: Duration = Duration::from_secs(8);
+/// How long the result of a run waits until the problem expert knows what the run has changed last.
+const TOLD_WITHIN: Duration = Duration::from_secs(2);
 /// Tickets of one run differ from those of another in these bits: the hub may still wait for what an earlier run has
 /// cancelled.
 const RUN_BITS: u32 = 32;
@@ -48,6 +53,18 @@ struct Execution {
     progress: Progress,
     answers: Option<UnixStream>,
     told: Option<Instant>,
+    order: Order,
+    /// Whether it has said all that it will say.
+    is_silent: bool,
+    /// Since when it is over, and with which exit code.
+    ended: Option<(Instant, Option<i32>)>,
+}
+
+/// With whom it speaks.
+pub(super) struct Sides {
+    pub(super) topics: Topics,
+    pub(super) services: Services,
+    pub(super) expert: Option<Expert>,
 }
 
 /// The server.
@@ -56,6 +73,7 @@ pub(super) struct Serving {
     speed: f64,
     topics: Topics,
     services: Services,
+    expert: Option<Expert>,
     inputs: Sender<Input>,
     hub: Hub,
     nodes: [Lifecycle; NODES.len()],
@@ -75,15 +93,20 @@ impl Serving {
     pub(super) fn new(
         settings: &Settings,
         serving: ServeSettings,
-        topics: Topics,
-        services: Services,
+        sides: Sides,
         inputs: Sender<Input>,
     ) -> Self {
+        let Sides {
+            topics,
+            services,
+            expert,
+        } = sides;
         Self {
             settings: serving,
             speed: settings.speed,
             topics,
             services,
+            expert,
             inputs,
             hub: Hub::new("elbowroom"),
             nodes: [Lifecycle::default(); NODES.len()],
@@ -155,8 +178,18 @@ impl Serving {
                 ));
             }
             Input::Over(code) => self.over(code),
-            // That a run does not speak any more is said by its end.
-            Input::Closed | Input::End => {}
+            Input::Ordered(number, order) => self.ordered(number, order),
+            Input::Expert(heard) => {
+                if let Some(expert) = &mut self.expert {
+                    expert.hear(heard);
+                }
+            }
+            Input::Closed => {
+                if let Some(execution) = &mut self.execution {
+                    execution.is_silent = true;
+                }
+            }
+            Input::End => {}
         }
     }
 
@@ -177,6 +210,11 @@ impl Serving {
             Ok(Some(Command::Cancel(ticket))) => {
                 self.hub.cancel(ticket | (execution.number << RUN_BITS));
             }
+            Ok(Some(Command::Believe { facts, values })) => {
+                if let Some(expert) = &mut self.expert {
+                    expert.believe(&facts, &values);
+                }
+            }
             Ok(Some(Command::Stop) | None) => {}
             Err(error) => remark(&format!("not understood: {line}: {error}")),
         }
@@ -192,6 +230,7 @@ impl Serving {
                     Part::Rest => self.services.rest.answer(who, response),
                 }
             }
+            Asked::Order(who) => return self.tell_order(who),
             Asked::Validate(who, request) => return self.validate(who, request.domain),
             Asked::Goal(who, request) => {
                 let stamp = stamp();
@@ -254,64 +293,6 @@ impl Serving {
         }
     }
 
-    /// Has a process of the command work on it, unless that is refused; what comes of it is an input.
-    fn plan(&mut self, who: Asker, texts: PlanRequest) {
-        self.work(move |elbowroom, refused, patience| {
-            let planned = refused.and_then(|()| command::plan(elbowroom, &texts, patience));
-            Input::Planned(who, texts, planned)
-        });
-    }
-
-    fn validate(&mut self, who: Asker, domain: String) {
-        self.work(move |elbowroom, refused, patience| {
-            Input::Validated(
-                who,
-                refused.and_then(|()| command::validate(elbowroom, domain, patience)),
-            )
-        });
-    }
-
-    fn work(
-        &mut self,
-        work: impl FnOnce(&str, Result<(), String>, &Patience) -> Input + Send + 'static,
-    ) {
-        let refused = if !self.nodes[PLANNER].serves() {
-            Err("the planner is not active".to_owned())
-        } else if self.planning >= MOST_PLANNERS {
-            Err(format!("{MOST_PLANNERS} plans are being made already"))
-        } else {
-            Ok(())
-        };
-        self.planning += 1;
-        let (inputs, elbowroom) = (self.inputs.clone(), self.settings.elbowroom.clone());
-        let (within, is_over) = (self.settings.plan_within, Arc::clone(&self.is_over));
-        thread::spawn(move || {
-            // Whoever receives is gone when the program ends.
-            let _ = inputs.send(work(&elbowroom, refused, &Patience { within, is_over }));
-        });
-    }
-
-    fn has_planned(&mut self, who: Asker, texts: PlanRequest, planned: Result<Planned, String>) {
-        self.planning -= 1;
-        let response = match planned {
-            Ok(planned) => {
-                let plan = planned.plan.clone();
-                (self.texts, self.planned) = (Some(texts), Some(planned));
-                PlanResponse {
-                    success: true,
-                    plan,
-                    error_info: String::new(),
-                }
-            }
-            Err(error_info) => PlanResponse {
-                success: false,
-                plan: Plan::default(),
-                error_info,
-            },
-        };
-        told(self.services.plan.answer(who, response));
-    }
-
     /// Begins to execute a plan.
     fn begin(&mut self, request: &GoalRequest, stamp: Stamp) -> Result<(), String> {
         if !self.nodes[EXECUTOR].serves() {
@@ -334,42 +315,75 @@ impl Serving {
             ..
         } = &self.settings;
         let run = Running::start(elbowroom, executor, texts, &text, &self.inputs)?;
+        let problem = texts.problem.clone();
         if !self.goals.accept(request.goal_id, stamp) {
             run.interrupt();
             return Err("there was a goal of that number".to_owned());
         }
         told(self.services.executing.say(request.plan.clone()));
         self.runs += 1;
+        let mut world = World::new("plansys2", self.speed);
+        if let Some(expert) = &mut self.expert {
+            expert.begin(&problem);
+            world = world.following();
+        }
         self.execution = Some(Execution {
             goal: request.goal_id,
             run,
             number: self.runs,
-            world: World::new("plansys2", self.speed),
+            world,
             plan: request.plan.clone(),
             progress: Progress::new(&request.plan),
             answers: None,
             told: None,
+            order: Order::default(),
+            is_silent: false,
+            ended: None,
         });
+        self.find_order(text);
         Ok(())
     }
 
     /// The run is to end in order.
     fn interrupt(&self) {
-        if let Some(execution) = &self.execution {
+        let running = self.execution.as_ref().filter(|it| it.ended.is_none());
+        if let Some(execution) = running {
             execution.run.interrupt();
         }
     }
 
     fn over(&mut self, code: Option<i32>) {
-        let Some(execution) = self.execution.take() else {
+        let Some(execution) = &mut self.execution else {
             return;
         };
+        execution.ended = Some((super::session::now(), code));
         // What a run that has died has left running is to stop.
         for ticket in execution.world.running() {
             self.hub.cancel(ticket | (execution.number << RUN_BITS));
         }
+    }
+
+    /// Tells the result of a run that is over, once the problem expert knows what it has changed.
+    fn conclude(&mut self) {
+        let is_told = self.expert.as_ref().is_none_or(Expert::is_idle);
+        let is_due = |it: &mut Execution| {
+            it.ended.is_some_and(|(since, _)| {
+                (it.is_silent && is_told)
+                    || super::session::now().saturating_duration_since(since) >= TOLD_WITHIN
+            })
+        };
+        let Some(execution) = self.execution.take_if(is_due) else {
+            return;
+        };
+        if let Some(expert) = &mut self.expert {
+            expert.end();
+        }
+        for who in execution.order.asked {
+            self.refuse_order(who, "the run is over");
+        }
+        let is_reached = execution.ended.is_some_and(|(_, code)| code == Some(0));
         let infos = execution.progress.infos().to_vec();
-        for (who, result) in self.goals.end(code == Some(0), infos) {
+        for (who, result) in self.goals.end(is_reached, infos) {
             told(self.services.result.answer(who, result));
         }
         told(self.services.statuses.say(self.goals.statuses()));
@@ -396,9 +410,14 @@ impl Serving {
                 Effect::Remark(text) => remark(&text),
             }
         }
+        let seen = self.expert.as_mut().map(|it| it.settle(now));
+        self.conclude();
         let Some(execution) = &mut self.execution else {
             return;
         };
+        for seen in seen.iter().flatten() {
+            execution.world.see(seen, now);
+        }
         let lines = execution.world.answer(now);
         say(execution, &lines);
         let clock = super::session::now();

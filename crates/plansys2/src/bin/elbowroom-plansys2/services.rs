@@ -5,6 +5,7 @@ use elbowroom_plansys2::interface::{
     GoalRequest, GoalResponse, GoalStatuses, Plan, PlanRequest, PlanResponse, ResultRequest,
     ResultResponse, StateResponse, Success, ValidateRequest, ValidateResponse,
 };
+use elbowroom_plansys2::knowledge::SubGoalsResponse;
 
 use super::Input;
 use super::network::{Answers, Asker, Mouth, Network, latched, reliable};
@@ -20,6 +21,8 @@ pub(super) enum Asked {
     Plan(Asker, PlanRequest),
     /// For the plan that is executed, or for what is left of it.
     Executed(Part, Asker),
+    /// For the order in which the parts of the goal are reached.
+    Order(Asker),
     Validate(Asker, ValidateRequest),
     Goal(Asker, GoalRequest),
     Cancel(Asker, CancelRequest),
@@ -41,6 +44,7 @@ pub(super) struct Services {
     pub(super) plan: Answers<PlanResponse>,
     pub(super) executed: Answers<PlanResponse>,
     pub(super) rest: Answers<PlanResponse>,
+    pub(super) order: Answers<SubGoalsResponse>,
     pub(super) validate: Answers<ValidateResponse>,
     pub(super) goal: Answers<GoalResponse>,
     pub(super) cancel: Answers<CancelResponse>,
@@ -93,6 +97,11 @@ impl Services {
                 "plansys2_msgs::srv::dds_::GetPlan",
                 move |asker, _: PlanRequest| ask(Asked::Executed(Part::Rest, asker)),
             )?,
+            order: network.serve(
+                "executor/get_ordered_sub_goals",
+                "plansys2_msgs::srv::dds_::GetOrderedSubGoals",
+                move |asker, _: Empty| ask(Asked::Order(asker)),
+            )?,
             validate: network.serve(
                 "planner/validate_domain",
                 "plansys2_msgs::srv::dds_::ValidateDomain",
@@ -143,6 +152,7 @@ impl Services {
         self.plan.flush()?;
         self.executed.flush()?;
         self.rest.flush()?;
+        self.order.flush()?;
         self.validate.flush()?;
         self.goal.flush()?;
         self.cancel.flush()?;

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use elbowroom_plansys2::{Census, Command, Effect, Hub, World};
 
+use super::expert::{Expert, Heard};
 use super::options::Settings;
 use super::topics::Topics;
 use super::{Input, remark};
@@ -15,9 +16,12 @@ use super::{Input, remark};
 const TICK: Duration = Duration::from_millis(200);
 /// What was told to stop is to hear of it before this program ends.
 const FAREWELL: Duration = Duration::from_millis(300);
+/// The problem expert may take so long to take in what was changed last. Elbowroom waits no longer than a second.
+const TOLD_WITHIN: Duration = Duration::from_millis(600);
 
 pub(super) struct Session {
     topics: Topics,
+    expert: Option<Expert>,
     inputs: Receiver<Input>,
     hub: Hub,
     world: World,
@@ -26,12 +30,24 @@ pub(super) struct Session {
 }
 
 impl Session {
-    pub(super) fn new(settings: &Settings, topics: Topics, inputs: Receiver<Input>) -> Self {
+    pub(super) fn new(
+        settings: &Settings,
+        topics: Topics,
+        mut expert: Option<Expert>,
+        inputs: Receiver<Input>,
+    ) -> Self {
+        let mut world = World::new("plansys2", settings.speed);
+        if let Some(expert) = &mut expert {
+            // The text of the problem is not known here: words are spelled as the problem expert has them.
+            expert.begin("");
+            world = world.following();
+        }
         Self {
             topics,
+            expert,
             inputs,
             hub: Hub::new("elbowroom"),
-            world: World::new("plansys2", settings.speed),
+            world,
             census: Census::new(settings.needs.clone(), settings.within),
             zero: now(),
         }
@@ -84,6 +100,7 @@ impl Session {
                     said.push(Input::Closed);
                     break;
                 }
+                Ok(Input::Expert(heard)) => self.hear(heard),
                 Ok(line @ Input::Line(_)) => said.push(line),
                 // Nobody serves here.
                 Ok(_) | Err(_) => {}
@@ -104,6 +121,11 @@ impl Session {
                 match command {
                     Ok(Some(Command::Begin(action))) => self.hub.begin(action, now),
                     Ok(Some(Command::Cancel(ticket))) => self.hub.cancel(ticket),
+                    Ok(Some(Command::Believe { facts, values })) => {
+                        if let Some(expert) = &mut self.expert {
+                            expert.believe(&facts, &values);
+                        }
+                    }
                     Ok(Some(Command::Stop)) => return true,
                     Ok(None) => {}
                     Err(error) => remark(&format!("not understood: {line}: {error}")),
@@ -112,11 +134,18 @@ impl Session {
             Input::Closed => return true,
             Input::Hub(message) => self.hub.message(&message, now),
             Input::Status(status) => self.hub.status(&status, now),
+            Input::Expert(heard) => self.hear(heard),
             Input::Trouble(text) => remark(&text),
             // Nobody serves here.
             _ => {}
         }
         false
+    }
+
+    fn hear(&mut self, heard: Heard) {
+        if let Some(expert) = &mut self.expert {
+            expert.hear(heard);
+        }
     }
 
     /// Does what the hub has decided, and answers if that is due.
@@ -133,6 +162,9 @@ impl Session {
                 Effect::Remark(text) => remark(&text),
             }
         }
+        for seen in self.expert.iter_mut().flat_map(|it| it.settle(now)) {
+            self.world.see(&seen, now);
+        }
         say(&self.world.answer(now));
     }
 
@@ -142,6 +174,19 @@ impl Session {
             self.hub.cancel(ticket);
         }
         self.settle();
+        if let Some(expert) = &mut self.expert {
+            expert.end();
+        }
+        // What the run has changed last is to be told.
+        let left = self.now();
+        while self.expert.as_ref().is_some_and(|it| !it.is_idle())
+            && self.now().saturating_sub(left) < TOLD_WITHIN
+        {
+            if let Ok(Input::Expert(heard)) = self.inputs.recv_timeout(FAREWELL) {
+                self.hear(heard);
+            }
+            self.settle();
+        }
         thread::sleep(FAREWELL);
     }
 

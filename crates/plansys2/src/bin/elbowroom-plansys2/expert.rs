@@ -1,0 +1,152 @@
+//! `PlanSys2`'s problem expert: what a run changes is told there, and what others change there is seen by the run.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use elbowroom_plansys2::interface::Empty;
+use elbowroom_plansys2::knowledge::{AffectRequest, AffectResponse, StatesResponse};
+use elbowroom_plansys2::{Answer, Call, CallId, Mirror, Seen};
+use rustdds::rpc::SampleIdentity;
+
+use super::network::{Network, Requests, reliable};
+use super::{Input, remark};
+
+/// So many answers are waited for; of what was asked before that, none will come.
+const MOST_OPEN: usize = 64;
+
+/// What the problem expert has said.
+pub(super) enum Heard {
+    /// Something has changed there.
+    Changed,
+    /// An answer to that request, which may be somebody else's.
+    States(SampleIdentity, StatesResponse),
+    /// Likewise.
+    Done(SampleIdentity, AffectResponse),
+}
+
+/// A client of it.
+pub(super) struct Expert {
+    mirror: Mirror,
+    predicates: Requests<Empty>,
+    functions: Requests<Empty>,
+    add: Requests<AffectRequest>,
+    remove: Requests<AffectRequest>,
+    define: Requests<AffectRequest>,
+    update: Requests<AffectRequest>,
+    forget: Requests<AffectRequest>,
+    open: VecDeque<(SampleIdentity, CallId)>,
+}
+
+impl Expert {
+    /// Joins the conversation.
+    ///
+    /// # Errors
+    /// DDS refuses; the text says what.
+    pub(super) fn join(network: &mut Network) -> Result<Self, String> {
+        network.subscribe(
+            "problem_expert/update_notify",
+            "std_msgs::msg::dds_::Empty_",
+            &reliable(100),
+            |_: Empty| Input::Expert(Heard::Changed),
+        )?;
+        let states = "plansys2_msgs::srv::dds_::GetStates";
+        let mut ask_states = |name: &str| {
+            network.ask(&format!("problem_expert/{name}"), states, |to, it| {
+                Input::Expert(Heard::States(to, it))
+            })
+        };
+        let predicates = ask_states("get_problem_predicates")?;
+        let functions = ask_states("get_problem_functions")?;
+        let affect = "plansys2_msgs::srv::dds_::AffectNode";
+        let mut ask_to = |name: &str| {
+            network.ask(&format!("problem_expert/{name}"), affect, |to, it| {
+                Input::Expert(Heard::Done(to, it))
+            })
+        };
+        Ok(Self {
+            mirror: Mirror::default(),
+            predicates,
+            functions,
+            add: ask_to("add_problem_predicate")?,
+            remove: ask_to("remove_problem_predicate")?,
+            define: ask_to("add_problem_function")?,
+            update: ask_to("update_problem_function")?,
+            forget: ask_to("remove_problem_function")?,
+            open: VecDeque::new(),
+        })
+    }
+
+    /// A run begins; `problem` is its text, as far as that is known.
+    pub(super) fn begin(&mut self, problem: &str) {
+        self.mirror.begin(problem);
+    }
+
+    /// The run is over; what it has changed is still told.
+    pub(super) fn end(&mut self) {
+        self.mirror.end();
+    }
+
+    /// The run believes that.
+    pub(super) fn believe(&mut self, facts: &[(String, bool)], values: &[(String, Option<f64>)]) {
+        self.mirror.believe(facts, values);
+    }
+
+    /// Whether all is told that is to be told.
+    pub(super) fn is_idle(&self) -> bool {
+        self.mirror.is_idle()
+    }
+
+    pub(super) fn hear(&mut self, heard: Heard) {
+        let outcome = |success, why| if success { Ok(()) } else { Err(why) };
+        let (to, answer) = match heard {
+            Heard::Changed => return self.mirror.notified(),
+            Heard::States(to, it) => {
+                let said = outcome(it.success, it.error_info);
+                (to, Answer::States(said.map(|()| it.states)))
+            }
+            Heard::Done(to, it) => (to, Answer::Done(outcome(it.success, it.error_info))),
+        };
+        let place = self.open.iter().position(|(asked, _)| *asked == to);
+        if let Some((_, call)) = place.and_then(|place| self.open.remove(place)) {
+            self.mirror.answered(call, answer);
+        }
+    }
+
+    /// Asks and tells what is due; what others have changed comes back. To be called a few times a second.
+    pub(super) fn settle(&mut self, now: Duration) -> Vec<Seen> {
+        let is_there = self.predicates.is_served()
+            & self.functions.is_served()
+            & self.add.is_served()
+            & self.remove.is_served()
+            & self.define.is_served()
+            & self.update.is_served()
+            & self.forget.is_served();
+        self.mirror.found(is_there);
+        self.mirror.tick(now);
+        for (id, call) in self.mirror.calls() {
+            let to =
+                |requests: &Requests<AffectRequest>, node| requests.say(AffectRequest { node });
+            let asked = match call {
+                Call::Predicates => self.predicates.say(Empty::default()),
+                Call::Functions => self.functions.say(Empty::default()),
+                Call::Add(node) => to(&self.add, node),
+                Call::Remove(node) => to(&self.remove, node),
+                Call::Define(node) => to(&self.define, node),
+                Call::Update(node) => to(&self.update, node),
+                Call::Forget(node) => to(&self.forget, node),
+            };
+            match asked {
+                Ok(asked) => self.open.push_back((asked, id)),
+                // It is asked again when no answer has come.
+                Err(why) => remark(&why),
+            }
+        }
+        while self.open.len() > MOST_OPEN {
+            self.open.pop_front();
+        }
+        for text in self.mirror.remarks() {
+            remark(&text);
+        }
+        self.mirror.seen()
+    }
+}

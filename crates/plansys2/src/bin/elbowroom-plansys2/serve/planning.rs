@@ -1,0 +1,80 @@
+//! Plans for who asks, each made by a process of the command.
+
+use std::sync::Arc;
+use std::thread;
+
+use elbowroom_plansys2::interface::{Plan, PlanRequest, PlanResponse};
+
+use super::super::Input;
+use super::super::command::{self, Patience, Planned};
+use super::super::network::Asker;
+use super::super::services::PLANNER;
+use super::{Serving, told};
+
+/// How many plans are made at a time.
+const MOST_PLANNERS: usize = 4;
+
+impl Serving {
+    /// Has a process of the command work on it, unless that is refused; what comes of it is an input.
+    pub(super) fn plan(&mut self, who: Asker, texts: PlanRequest) {
+        self.work(move |elbowroom, refused, patience| {
+            let planned = refused.and_then(|()| command::plan(elbowroom, &texts, patience));
+            Input::Planned(who, texts, planned)
+        });
+    }
+
+    pub(super) fn validate(&mut self, who: Asker, domain: String) {
+        self.work(move |elbowroom, refused, patience| {
+            Input::Validated(
+                who,
+                refused.and_then(|()| command::validate(elbowroom, domain, patience)),
+            )
+        });
+    }
+
+    fn work(
+        &mut self,
+        work: impl FnOnce(&str, Result<(), String>, &Patience) -> Input + Send + 'static,
+    ) {
+        let refused = if !self.nodes[PLANNER].serves() {
+            Err("the planner is not active".to_owned())
+        } else if self.planning >= MOST_PLANNERS {
+            Err(format!("{MOST_PLANNERS} plans are being made already"))
+        } else {
+            Ok(())
+        };
+        self.planning += 1;
+        let (inputs, elbowroom) = (self.inputs.clone(), self.settings.elbowroom.clone());
+        let (within, is_over) = (self.settings.plan_within, Arc::clone(&self.is_over));
+        thread::spawn(move || {
+            // Whoever receives is gone when the program ends.
+            let _ = inputs.send(work(&elbowroom, refused, &Patience { within, is_over }));
+        });
+    }
+
+    pub(super) fn has_planned(
+        &mut self,
+        who: Asker,
+        texts: PlanRequest,
+        planned: Result<Planned, String>,
+    ) {
+        self.planning -= 1;
+        let response = match planned {
+            Ok(planned) => {
+                let plan = planned.plan.clone();
+                (self.texts, self.planned) = (Some(texts), Some(planned));
+                PlanResponse {
+                    success: true,
+                    plan,
+                    error_info: String::new(),
+                }
+            }
+            Err(error_info) => PlanResponse {
+                success: false,
+                plan: Plan::default(),
+                error_info,
+            },
+        };
+        told(self.services.plan.answer(who, response));
+    }
+}
