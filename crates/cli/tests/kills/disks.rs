@@ -1,8 +1,12 @@
 //! Journals on disks that are full, fill up, or cannot be written.
 
 use std::fs;
-use std::path::Path;
+use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
 
 use super::command::root;
 use super::skipped::skipped;
@@ -136,4 +140,102 @@ fn a_run_goes_on_from_a_small_disk_that_was_full_when_there_is_room_again() {
     assert!((1..6).contains(&half), "in the middle: {half} begun");
     judge(&folder, &output, "with room again");
     fs::remove_dir_all(&folder).expect("the folder is there");
+}
+
+/// A disk that is slow: each record that must be on it waits until this test lets it. Until then nothing is told.
+#[test]
+fn on_a_slow_disk_what_is_told_is_told_late_and_never_before_it_is_on_the_disk() {
+    if !python_is_there() {
+        return;
+    }
+    let folder = folder("slow");
+    let Some(shim) = compiled(&folder) else {
+        return;
+    };
+    let journal = folder.join("journal").display().to_string();
+    let [asked, go] = ["asked", "go"].map(|name| pipe(&folder.join(name)));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .current_dir(root())
+        .args(beginning(&folder, &journal, false))
+        .env("LD_PRELOAD", &shim)
+        .env("ASKED", folder.join("asked"))
+        .env("GO", folder.join("go"))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the command can be started");
+    let (syncs, heard) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let mut asked = asked;
+        let mut byte = [0];
+        while asked.read_exact(&mut byte).is_ok() && syncs.send(()).is_ok() {}
+    });
+    let (mut held, mut held_for_long) = (0, 0);
+    while child.try_wait().expect("it can be asked").is_none() {
+        if heard.recv_timeout(Duration::from_millis(50)).is_err() {
+            continue;
+        }
+        // It waits for its disk. Nothing can be told any more, so that what the robot has begun by now was on it.
+        let told = told_to_start(&journal);
+        let (last, before) = told.split_last().expect("a start, for which it waits");
+        let done = lines(&folder, "done").len();
+        if done + 1 < before.len() {
+            // As slow as the rest of what is under way.
+            held_for_long += 1;
+            while lines(&folder, "done").len() == done {
+                assert!(child.try_wait().expect("it can be asked").is_none(), "it waits");
+                std::thread::sleep(Duration::from_millis(10));
+            }
+        }
+        let begun = lines(&folder, "begun");
+        assert!(!begun.contains(last), "{last} was told too early: {begun:?}");
+        assert!(begun.iter().all(|it| before.contains(it)), "{begun:?}, {before:?}");
+        held += 1;
+        (&go).write_all(b"g").expect("it waits for that");
+    }
+    let output = child.wait_with_output().expect("its output");
+    judge(&folder, &output, "on the slow disk");
+    assert!(held >= 6, "{held} starts were held");
+    assert!(held_for_long > 0, "none was held until something else had ended");
+    fs::remove_dir_all(&folder).expect("the folder is there");
+}
+
+/// What makes the disk slow; `None`, with the reason told, where it cannot be made.
+fn compiled(folder: &Path) -> Option<PathBuf> {
+    let shim = folder.join("slow_sync.so");
+    let source = root().join("crates/cli/tests/files/slow_sync.c");
+    let made = Command::new("cc")
+        .args(["-shared", "-fPIC", "-o"])
+        .args([&shim, &source])
+        .output();
+    if !cfg!(all(target_os = "linux", target_env = "gnu")) || !made.is_ok_and(|it| it.status.success())
+    {
+        skipped("no disk can be made slow: that takes a C compiler and Linux's C library");
+        return None;
+    }
+    Some(shim)
+}
+
+/// A named pipe. Whoever opens it for both does not wait for others.
+fn pipe(path: &Path) -> fs::File {
+    let made = Command::new("mkfifo").arg(path).status();
+    assert!(made.is_ok_and(|it| it.success()), "{}", path.display());
+    let mut options = fs::OpenOptions::new();
+    options.read(true).write(true);
+    options.open(path).expect("it was made")
+}
+
+/// The starts that the journal has, as the robot writes them down.
+fn told_to_start(journal: &str) -> Vec<String> {
+    let text = fs::read_to_string(journal).expect("there is a journal");
+    let records = text.lines().filter_map(|line| {
+        let (_, record) = line.split_once(' ')?;
+        serde_json::from_str::<Value>(record).ok()
+    });
+    let commands = records.filter(|it| it["event"] == "command");
+    let starts = commands.map(|it| it["command"].clone());
+    let starts = starts.filter(|it| it["type"] == "start");
+    starts
+        .map(|it| format!("{} {}", it["ticket"], it["action"].as_str().expect("a text")))
+        .collect()
 }

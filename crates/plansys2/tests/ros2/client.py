@@ -1,6 +1,7 @@
 """A client of PlanSys2's planner and executor on real ROS 2, such as its terminal and its Python clients are.
 
 `client.py DOMAIN PROBLEM [CANCEL_AFTER]` has a plan made and executed, and prints what it was told as a document of JSON.
+Where a problem expert is there, it is asked for its facts and numbers as soon as the plan has ended.
 """
 
 import json
@@ -13,7 +14,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from plansys2_msgs.action import ExecutePlan
 from plansys2_msgs.msg import ActionExecutionInfo, Plan
-from plansys2_msgs.srv import GetPlan, ValidateDomain
+from plansys2_msgs.srv import GetOrderedSubGoals, GetPlan, GetStates, ValidateDomain
 from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
@@ -26,6 +27,7 @@ SERVICES = {
     "planner/change_state": ChangeState,
     "executor/get_plan": GetPlan,
     "executor/get_remaining_plan": GetPlan,
+    "executor/get_ordered_sub_goals": GetOrderedSubGoals,
     "executor/get_state": GetState,
     "executor/change_state": ChangeState,
 }
@@ -46,6 +48,8 @@ class Client:
         # At the beginning, as PlanSys2's terminal does: the first request of a client whose peer does not know it yet
         # takes three seconds.
         self.clients = {name: self.node.create_client(kind, name) for name, kind in SERVICES.items()}
+        self.states = [self.node.create_client(GetStates, f"problem_expert/get_problem_{it}")
+                       for it in ("predicates", "functions")]  # fmt: skip
         self.executing = ActionClient(self.node, ExecutePlan, "execute_plan")
         self.infos, self.plans = [], []
         self.node.create_subscription(ActionExecutionInfo, "action_execution_info", self.infos.append, 100)
@@ -75,6 +79,18 @@ class Client:
         answers = [self.call(f"executor/{it}", domain="", problem="") for it in ("get_plan", "get_remaining_plan")]
         return [[it.action for it in told.plan.items] if told.success else told.error_info for told in answers]
 
+    def sub_goals(self):
+        """The parts of the goal in their order; or why there are none."""
+        told = self.call("executor/get_ordered_sub_goals")
+        return [text(it.nodes, 0) for it in told.sub_goals] if told.success else told.error_info
+
+    def known(self):
+        """The facts and numbers of the problem expert, if it is there."""
+        if not all(it.service_is_ready() for it in self.states):
+            return None
+        facts, numbers = (self.spin(it.call_async(GetStates.Request())).states for it in self.states)
+        return [sorted(named(it) for it in facts), {named(it): it.value for it in numbers}]
+
     def execute(self, plan, cancel_after=None):
         """What became of it, and how often there was feedback."""
         client = self.executing
@@ -91,7 +107,7 @@ class Client:
             until = time.monotonic() + cancel_after
             while time.monotonic() < until:
                 rclpy.spin_once(self.node, timeout_sec=0.1)
-            asked = self.executed()
+            asked = [*self.executed(), self.sub_goals()]
             assert len(self.spin(goal.cancel_goal_async()).goals_canceling) == 1
         answer = self.spin(result)
         note(f"execute_plan: {STATUSES[answer.status]}")
@@ -104,6 +120,21 @@ class Client:
             "was_executing": any(it.status == it.EXECUTING for told in feedback for it in told),
             "actions": {it.action_full_name: [it.status, it.message_status] for it in infos},
         }
+
+
+def named(node):
+    return " ".join([node.name, *(it.name for it in node.parameters)])
+
+
+def text(nodes, place):
+    """As PDDL writes it."""
+    node = nodes[place]
+    assert node.node_id == place
+    heads = {node.AND: "and", node.OR: "or", node.NOT: "not"}
+    if node.node_type not in heads:
+        assert node.node_type == node.PREDICATE, node
+        return f"({named(node)})"
+    return "(" + " ".join([heads[node.node_type], *(text(nodes, it) for it in node.children)]) + ")"
 
 
 def main():
@@ -122,8 +153,9 @@ def main():
     said["validated"] = [[it.success, it.error_info] for it in validated]
     answer = client.call("planner/get_plan", domain=domain, problem=problem)
     said["planned"] = [answer.success, [it.action for it in answer.plan.items]]
-    said["idle"] = client.executed()
+    said["idle"] = [*client.executed(), client.sub_goals()]
     said["executed"] = client.execute(answer.plan, float(sys.argv[3]) if len(sys.argv) > 3 else None)
+    said["known"] = client.known()
     said["followed"] = [client.plans == [answer.plan], sorted({it.action_full_name for it in client.infos})]
     there = client.node.get_publishers_info_by_topic("ros_discovery_info", no_mangle=True)
     said["nodes"] = [len(there), client.node.get_node_names()]

@@ -219,11 +219,30 @@ def a_missing_performer_is_named(stage):
     assert stage.log() == []
 
 
-def serve(stage, crew, *options, meanwhile=None):
+def begin_expert(stage, **more):
+    """A problem expert that has what the problem of the yard says, but for a number."""
+    spec = {"facts": ["at r1 shed", "at r2 barn"], "numbers": {"trips r1": 0}, **more}
+    stage.expert_file = os.path.join(stage.folder, "expert.jsonl")
+    expert = stage.start([sys.executable, os.path.join(HERE, "expert.py"), json.dumps(spec), stage.expert_file])
+    stage.wait_for("the problem expert", lambda: os.path.exists(stage.expert_file), expert)
+    return expert
+
+
+def changes(stage):
+    """What the problem expert was told, by whom, and what it had in the end."""
+    with open(stage.expert_file, encoding="utf-8") as file:
+        lines = [json.loads(line) for line in file]
+    return [(it["who"], it["told"]) for it in lines], [lines[-1]["facts"], lines[-1]["numbers"]]
+
+
+def serve(stage, crew, *options, meanwhile=None, expert=None):
     """The program stands in for PlanSys2's planner and executor; what a client of theirs is told."""
     script = os.path.join(HERE, "performers.py")
     there = [stage.start([sys.executable, script, json.dumps(crew), stage.log_file])]
-    there.append(stage.start([*stage.world.split(), "serve", "--elbowroom", ELBOWROOM], stdout=subprocess.DEVNULL))
+    program = [*stage.world.split(), "serve", "--elbowroom", ELBOWROOM]
+    said = open(os.path.join(stage.folder, "program"), "w+", encoding="utf-8")
+    there.append(stage.start(program, stdout=subprocess.DEVNULL, stderr=said))
+    there += [expert] if expert else []
     try:
         client = stage.start([sys.executable, os.path.join(HERE, "client.py"), *YARD[:2], *options],
                              stdout=subprocess.PIPE, stderr=subprocess.PIPE)  # fmt: skip
@@ -238,6 +257,10 @@ def serve(stage, crew, *options, meanwhile=None):
         stage.settle()
     finally:
         end(*there)
+        said.seek(0)
+        stage.program = said.read()
+        said.close()
+        print(stage.program, file=sys.stderr, end="", flush=True)
     return json.loads(stage.out)
 
 
@@ -256,7 +279,8 @@ def a_plan_is_asked_for_and_executed(stage):
     assert executed["outcome"] == "succeeded" and executed["success"] and executed["was_executing"]
     assert set(executed["actions"]) == {"(move r1 shed gate):0", "(move r2 barn gate):0", "(signal r1 gate):2000"}
     assert all(status == 4 for status, _ in executed["actions"].values())
-    assert said["idle"] == 2 * ["no plan is being executed"]
+    assert said["idle"] == 3 * ["no plan is being executed"]
+    assert said["known"] is None and stage.program.count("no problem expert is there") == 1
     assert said["followed"] == [True, sorted(executed["actions"])], "tools can follow"
     # The performers' process and the client: the program does not say what nodes of another distribution cannot bear.
     publishers, nodes = said["nodes"]
@@ -269,7 +293,8 @@ def an_executed_plan_is_cancelled(stage):
     said = serve(stage, crew, "2")
     executed = said["executed"]
     # Nothing of it has ended.
-    assert executed["asked"] == 2 * [said["planned"][1]]
+    goals = ["(and (at r1 gate))", "(and (at r2 gate))", "(and (signalled gate))"]
+    assert executed["asked"] == [*2 * [said["planned"][1]], goals]
     assert executed["outcome"] == "canceled" and not executed["success"]
     assert sorted(status for status, _ in executed["actions"].values()) == [1, 5, 5]
     assert stage.events().count("told to cancel") == 2
@@ -307,7 +332,80 @@ def an_executed_plan_fails_with_its_reason(stage):
     assert executed["actions"]["(move r1 shed gate):0"] == [3, "the wheels slip"]
 
 
+AT_THE_GATE = [["at r1 gate", "at r2 gate", "signalled gate"], {"trips r1": 1.0, "trips r2": 1.0}]
+
+
+def what_is_done_is_told_to_the_problem_expert(stage):
+    """Each effect once, when it takes place; the client's result comes when all of them are there."""
+    said = serve(stage, DRIVERS, expert=begin_expert(stage))
+    assert said["executed"]["outcome"] == "succeeded" and len(said["executed"]["actions"]) == 3
+    told, known = changes(stage)
+    assert known == AT_THE_GATE and said["known"] == AT_THE_GATE
+    assert {who for who, _ in told} == {"the run"}
+    told = [it for _, it in told]
+    # The number that it did not have is defined, the other one updated.
+    first, last = {"remove at r1 shed", "remove at r2 barn"}, "add signalled gate"
+    between = {"add at r1 gate", "add at r2 gate", "update trips r1 1", "add trips r2 1"}
+    assert len(told) == 7 and set(told[:2]) == first and set(told[2:6]) == between and told[6] == last
+    assert stage.program.count("problem expert") == 0, "there is nothing to remark"
+
+
+def what_others_tell_the_problem_expert_is_heeded(stage):
+    """The robot that has come to the gate is taken back to the barn, and goes to the gate again."""
+    then = [{"when": "add at r2 gate", "then": ["remove at r2 gate", "add at r2 barn", "update trips r1 7"]}]
+    said = serve(stage, DRIVERS, expert=begin_expert(stage, then=then))
+    assert said["executed"]["outcome"] == "succeeded"
+    moves = [it["at"] for it in stage.log() if (it["event"], it["action"]) == ("begins", "(move r2 barn gate)")]
+    assert len(moves) == 2
+    told, (facts, numbers) = changes(stage)
+    assert facts == AT_THE_GATE[0] and numbers["trips r2"] == 2.0
+    # The last change counts: that of the trip of the other robot was told before or after that.
+    assert numbers["trips r1"] in (1.0, 7.0)
+    assert [it for who, it in told if who == "somebody else"] == then[0]["then"]
+
+
+def what_the_problem_expert_refuses_is_said_and_the_run_goes_on(stage):
+    said = serve(stage, DRIVERS, expert=begin_expert(stage, refuses="at r1 gate"))
+    assert said["executed"]["outcome"] == "succeeded" and len(said["executed"]["actions"]) == 3
+    assert "the problem expert does not take (at r1 gate): it is not valid" in stage.program
+    assert said["known"][0] == ["at r2 gate", "signalled gate"]
+
+
+def a_problem_expert_that_does_not_answer_delays_nothing(stage):
+    crew = {**DRIVERS, "driver1": dict(DRIVERS["driver1"], lasts=6), "driver2": dict(DRIVERS["driver2"], lasts=6)}
+    expert = begin_expert(stage, mute=True)
+
+    def leave(client):
+        # The client would ask it, too, and wait: it is gone before that.
+        stage.wait_for("it to be said", lambda: "has not answered" in read(stage), client)
+        end(expert)
+
+    def read(stage):
+        with open(os.path.join(stage.folder, "program"), encoding="utf-8") as file:
+            return file.read()
+
+    said = serve(stage, crew, expert=expert, meanwhile=leave)
+    assert said["executed"]["outcome"] == "succeeded" and len(said["executed"]["actions"]) == 3
+    assert stage.program.count("the problem expert has not answered for 5 s") == 1
+
+
+def a_run_tells_the_problem_expert_if_it_is_asked_to(stage):
+    stage.world += " --problem-expert follow"
+    expert = begin_expert(stage)
+    try:
+        stage.play(DRIVERS, YARD)
+    finally:
+        end(expert)
+    assert stage.code == 0 and "goal reached" in stage.out and "with 0 new plans" in stage.out
+    assert changes(stage)[1] == AT_THE_GATE
+
+
 PROGRAM_ONLY = [
+    what_is_done_is_told_to_the_problem_expert,
+    what_others_tell_the_problem_expert_is_heeded,
+    what_the_problem_expert_refuses_is_said_and_the_run_goes_on,
+    a_problem_expert_that_does_not_answer_delays_nothing,
+    a_run_tells_the_problem_expert_if_it_is_asked_to,
     a_missing_performer_is_named,
     a_plan_is_asked_for_and_executed,
     an_executed_plan_is_cancelled,
