@@ -152,6 +152,7 @@ class World:
         self._canceller: Does | None = None
         self._look: Callable[[list[str]], Any] | None = None
         self._resumed: Callable[[list[Action]], Any] | None = None
+        self._believed: Callable[[dict[str, bool], dict[str, float | None]], Any] | None = None
         self._inbox: queue.Queue[tuple[Any, ...]] = queue.Queue()
         self._actions: dict[int, Action] = {}
         self._begun: set[int] = set()
@@ -185,6 +186,15 @@ class World:
         """The function says what is so: it gets the words of a fact or fluent, and returns whether
         the fact is true, the fluent's value, or ``None`` where it cannot tell."""
         self._look = function
+        return function
+
+    def believed(
+        self, function: Callable[[dict[str, bool], dict[str, float | None]], Any]
+    ) -> Callable[[dict[str, bool], dict[str, float | None]], Any]:
+        """The function is told what Elbowroom believes: at first all facts that are true and all values,
+        later what has changed: ``{"(at rover shelf)": True}``, ``{"(charge rover)": 17.5}``. It must not
+        block."""
+        self._believed = function
         return function
 
     def resumed(self, function: Callable[[list[Action]], Any]) -> Callable[[list[Action]], Any]:
@@ -307,6 +317,9 @@ class World:
         if what == "hello":
             self._greet(message)
             return
+        if what == "believed":
+            self._hear_believed(message)
+            return
         self._begin_time()
         if what == "start":
             self._start(message)
@@ -315,6 +328,15 @@ class World:
             if action is not None and action.ticket not in self._ended:
                 action._cancelled.set()
                 self._cancel(action)
+
+    def _hear_believed(self, message: dict[str, Any]) -> None:
+        if self._believed is None:
+            return
+        values = {name: _number(value) for name, value in message.get("values", {}).items()}
+        try:
+            self._believed(dict(message.get("facts", {})), values)
+        except Exception:  # what is made of it is no part of the conversation
+            traceback.print_exc()
 
     def _begin_time(self) -> None:
         if self._zero is None:
@@ -336,6 +358,7 @@ class World:
         can = list(self.capabilities)
         can += ["look"] if self._look is not None else []
         can += ["resume"] if self._ledger is not None else []
+        can += ["beliefs"] if self._believed is not None else []
         self._say({"type": "hello", "version": VERSION, "name": self.name, "can": can})
 
     def _start(self, message: dict[str, Any]) -> None:

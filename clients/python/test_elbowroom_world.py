@@ -199,6 +199,18 @@ class OnTheWallClock(unittest.TestCase):
         self.assertEqual([it["type"] for it in seen], ["fact", "value"])
         self.assertEqual(seen[1]["value"], 17.5)
 
+    def test_what_is_believed_is_heard_by_who_wants_to(self):
+        world, heard = World(), []
+        world.believed(lambda facts, values: heard.append((facts, values)))
+        peer = Peer(world)
+        self.assertIn("beliefs", peer.greeting["can"])
+        number = {"exact": "7/2", "decimal": 3.5}
+        peer.tell(type="believed", now=number, facts={"(at r a)": True}, values={"(charge r)": number})
+        peer.tell(type="believed", now=number, facts={}, values={"(charge r)": None})
+        self.assertEqual(peer.ask(type="look", facts=[])[0], [])
+        self.assertEqual(heard, [({"(at r a)": True}, {"(charge r)": 3.5}), ({}, {"(charge r)": None})])
+        self.assertNotIn("beliefs", Peer(World()).greeting["can"])
+
     def test_without_an_offer_of_version_2_the_first_is_spoken(self):
         world = World(speed=100)
 

@@ -172,3 +172,73 @@ fn the_library_for_python_and_the_bridges_pass_their_own_tests() {
         assert!(said.contains("\nOK"), "{folder}: {said}");
     }
 }
+
+/// The beginning is told whole, and then each change once; in the end the program knows what the judge says.
+#[test]
+fn a_program_that_wants_to_hear_what_is_believed_is_told_all_of_it_once() {
+    if !python_is_there() {
+        return;
+    }
+    let battery =
+        ["domain.pddl", "problem.pddl", "plan.plan"].map(|it| format!("cases/battery/{it}"));
+    let name = format!("elbowroom-{}-believed", std::process::id());
+    let file = std::env::temp_dir().join(name);
+    let _ = fs::remove_file(&file);
+    let world = format!(
+        "python3 crates/cli/tests/files/listening.py {}",
+        file.display()
+    );
+    let files = battery.each_ref().map(String::as_str);
+    let run = elbowroom(&[&["run"], &files[..], &["--world-process", &world]].concat());
+    assert_eq!(run.status.code(), Some(0), "{run:?}");
+    let told = fs::read_to_string(&file).expect("it was told something");
+    let told: Vec<Value> = told
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    let (mut facts, mut values) = (serde_json::Map::new(), serde_json::Map::new());
+    for (number, message) in told.iter().enumerate() {
+        let entries = |name: &str| message[name].as_object().expect("entries").clone();
+        for (all, changed) in [
+            (&mut facts, entries("facts")),
+            (&mut values, entries("values")),
+        ] {
+            for (name, now) in changed {
+                let nothing = Value::from(false);
+                let before = all.insert(name.clone(), now.clone());
+                let is_new = before.as_ref().unwrap_or(&nothing) != &now;
+                assert!(is_new, "message {number} says {name} again");
+            }
+        }
+        if number == 0 {
+            let problem = fs::read_to_string(root().join(&battery[1])).expect("the problem");
+            assert!(
+                facts
+                    .iter()
+                    .all(|(name, now)| now == true && problem.contains(name))
+            );
+            assert!(!facts.is_empty() && !values.is_empty());
+        }
+    }
+    assert!(told.len() > 2, "{told:?}");
+    let judged = elbowroom(&[&["check"], &files[..], &["--json"]].concat());
+    let judged: Value = serde_json::from_slice(&judged.stdout).expect("a document");
+    for it in judged["values"].as_array().expect("values") {
+        let name = it["fluent"].as_str().expect("a name");
+        let (told, judged) = (values[name].as_f64(), it["value"]["decimal"].as_f64());
+        let off = told.zip(judged).map(|(told, judged)| (told - judged).abs());
+        // The simulation's clock counts in floats.
+        assert!(
+            off.is_some_and(|it| it < 1e-9),
+            "{name}: {told:?}, {judged:?}"
+        );
+    }
+    for it in judged["goals"].as_array().expect("goals") {
+        let goal = it["goal"].as_str().expect("a condition");
+        assert!(
+            goal.contains('>') || facts[goal] == true,
+            "{goal} in {facts:?}"
+        );
+    }
+    fs::remove_file(&file).expect("it is there");
+}

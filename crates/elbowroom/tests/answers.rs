@@ -442,3 +442,49 @@ fn a_timeline_shows_durations_that_the_executor_chooses_as_it_tells_them() {
     let makespans = makespans.as_ref().expect("a schedule");
     assert_eq!(makespans.nominal, millis(25_001));
 }
+
+#[test]
+fn parts_of_the_goal_come_in_the_order_in_which_the_plan_reaches_them() {
+    let domain = "(define (domain d) (:requirements :durative-actions :numeric-fluents :timed-initial-literals)
+        (:types thing) (:constants a b - thing)
+        (:predicates (done ?x - thing) (whole) (open)) (:functions (n))
+        (:durative-action long :parameters () :duration (= ?duration 9) :condition ()
+            :effect (and (at end (done a)) (at start (increase (n) 1))))
+        (:durative-action short :parameters () :duration (= ?duration 2) :condition ()
+            :effect (and (at end (done b)) (at end (increase (n) 1)))))";
+    let problem = "(define (problem p) (:domain d) (:init (whole) (= (n) 0) (at 5 (open)))
+        (:goal (and (done a) (done b) (>= (n) 2) (open) (whole))))";
+    let read = pddl::read_problem(
+        &Source::new("domain", domain),
+        &Source::new("problem", problem),
+    );
+    let task = std::sync::Arc::new(Task::new(read.expect("a problem without mistakes").0));
+    let plan = Source::new("plan", "0: (long) [9]\n1: (short) [2]\n");
+    let plan = pddl::read_plan(&plan, &task)
+        .expect("a plan without mistakes")
+        .0;
+    let answer = check(&CheckRequest {
+        task: &task,
+        plan: Some(&plan),
+        name: String::new(),
+        settings: Settings::default(),
+    });
+    let Ok(CheckAnswer::Plan(checked)) = answer else {
+        panic!("{answer:?}")
+    };
+    assert_stored(&checked);
+    let CheckFinding::Valid { goals, .. } = checked.finding else {
+        panic!("{:?}", checked.finding)
+    };
+    let goals = goals.iter().map(|it| format!("{} {}", it.time, it.goal));
+    assert_eq!(
+        goals.collect::<Vec<_>>(),
+        [
+            "0 (whole)",
+            "3 (done b)",
+            "3 (>= (n) 2)",
+            "5 (open)",
+            "9 (done a)"
+        ]
+    );
+}

@@ -176,27 +176,44 @@ fn on_a_slow_disk_what_is_told_is_told_late_and_never_before_it_is_on_the_disk()
             continue;
         }
         // It waits for its disk. Nothing can be told any more, so that what the robot has begun by now was on it.
-        let told = told_to_start(&journal);
-        let (last, before) = told.split_last().expect("a start, for which it waits");
+        let (told, is_start) = told_to_start(&journal);
+        let (last, before) = told.split_last().expect("a start comes first");
+        if !is_start {
+            // A cancel; what is late may be told to stop.
+            (&go).write_all(b"g").expect("it waits for that");
+            continue;
+        }
         let done = lines(&folder, "done").len();
-        if done + 1 < before.len() {
+        if done < before.len() {
             // As slow as the rest of what is under way.
             held_for_long += 1;
             while lines(&folder, "done").len() == done {
-                assert!(child.try_wait().expect("it can be asked").is_none(), "it waits");
+                assert!(
+                    child.try_wait().expect("it can be asked").is_none(),
+                    "it waits"
+                );
                 std::thread::sleep(Duration::from_millis(10));
             }
         }
         let begun = lines(&folder, "begun");
-        assert!(!begun.contains(last), "{last} was told too early: {begun:?}");
-        assert!(begun.iter().all(|it| before.contains(it)), "{begun:?}, {before:?}");
+        assert!(
+            !begun.contains(last),
+            "{last} was told too early: {begun:?}"
+        );
+        assert!(
+            begun.iter().all(|it| before.contains(it)),
+            "{begun:?}, {before:?}"
+        );
         held += 1;
         (&go).write_all(b"g").expect("it waits for that");
     }
     let output = child.wait_with_output().expect("its output");
     judge(&folder, &output, "on the slow disk");
     assert!(held >= 6, "{held} starts were held");
-    assert!(held_for_long > 0, "none was held until something else had ended");
+    assert!(
+        held_for_long > 0,
+        "none was held until something else had ended"
+    );
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
@@ -208,7 +225,8 @@ fn compiled(folder: &Path) -> Option<PathBuf> {
         .args(["-shared", "-fPIC", "-o"])
         .args([&shim, &source])
         .output();
-    if !cfg!(all(target_os = "linux", target_env = "gnu")) || !made.is_ok_and(|it| it.status.success())
+    if !cfg!(all(target_os = "linux", target_env = "gnu"))
+        || !made.is_ok_and(|it| it.status.success())
     {
         skipped("no disk can be made slow: that takes a C compiler and Linux's C library");
         return None;
@@ -225,17 +243,19 @@ fn pipe(path: &Path) -> fs::File {
     options.open(path).expect("it was made")
 }
 
-/// The starts that the journal has, as the robot writes them down.
-fn told_to_start(journal: &str) -> Vec<String> {
+/// The starts that the journal has, as the robot writes them down; and whether the last command is one.
+fn told_to_start(journal: &str) -> (Vec<String>, bool) {
     let text = fs::read_to_string(journal).expect("there is a journal");
     let records = text.lines().filter_map(|line| {
         let (_, record) = line.split_once(' ')?;
         serde_json::from_str::<Value>(record).ok()
     });
     let commands = records.filter(|it| it["event"] == "command");
-    let starts = commands.map(|it| it["command"].clone());
-    let starts = starts.filter(|it| it["type"] == "start");
-    starts
-        .map(|it| format!("{} {}", it["ticket"], it["action"].as_str().expect("a text")))
-        .collect()
+    let commands: Vec<_> = commands.map(|it| it["command"].clone()).collect();
+    let is_start = |it: &&Value| it["type"] == "start";
+    let written = |it: &Value| format!("{} {}", it["ticket"], it["action"].as_str().unwrap_or("?"));
+    (
+        commands.iter().filter(is_start).map(written).collect(),
+        commands.last().is_some_and(|it| is_start(&it)),
+    )
 }
