@@ -59,8 +59,7 @@ pub enum Answer {
 #[derive(Debug, Default)]
 pub struct Mirror {
     is_there: bool,
-    has_missed: bool,
-    has_complained: bool,
+    said: Said,
     following: Following,
     /// As the run believes it; `None` before it has said anything.
     believed: Option<State>,
@@ -80,6 +79,15 @@ pub struct Mirror {
     calls: Vec<(CallId, Call)>,
     seen: Vec<Seen>,
     remarks: Vec<String>,
+}
+
+/// What people have been told already.
+#[derive(Clone, Copy, Debug, Default)]
+struct Said {
+    /// That there is no problem expert.
+    is_missing: bool,
+    /// That it does not answer.
+    is_silent: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -194,7 +202,7 @@ impl Mirror {
         match answer {
             Answer::Done(outcome) => {
                 if let Some(writing) = self.writing.take_if(|it| it.call == call) {
-                    self.has_complained = false;
+                    self.said.is_silent = false;
                     self.unsure.remove(&writing.key);
                     match outcome {
                         Ok(()) => {
@@ -214,7 +222,7 @@ impl Mirror {
                 let Some(reading) = self.reading.as_mut().filter(|it| is_asked(it)) else {
                     return;
                 };
-                self.has_complained = false;
+                self.said.is_silent = false;
                 match outcome {
                     Ok(nodes) if reading.predicates == call => reading.facts = Some(nodes),
                     Ok(nodes) => reading.numbers = Some(nodes),
@@ -230,7 +238,7 @@ impl Mirror {
                     && reading.numbers.is_some()
                     && let Some(reading) = self.reading.take()
                 {
-                    self.has_read(reading);
+                    self.has_read(&reading);
                 }
             }
         }
@@ -240,7 +248,7 @@ impl Mirror {
     /// [`Self::remarks`] have what is to be done.
     pub fn tick(&mut self, now: Duration) {
         if !self.is_there {
-            if self.believed.is_some() && !std::mem::replace(&mut self.has_missed, true) {
+            if self.believed.is_some() && !std::mem::replace(&mut self.said.is_missing, true) {
                 let text = "no problem expert is there: what runs change is told to none";
                 self.remarks.push(text.to_owned());
             }
@@ -324,7 +332,7 @@ impl Mirror {
 
     /// Once, until it answers again.
     fn complain(&mut self) {
-        if !std::mem::replace(&mut self.has_complained, true) {
+        if !std::mem::replace(&mut self.said.is_silent, true) {
             self.remarks.push(format!(
                 "the problem expert has not answered for {} s; it is asked again, and the run goes on",
                 PATIENCE.as_secs()
@@ -332,7 +340,7 @@ impl Mirror {
         }
     }
 
-    fn has_read(&mut self, reading: Reading) {
+    fn has_read(&mut self, reading: &Reading) {
         let Some(believed) = &mut self.believed else {
             return;
         };

@@ -357,112 +357,134 @@ fn words_are_told_as_the_problem_and_the_problem_expert_write_them() {
     );
 }
 
+/// A run and a problem expert, between which messages are late and lost.
+struct Play {
+    rng: ChaCha8Rng,
+    expert: Expert,
+    mirror: Mirror,
+    /// What the run believes: what it was told, and what it does.
+    facts: BTreeMap<String, bool>,
+    value: f64,
+    open: Vec<(CallId, Call)>,
+    answers: Vec<(CallId, Answer)>,
+}
+
+impl Play {
+    fn new(seed: u64) -> Self {
+        let facts = [("p a", true), ("here", true)];
+        let mut play = Self {
+            rng: ChaCha8Rng::seed_from_u64(seed),
+            expert: Expert::with(&["p a", "here"], &[("n", 1.0)]),
+            mirror: Mirror::default(),
+            facts: facts.map(|(it, truth)| (it.to_owned(), truth)).into(),
+            value: 1.0,
+            open: Vec::new(),
+            answers: Vec::new(),
+        };
+        play.mirror.found(true);
+        play.mirror.begin("");
+        let all = facts.map(|(it, truth)| fact(&format!("({it})"), truth));
+        play.mirror.believe(&all, &[number("(n)", 1.0)]);
+        play
+    }
+
+    fn believe(&mut self, it: &str, truth: bool) {
+        if self.facts.insert(it.to_owned(), truth) != Some(truth) {
+            self.mirror.believe(&[fact(&format!("({it})"), truth)], &[]);
+        }
+    }
+
+    fn count(&mut self, value: f64) {
+        self.value = value;
+        self.mirror.believe(&[], &[number("(n)", value)]);
+    }
+
+    /// Something happens; once all is quiet, only messages get through, and none is lost.
+    fn act(&mut self, is_busy: bool, others_act: bool) {
+        let it = *["p a", "p b", "q"].choose(&mut self.rng).expect("some");
+        match self.rng.random_range(0..8) {
+            0 if is_busy => {
+                let truth = self.rng.random();
+                self.believe(it, truth);
+            }
+            1 if is_busy => self.count(self.value + 1.0),
+            2 if is_busy && others_act => {
+                let facts = &mut self.expert.facts;
+                let is_added = self.rng.random();
+                self.expert.has_changed |= if is_added {
+                    facts.insert(it.to_owned())
+                } else {
+                    facts.remove(it)
+                };
+            }
+            3 if is_busy && others_act => {
+                let value = f64::from(self.rng.random_range(100..900));
+                self.expert.numbers.insert("n".to_owned(), value);
+                self.expert.has_changed = true;
+            }
+            4..6 if !self.open.is_empty() => {
+                let (id, call) = self.open.remove(0);
+                let answer = self.expert.answer(&call);
+                if !is_busy || self.rng.random_bool(0.8) {
+                    self.answers.push((id, answer));
+                }
+            }
+            6..8 if !self.answers.is_empty() => {
+                let place = self.rng.random_range(0..self.answers.len());
+                let (id, answer) = self.answers.remove(place);
+                self.mirror.answered(id, answer);
+            }
+            _ => {}
+        }
+    }
+
+    /// What is due, and what the run sees, which it believes.
+    fn settle(&mut self, now: Duration, is_busy: bool) -> Vec<Seen> {
+        if std::mem::take(&mut self.expert.has_changed) {
+            self.mirror.notified();
+        }
+        self.mirror.tick(now);
+        for call in self.mirror.calls() {
+            if !is_busy || self.rng.random_bool(0.9) {
+                self.open.push(call);
+            }
+        }
+        let seen = self.mirror.seen();
+        for it in &seen {
+            match it {
+                Seen::Fact(it, truth) => self.believe(it.trim_matches(['(', ')']), *truth),
+                Seen::Value(_, value) => self.count(*value),
+            }
+        }
+        seen
+    }
+}
+
 /// Run and others change the same facts and numbers at random, while messages are late and lost. When all is quiet, both
 /// sides have the same; and as long as others change nothing, nothing is seen.
 #[test]
 fn both_sides_come_to_the_same_whoever_changes_what_and_when() {
-    let names = ["p a", "p b", "q"];
     let (mut seen_of_others, mut conflicts) = (0, 0);
     for seed in 0..400 {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let others_act = seed % 2 == 0;
-        let mut expert = Expert::with(&["p a", "here"], &[("n", 1.0)]);
-        let mut mirror = Mirror::default();
-        mirror.found(true);
-        mirror.begin("");
-        // What the run believes: what it was told, and what it does.
-        let mut facts: BTreeMap<String, bool> = [("p a", true), ("here", true)]
-            .map(|(it, truth)| (it.to_owned(), truth))
-            .into();
-        let mut value = 1.0;
-        let all: Vec<_> = facts
-            .iter()
-            .map(|(it, truth)| fact(&format!("({it})"), *truth))
-            .collect();
-        mirror.believe(&all, &[number("(n)", value)]);
-        let mut open: Vec<(CallId, Call)> = Vec::new();
-        let mut answers: Vec<(CallId, Answer)> = Vec::new();
+        let mut play = Play::new(seed);
         for step in 0..400_u64 {
-            let now = Duration::from_millis(step * 200);
             let is_busy = step < 200;
-            match rng.random_range(0..8) {
-                0 if is_busy => {
-                    let it = *names.choose(&mut rng).expect("some");
-                    let truth = rng.random();
-                    if facts.insert(it.to_owned(), truth) != Some(truth) {
-                        mirror.believe(&[fact(&format!("({it})"), truth)], &[]);
-                    }
-                }
-                1 if is_busy => {
-                    value += 1.0;
-                    mirror.believe(&[], &[number("(n)", value)]);
-                }
-                2 if is_busy && others_act => {
-                    let it = (*names.choose(&mut rng).expect("some")).to_owned();
-                    let has_changed = if rng.random() {
-                        expert.facts.insert(it)
-                    } else {
-                        expert.facts.remove(&it)
-                    };
-                    expert.has_changed |= has_changed;
-                }
-                3 if is_busy && others_act => {
-                    let number = f64::from(rng.random_range(100..900));
-                    expert.numbers.insert("n".to_owned(), number);
-                    expert.has_changed = true;
-                }
-                4..6 if !open.is_empty() => {
-                    let (id, call) = open.remove(0);
-                    let answer = expert.answer(&call);
-                    // Lost is lost, but not once all is quiet.
-                    if !is_busy || rng.random_bool(0.8) {
-                        answers.push((id, answer));
-                    }
-                }
-                6..8 if !answers.is_empty() => {
-                    let (id, answer) = answers.remove(rng.random_range(0..answers.len()));
-                    mirror.answered(id, answer);
-                }
-                _ => {}
-            }
-            if std::mem::take(&mut expert.has_changed) {
-                mirror.notified();
-            }
-            mirror.tick(now);
-            for (id, call) in mirror.calls() {
-                if !is_busy || rng.random_bool(0.9) {
-                    open.push((id, call));
-                }
-            }
-            for seen in mirror.seen() {
-                assert!(others_act, "seed {seed}, step {step}: {seen:?} is an echo");
-                seen_of_others += 1;
-                match seen {
-                    Seen::Fact(it, truth) => {
-                        let it = it.trim_matches(['(', ')']).to_owned();
-                        facts.insert(it.clone(), truth);
-                        mirror.believe(&[fact(&format!("({it})"), truth)], &[]);
-                    }
-                    Seen::Value(_, seen) => {
-                        value = seen;
-                        mirror.believe(&[], &[number("(n)", value)]);
-                    }
-                }
-            }
-            conflicts += usize::from(!mirror.is_idle() && mirror.reading.is_some());
+            play.act(is_busy, others_act);
+            let seen = play.settle(Duration::from_millis(step * 200), is_busy);
+            assert!(
+                others_act || seen.is_empty(),
+                "seed {seed}, step {step}: {seen:?} is an echo"
+            );
+            seen_of_others += seen.len();
+            conflicts += usize::from(!play.mirror.is_idle() && play.mirror.reading.is_some());
         }
-        let believed: BTreeSet<_> = facts
-            .iter()
-            .filter(|(_, truth)| **truth)
-            .map(|(it, _)| it.clone())
-            .collect();
-        assert_eq!(believed, expert.facts, "seed {seed}");
-        assert_eq!(
-            expert.numbers.get("n").map(|it| it.to_bits()),
-            Some(value.to_bits()),
-            "seed {seed}"
-        );
-        assert!(mirror.is_idle(), "seed {seed}");
+        let believed = play.facts.iter().filter(|(_, truth)| **truth);
+        let believed: BTreeSet<_> = believed.map(|(it, _)| it.clone()).collect();
+        assert_eq!(believed, play.expert.facts, "seed {seed}");
+        let held = play.expert.numbers.get("n").copied().map(f64::to_bits);
+        assert_eq!(held, Some(play.value.to_bits()), "seed {seed}");
+        assert!(play.mirror.is_idle(), "seed {seed}");
     }
     // Scripts in which nothing happens would show nothing.
     assert!(

@@ -114,9 +114,12 @@ pub(super) struct NetworkOptions {
     /// [default: all; with `ROS_LOCALHOST_ONLY=1` in the environment, 127.0.0.1]
     #[arg(long, global = true, value_name = "ADDRESS")]
     interface: Vec<IpAddr>,
-    /// Whether what a run changes is told to PlanSys2's problem expert, and what others change there to the run
-    /// [default: follow with `serve`, else ignore]
-    #[arg(long, global = true, value_name = "HOW")]
+    #[arg(
+        long,
+        global = true,
+        value_name = "HOW",
+        help = "Whether what a run changes is told to PlanSys2's problem expert, and what others change there to the run [default: follow for `serve`, else ignore]"
+    )]
     problem_expert: Option<ProblemExpert>,
 }
 
