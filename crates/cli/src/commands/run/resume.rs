@@ -173,12 +173,9 @@ pub(in crate::commands) fn run(
     let rested = stored.rested(&task);
     let rested = rested.map_err(|error| unreadable(&name, &error.to_string()))?;
     let now = stored.snapshot.as_ref().map(|it| it.now().clone());
-    let first = if spec.has_plan {
-        let first = stored.first_plan(&task);
-        first.map_err(|error| unreadable(&name, &error.to_string()))?
-    } else {
-        None
-    };
+    let first = spec.has_plan.then(|| stored.first_plan(&task)).transpose();
+    let first = first.map_err(|error| unreadable(&name, &error.to_string()))?;
+    let first = first.flatten();
     let mut file = JournalFile::go_on(path, &journal, length)?.in_segments(host.segments());
     let interrupt = Interrupt::listen();
     let attendance = host.attend(&spec, &task, &interrupt)?;

@@ -52,7 +52,7 @@ impl Expert {
         let states = "plansys2_msgs::srv::dds_::GetStates";
         let mut ask_states = |name: &str| {
             network.ask(&format!("problem_expert/{name}"), states, |to, it| {
-                Input::Expert(Heard::States(to, it))
+                Input::Expert(Heard::States(to.identity, it))
             })
         };
         let predicates = ask_states("get_problem_predicates")?;
@@ -60,7 +60,7 @@ impl Expert {
         let affect = "plansys2_msgs::srv::dds_::AffectNode";
         let mut ask_to = |name: &str| {
             network.ask(&format!("problem_expert/{name}"), affect, |to, it| {
-                Input::Expert(Heard::Done(to, it))
+                Input::Expert(Heard::Done(to.identity, it))
             })
         };
         Ok(Self {

@@ -4,21 +4,24 @@
 //! changed between Humble and Iron, and nodes of one side abort when they read that of the other. Who does not
 //! speak of nodes can do no harm to either; topics, services and actions need no nodes.
 
+mod raw;
+
 use std::collections::BTreeSet;
 use std::io;
+use std::marker::PhantomData;
 use std::sync::mpsc::Sender;
 use std::thread;
 use std::time::Instant;
 
 use rustdds::mio1::event::Source;
 use rustdds::mio1::{Events, Interest, Poll, Registry, Token};
-use rustdds::no_key::{DataWriterCdr, SimpleDataReaderCdr};
+use rustdds::no_key::{DataWriterCdr, DeserializerAdapter as _, SimpleDataReader};
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::rpc::SampleIdentity;
 use rustdds::{
-    DataWriterStatus, DomainParticipant, DomainParticipantBuilder, Duration, GUID, Publisher,
-    QosPolicies, QosPolicyBuilder, SequenceNumber, StatusEvented as _, Subscriber, Timestamp,
-    Topic, TopicKind, WriteOptionsBuilder,
+    CDRDeserializerAdapter, DataWriterStatus, DomainParticipant, DomainParticipantBuilder,
+    Duration, GUID, Publisher, QosPolicies, QosPolicyBuilder, SequenceNumber, StatusEvented as _,
+    Subscriber, Timestamp, Topic, TopicKind, WriteOptionsBuilder,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -26,9 +29,18 @@ use serde::de::DeserializeOwned;
 use super::Input;
 use super::options::Settings;
 use super::session::now;
+use raw::{Raw, RawAdapter};
 
 /// Which request an answer belongs to.
-pub(super) type Asker = SampleIdentity;
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asker {
+    pub(super) identity: SampleIdentity,
+    /// Where `ROS` runs on Cyclone DDS: what stands before each request and each answer.
+    header: Option<Header>,
+}
+
+/// Who has asked, and the number of the question, as `rmw_cyclonedds` has them.
+type Header = (u64, i64);
 
 /// A connection to a domain of DDS.
 pub(super) struct Network {
@@ -87,6 +99,7 @@ impl Network {
     fn hear<T>(
         &mut self,
         topic: &Topic,
+        is_service: bool,
         input: impl Fn(Asker, T) -> Input + Send + 'static,
     ) -> Result<(), String>
     where
@@ -94,7 +107,12 @@ impl Network {
     {
         let reader = self.subscriber.create_simple_datareader_no_key(topic, None);
         let reader = reader.map_err(|e| format!("cannot listen: {e}"))?;
-        self.ears.push(Box::new(Listening { reader, input }));
+        self.ears.push(Box::new(Listening {
+            reader,
+            is_service,
+            input,
+            message: PhantomData,
+        }));
         Ok(())
     }
 
@@ -133,7 +151,7 @@ impl Network {
         T: DeserializeOwned + Send + 'static,
     {
         let topic = self.topic("rt", name, kind, qos)?;
-        self.hear(&topic, move |_, message| input(message))
+        self.hear(&topic, false, move |_, message| input(message))
     }
 
     /// Serves a service; `kind` is its type, as in `plansys2_msgs::srv::dds_::GetPlan`.
@@ -157,7 +175,7 @@ impl Network {
             &format!("{kind}_Request_"),
             &qos,
         )?;
-        self.hear(&requests, input)?;
+        self.hear(&requests, true, input)?;
         let replies = self.topic(
             "rr",
             &format!("{name}Reply"),
@@ -189,7 +207,7 @@ impl Network {
         let qos = reliable(10);
         let (reply, request) = (format!("{name}Reply"), format!("{name}Request"));
         let replies = self.topic("rr", &reply, &format!("{kind}_Response_"), &qos)?;
-        self.hear(&replies, input)?;
+        self.hear(&replies, true, input)?;
         let requests = self.topic("rq", &request, &format!("{kind}_Request_"), &qos)?;
         let writer = self.publisher.create_datawriter_no_key_cdr(&requests, None);
         Ok(Requests {
@@ -282,7 +300,8 @@ impl<T: Serialize> Requests<T> {
     /// Whether anybody serves it. To be called a few times a second.
     pub(super) fn is_served(&mut self) -> bool {
         note_readers(&self.writer, &mut self.found);
-        !self.found.is_empty()
+        // Who speaks by Cyclone DDS would take a request for another one.
+        self.found.iter().any(|it| !is_cyclone(it))
     }
 }
 
@@ -307,7 +326,7 @@ const FOUND_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
 
 /// By what a service is answered.
 pub(super) struct Answers<T: Serialize> {
-    writer: DataWriterCdr<T>,
+    writer: DataWriterCdr<Answer<T>>,
     /// Who can hear an answer: a request may come before its sender is found, and what is said then is lost.
     found: BTreeSet<GUID>,
     waiting: Vec<(Asker, T, Instant)>,
@@ -331,17 +350,24 @@ impl<T: Serialize> Answers<T> {
         note_readers(&self.writer, &mut self.found);
         let clock = now();
         let is_due = |(asker, _, since): &mut (Asker, T, Instant)| {
-            let reader = asker.writer_guid;
-            // Whoever names no reader cannot be waited for.
-            !reader.entity_id.entity_kind.is_reader()
-                || self.found.contains(&reader)
-                || clock.saturating_duration_since(*since) >= FOUND_WITHIN
+            let who = asker.identity.writer_guid;
+            let is_found = if who.entity_id.entity_kind.is_reader() {
+                self.found.contains(&who)
+            } else {
+                // Who names no reader has one all the same, where the question came from; but it may be that of another.
+                asker.header.is_none() || self.found.iter().any(|it| it.prefix == who.prefix)
+            };
+            is_found || clock.saturating_duration_since(*since) >= FOUND_WITHIN
         };
         for (asker, response, _) in self.waiting.extract_if(.., is_due) {
             let options = WriteOptionsBuilder::new()
                 .source_timestamp(Timestamp::now())
-                .related_sample_identity(asker);
-            let written = self.writer.write_with_options(response, options.build());
+                .related_sample_identity(asker.identity);
+            let answer = match asker.header {
+                Some(header) => Answer::Headed(header, response),
+                None => Answer::Plain(response),
+            };
+            let written = self.writer.write_with_options(answer, options.build());
             written.map_err(|e| format!("an answer was not sent: {e}"))?;
         }
         Ok(())
@@ -355,9 +381,38 @@ trait Ear: Send {
     fn forward(&self, inputs: &Sender<Input>) -> bool;
 }
 
-struct Listening<T: DeserializeOwned + 'static, F> {
-    reader: SimpleDataReaderCdr<T>,
+/// On the wire there is nothing but its parts.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Answer<T> {
+    Plain(T),
+    Headed(Header, T),
+}
+
+struct Listening<T, F> {
+    reader: SimpleDataReader<Raw, RawAdapter>,
+    /// Whether messages are requests or answers.
+    is_service: bool,
     input: F,
+    message: PhantomData<fn() -> T>,
+}
+
+impl<T: DeserializeOwned + 'static, F> Listening<T, F> {
+    /// From whom it is, and what it says.
+    fn read(&self, raw: &Raw, writer: GUID) -> Result<(Option<Header>, T), String> {
+        let wrong = |e: rustdds::cdr_encoding::Error| e.to_string();
+        if self.is_service && is_cyclone(&writer) {
+            let read = CDRDeserializerAdapter::<(Header, T)>::from_bytes(&raw.bytes, raw.encoding);
+            return read.map(|(header, it)| (Some(header), it)).map_err(wrong);
+        }
+        let read = CDRDeserializerAdapter::<T>::from_bytes(&raw.bytes, raw.encoding);
+        read.map(|it| (None, it)).map_err(wrong)
+    }
+}
+
+/// Whether somebody speaks by Cyclone DDS, which has these first bytes in all of its names.
+fn is_cyclone(guid: &GUID) -> bool {
+    guid.to_bytes().starts_with(&[0x01, 0x10])
 }
 
 impl<T, F> Ear for Listening<T, F>
@@ -379,11 +434,14 @@ where
                         writer_guid: sample.writer_guid(),
                         sequence_number: sample.sequence_number,
                     };
-                    let mut asker = sample.related_sample_identity().unwrap_or(own);
-                    if asker.sequence_number == SequenceNumber::UNKNOWN {
-                        asker.sequence_number = own.sequence_number;
+                    let mut identity = sample.related_sample_identity().unwrap_or(own);
+                    if identity.sequence_number == SequenceNumber::UNKNOWN {
+                        identity.sequence_number = own.sequence_number;
                     }
-                    (self.input)(asker, sample.into_value())
+                    match self.read(&sample.into_value(), own.writer_guid) {
+                        Ok((header, message)) => (self.input)(Asker { identity, header }, message),
+                        Err(why) => Input::Trouble(format!("a message was not understood: {why}")),
+                    }
                 }
                 Ok(None) => return true,
                 Err(error) => Input::Trouble(format!("a message was not understood: {error}")),

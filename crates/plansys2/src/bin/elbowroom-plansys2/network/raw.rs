@@ -1,0 +1,53 @@
+//! Messages as they come: how they are to be read depends on who has sent them.
+
+use std::convert::Infallible;
+
+use rustdds::RepresentationIdentifier;
+use rustdds::no_key::{Decode, DefaultDecoder, DeserializerAdapter};
+
+/// The bytes of a message, and how they are to be read.
+pub(super) struct Raw {
+    pub(super) bytes: Vec<u8>,
+    pub(super) encoding: RepresentationIdentifier,
+}
+
+/// Reads nothing.
+pub(super) struct RawAdapter;
+
+impl DeserializerAdapter<Raw> for RawAdapter {
+    type Error = Infallible;
+    type Decoded = Raw;
+
+    fn supported_encodings() -> &'static [RepresentationIdentifier] {
+        &[
+            RepresentationIdentifier::CDR_BE,
+            RepresentationIdentifier::CDR_LE,
+        ]
+    }
+
+    fn transform_decoded(decoded: Raw) -> Raw {
+        decoded
+    }
+}
+
+/// Takes the bytes as they are.
+#[derive(Clone)]
+pub(super) struct AsItIs;
+
+impl Decode<'_, Raw> for AsItIs {
+    type Error = Infallible;
+
+    fn decode_bytes(
+        self,
+        bytes: &[u8],
+        encoding: RepresentationIdentifier,
+    ) -> Result<Raw, Infallible> {
+        let bytes = bytes.to_vec();
+        Ok(Raw { bytes, encoding })
+    }
+}
+
+impl DefaultDecoder<Raw> for RawAdapter {
+    type Decoder = AsItIs;
+    const DECODER: AsItIs = AsItIs;
+}
