@@ -400,7 +400,32 @@ def a_run_tells_the_problem_expert_if_it_is_asked_to(stage):
     assert changes(stage)[1] == AT_THE_GATE
 
 
+def clients_on_cyclone_dds_are_answered_beside_others(stage):
+    stage.environment["CYCLONEDDS_URI"] = (
+        "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo' multicast='true'/></Interfaces></General>"
+        "</Domain></CycloneDDS>"
+    )
+    told = []
+
+    def ask(client):
+        script = os.path.join(HERE, "cyclone.py")
+        other = stage.start([sys.executable, script, *YARD[:2]], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        out, errors = other.communicate(timeout=PATIENCE)
+        assert other.returncode == 0, errors
+        told.append(json.loads(out))
+
+    said = serve(stage, DRIVERS, meanwhile=ask)
+    assert said["executed"]["outcome"] == "succeeded"
+    (told,) = told
+    assert told["state"] in ("unconfigured", "inactive", "active")
+    assert told["planned"] == [True, [[0.0, "(move r1 shed gate)", 2.0], [0.0, "(move r2 barn gate)", 2.0],
+                                      [2.0, "(signal r1 gate)", 1.0]]]  # fmt: skip
+    assert not told["broken"][0] and "domain.pddl:1:9" in told["broken"][1]
+    assert "not understood" not in stage.program
+
+
 PROGRAM_ONLY = [
+    clients_on_cyclone_dds_are_answered_beside_others,
     what_is_done_is_told_to_the_problem_expert,
     what_others_tell_the_problem_expert_is_heeded,
     what_the_problem_expert_refuses_is_said_and_the_run_goes_on,

@@ -35,7 +35,7 @@ use raw::{Raw, RawAdapter};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asker {
     pub(super) identity: SampleIdentity,
-    /// Where `ROS` runs on Cyclone DDS: what stands before each request and each answer.
+    /// Where ROS runs on Cyclone DDS: what stands before each request and each answer.
     header: Option<Header>,
 }
 
