@@ -20,52 +20,33 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Empty
 
 
-class Expert:
-    def __init__(self, spec, log):
-        self.spec, self.log = spec, log
+CHANGES = ("add_problem_predicate", "remove_problem_predicate", "add_problem_function", "update_problem_function",
+           "remove_problem_function")  # fmt: skip
+PREDICATE, FUNCTION = 5, 6
+
+
+class Knowledge:
+    """What it knows, and what is changed of that; `notify` tells others."""
+
+    def __init__(self, spec, log, notify):
+        self.spec, self.log, self.notify = spec, log, notify
         self.facts, self.numbers = set(spec["facts"]), dict(spec.get("numbers", {}))
         self.then = list(spec.get("then", []))
-        self.node = rclpy.create_node("problem_expert")
-        self.notify = self.node.create_publisher(Empty, "problem_expert/update_notify", QoSProfile(depth=100))
-        for name in ("predicates", "functions"):
-            self.serve(GetStates, f"get_problem_{name}", getattr(self, name))
-        for name in ("add_problem_predicate", "remove_problem_predicate", "add_problem_function",
-                     "update_problem_function", "remove_problem_function"):  # fmt: skip
-            self.serve(AffectNode, name, lambda request, answer, name=name: self.affect(name, request, answer))
 
-    def serve(self, kind, name, answered):
-        def answer(request, response):
-            while self.spec.get("mute") and rclpy.ok():
-                time.sleep(1)
-            return answered(request, response)
-
-        self.node.create_service(kind, f"problem_expert/{name}", answer)
-
-    def predicates(self, request, answer):
-        answer.success, answer.states = True, [node(it, Node.PREDICATE) for it in sorted(self.facts)]
-        return answer
-
-    def functions(self, request, answer):
-        answer.success = True
-        answer.states = [node(it, Node.FUNCTION, value) for it, value in sorted(self.numbers.items())]
-        return answer
-
-    def affect(self, name, request, answer):
-        word = " ".join([request.node.name, *(it.name for it in request.node.parameters)])
+    def affect(self, name, node):
+        """Whether that was done."""
+        word = " ".join([node.name, *(it.name for it in node.parameters)])
         what = name.split("_")[0]
         is_fact = name.endswith("predicate")
         is_wrong = word == self.spec.get("refuses") or (what == "update" and word not in self.numbers)
-        is_wrong |= request.node.node_type != (Node.PREDICATE if is_fact else Node.FUNCTION)
-        if is_wrong:
-            answer.error_info = "it is not valid"
-            return answer
-        answer.success = True
-        told = f"{what} {word}" if is_fact or what == "remove" else f"{what} {word} {request.node.value:g}"
+        if is_wrong or node.node_type != (PREDICATE if is_fact else FUNCTION):
+            return False
+        told = f"{what} {word}" if is_fact or what == "remove" else f"{what} {word} {node.value:g}"
         self.change(told, is_fact, "the run")
         if self.then and self.then[0]["when"] == told:
             for it in self.then.pop(0)["then"]:
                 self.change(it, not it.startswith("update"), "somebody else")
-        return answer
+        return True
 
     def change(self, told, is_fact, who):
         what, word = told.split(" ", 1)
@@ -79,7 +60,41 @@ class Expert:
         line = {"who": who, "told": told, "facts": sorted(self.facts), "numbers": self.numbers}
         self.log.write(json.dumps(line) + "\n")
         self.log.flush()
-        self.notify.publish(Empty())
+        self.notify()
+
+
+class Expert:
+    def __init__(self, spec, log):
+        self.spec = spec
+        self.node = rclpy.create_node("problem_expert")
+        notify = self.node.create_publisher(Empty, "problem_expert/update_notify", QoSProfile(depth=100))
+        self.knowledge = Knowledge(spec, log, lambda: notify.publish(Empty()))
+        for name in ("predicates", "functions"):
+            self.serve(GetStates, f"get_problem_{name}", getattr(self, name))
+        for name in CHANGES:
+            self.serve(AffectNode, name, lambda request, answer, name=name: self.affect(name, request, answer))
+
+    def serve(self, kind, name, answered):
+        def answer(request, response):
+            while self.spec.get("mute") and rclpy.ok():
+                time.sleep(1)
+            return answered(request, response)
+
+        self.node.create_service(kind, f"problem_expert/{name}", answer)
+
+    def predicates(self, request, answer):
+        answer.success, answer.states = True, [node(it, PREDICATE) for it in sorted(self.knowledge.facts)]
+        return answer
+
+    def functions(self, request, answer):
+        answer.success = True
+        answer.states = [node(it, FUNCTION, value) for it, value in sorted(self.knowledge.numbers.items())]
+        return answer
+
+    def affect(self, name, request, answer):
+        answer.success = self.knowledge.affect(name, request.node)
+        answer.error_info = "" if answer.success else "it is not valid"
+        return answer
 
 
 def node(words, kind, value=0.0):

@@ -219,11 +219,11 @@ def a_missing_performer_is_named(stage):
     assert stage.log() == []
 
 
-def begin_expert(stage, **more):
+def begin_expert(stage, script="expert.py", **more):
     """A problem expert that has what the problem of the yard says, but for a number."""
     spec = {"facts": ["at r1 shed", "at r2 barn"], "numbers": {"trips r1": 0}, **more}
     stage.expert_file = os.path.join(stage.folder, "expert.jsonl")
-    expert = stage.start([sys.executable, os.path.join(HERE, "expert.py"), json.dumps(spec), stage.expert_file])
+    expert = stage.start([sys.executable, os.path.join(HERE, script), json.dumps(spec), stage.expert_file])
     stage.wait_for("the problem expert", lambda: os.path.exists(stage.expert_file), expert)
     return expert
 
@@ -400,11 +400,29 @@ def a_run_tells_the_problem_expert_if_it_is_asked_to(stage):
     assert changes(stage)[1] == AT_THE_GATE
 
 
-def clients_on_cyclone_dds_are_answered_beside_others(stage):
+def use_cyclone(stage):
     stage.environment["CYCLONEDDS_URI"] = (
         "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo' multicast='true'/></Interfaces></General>"
         "</Domain></CycloneDDS>"
     )
+
+
+def a_problem_expert_on_cyclone_dds_is_told_and_heard(stage):
+    use_cyclone(stage)
+    stage.world += " --problem-expert follow"
+    then = [{"when": "add at r2 gate", "then": ["remove at r2 gate", "add at r2 barn"]}]
+    expert = begin_expert(stage, "cyclone_expert.py", then=then)
+    try:
+        stage.play(DRIVERS, YARD)
+    finally:
+        end(expert)
+    assert stage.code == 0 and "goal reached" in stage.out
+    facts, numbers = changes(stage)[1]
+    assert facts == AT_THE_GATE[0] and numbers == {"trips r1": 1.0, "trips r2": 2.0}
+
+
+def clients_on_cyclone_dds_are_answered_beside_others(stage):
+    use_cyclone(stage)
     told = []
 
     def ask(client):
@@ -425,6 +443,7 @@ def clients_on_cyclone_dds_are_answered_beside_others(stage):
 
 
 PROGRAM_ONLY = [
+    a_problem_expert_on_cyclone_dds_is_told_and_heard,
     clients_on_cyclone_dds_are_answered_beside_others,
     what_is_done_is_told_to_the_problem_expert,
     what_others_tell_the_problem_expert_is_heeded,

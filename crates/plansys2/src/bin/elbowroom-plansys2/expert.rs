@@ -6,9 +6,8 @@ use std::time::Duration;
 use elbowroom_plansys2::interface::Empty;
 use elbowroom_plansys2::knowledge::{AffectRequest, AffectResponse, StatesResponse};
 use elbowroom_plansys2::{Answer, Call, CallId, Mirror, Seen};
-use rustdds::rpc::SampleIdentity;
 
-use super::network::{Network, Requests, reliable};
+use super::network::{Asker, Network, Requests, reliable};
 use super::{Input, remark};
 
 /// So many answers are waited for; of what was asked before that, none will come.
@@ -19,9 +18,9 @@ pub(super) enum Heard {
     /// Something has changed there.
     Changed,
     /// An answer to that request, which may be somebody else's.
-    States(SampleIdentity, StatesResponse),
+    States(Asker, StatesResponse),
     /// Likewise.
-    Done(SampleIdentity, AffectResponse),
+    Done(Asker, AffectResponse),
 }
 
 /// A client of it.
@@ -34,7 +33,7 @@ pub(super) struct Expert {
     define: Requests<AffectRequest>,
     update: Requests<AffectRequest>,
     forget: Requests<AffectRequest>,
-    open: VecDeque<(SampleIdentity, CallId)>,
+    open: VecDeque<(Asker, CallId)>,
 }
 
 impl Expert {
@@ -52,7 +51,7 @@ impl Expert {
         let states = "plansys2_msgs::srv::dds_::GetStates";
         let mut ask_states = |name: &str| {
             network.ask(&format!("problem_expert/{name}"), states, |to, it| {
-                Input::Expert(Heard::States(to.identity, it))
+                Input::Expert(Heard::States(to, it))
             })
         };
         let predicates = ask_states("get_problem_predicates")?;
@@ -60,7 +59,7 @@ impl Expert {
         let affect = "plansys2_msgs::srv::dds_::AffectNode";
         let mut ask_to = |name: &str| {
             network.ask(&format!("problem_expert/{name}"), affect, |to, it| {
-                Input::Expert(Heard::Done(to.identity, it))
+                Input::Expert(Heard::Done(to, it))
             })
         };
         Ok(Self {
@@ -106,7 +105,10 @@ impl Expert {
             }
             Heard::Done(to, it) => (to, Answer::Done(outcome(it.success, it.error_info))),
         };
-        let place = self.open.iter().position(|(asked, _)| *asked == to);
+        let place = self
+            .open
+            .iter()
+            .position(|(asked, _)| asked.is_meant_by(&to));
         if let Some((_, call)) = place.and_then(|place| self.open.remove(place)) {
             self.mirror.answered(call, answer);
         }
@@ -125,15 +127,15 @@ impl Expert {
         self.mirror.tick(now);
         for (id, call) in self.mirror.calls() {
             let to =
-                |requests: &Requests<AffectRequest>, node| requests.say(AffectRequest { node });
+                |requests: &mut Requests<AffectRequest>, node| requests.say(AffectRequest { node });
             let asked = match call {
                 Call::Predicates => self.predicates.say(Empty::default()),
                 Call::Functions => self.functions.say(Empty::default()),
-                Call::Add(node) => to(&self.add, node),
-                Call::Remove(node) => to(&self.remove, node),
-                Call::Define(node) => to(&self.define, node),
-                Call::Update(node) => to(&self.update, node),
-                Call::Forget(node) => to(&self.forget, node),
+                Call::Add(node) => to(&mut self.add, node),
+                Call::Remove(node) => to(&mut self.remove, node),
+                Call::Define(node) => to(&mut self.define, node),
+                Call::Update(node) => to(&mut self.update, node),
+                Call::Forget(node) => to(&mut self.forget, node),
             };
             match asked {
                 Ok(asked) => self.open.push_back((asked, id)),

@@ -20,8 +20,8 @@ use rustdds::policy::{Durability, History, Reliability};
 use rustdds::rpc::SampleIdentity;
 use rustdds::{
     CDRDeserializerAdapter, DataWriterStatus, DomainParticipant, DomainParticipantBuilder,
-    Duration, GUID, Publisher, QosPolicies, QosPolicyBuilder, SequenceNumber, StatusEvented as _,
-    Subscriber, Timestamp, Topic, TopicKind, WriteOptionsBuilder,
+    Duration, GUID, Publisher, QosPolicies, QosPolicyBuilder, RTPSEntity as _, SequenceNumber,
+    StatusEvented as _, Subscriber, Timestamp, Topic, TopicKind, WriteOptionsBuilder,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -41,6 +41,16 @@ pub(super) struct Asker {
 
 /// Who has asked, and the number of the question, as `rmw_cyclonedds` has them.
 type Header = (u64, i64);
+
+impl Asker {
+    /// Whether an answer to `other` is one to this request.
+    pub(super) fn is_meant_by(&self, other: &Self) -> bool {
+        match (self.header, other.header) {
+            (None, None) => self.identity == other.identity,
+            (header, other) => header == other,
+        }
+    }
+}
 
 /// A connection to a domain of DDS.
 pub(super) struct Network {
@@ -210,8 +220,14 @@ impl Network {
         self.hear(&replies, true, input)?;
         let requests = self.topic("rq", &request, &format!("{kind}_Request_"), &qos)?;
         let writer = self.publisher.create_datawriter_no_key_cdr(&requests, None);
+        let writer: DataWriterCdr<Framed<Request>> =
+            writer.map_err(|e| format!("cannot ask {name}: {e}"))?;
+        let own = u128::from_le_bytes(writer.guid().to_bytes());
+        let half = |it: u128| u64::try_from(it & u128::from(u64::MAX)).unwrap_or_default();
         Ok(Requests {
-            writer: writer.map_err(|e| format!("cannot ask {name}: {e}"))?,
+            // Half as long as the name, and as good as its own.
+            last: (half(own) ^ half(own >> 64), 0),
+            writer,
             found: BTreeSet::new(),
         })
     }
@@ -281,9 +297,11 @@ impl<T: Serialize> Mouth<T> {
 
 /// By what a service is asked.
 pub(super) struct Requests<T: Serialize> {
-    writer: DataWriterCdr<T>,
+    writer: DataWriterCdr<Framed<T>>,
     /// Who serves it.
     found: BTreeSet<GUID>,
+    /// Of the last request to somebody on Cyclone DDS.
+    last: Header,
 }
 
 impl<T: Serialize> Requests<T> {
@@ -291,17 +309,25 @@ impl<T: Serialize> Requests<T> {
     ///
     /// # Errors
     /// It could not be sent.
-    pub(super) fn say(&self, request: T) -> Result<SampleIdentity, String> {
+    pub(super) fn say(&mut self, request: T) -> Result<Asker, String> {
         let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
-        let written = self.writer.write_with_options(request, options.build());
-        written.map_err(|e| format!("a request was not sent: {e}"))
+        // Nobody understands both: where both are there, those on Fast DDS are asked.
+        let (header, framed) = if self.found.iter().all(is_cyclone) {
+            self.last.1 += 1;
+            (Some(self.last), Framed::Headed(self.last, request))
+        } else {
+            (None, Framed::Plain(request))
+        };
+        let written = self.writer.write_with_options(framed, options.build());
+        written
+            .map(|identity| Asker { identity, header })
+            .map_err(|e| format!("a request was not sent: {e}"))
     }
 
     /// Whether anybody serves it. To be called a few times a second.
     pub(super) fn is_served(&mut self) -> bool {
         note_readers(&self.writer, &mut self.found);
-        // Who speaks by Cyclone DDS would take a request for another one.
-        self.found.iter().any(|it| !is_cyclone(it))
+        !self.found.is_empty()
     }
 }
 
@@ -326,7 +352,7 @@ const FOUND_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
 
 /// By what a service is answered.
 pub(super) struct Answers<T: Serialize> {
-    writer: DataWriterCdr<Answer<T>>,
+    writer: DataWriterCdr<Framed<T>>,
     /// Who can hear an answer: a request may come before its sender is found, and what is said then is lost.
     found: BTreeSet<GUID>,
     waiting: Vec<(Asker, T, Instant)>,
@@ -364,8 +390,8 @@ impl<T: Serialize> Answers<T> {
                 .source_timestamp(Timestamp::now())
                 .related_sample_identity(asker.identity);
             let answer = match asker.header {
-                Some(header) => Answer::Headed(header, response),
-                None => Answer::Plain(response),
+                Some(header) => Framed::Headed(header, response),
+                None => Framed::Plain(response),
             };
             let written = self.writer.write_with_options(answer, options.build());
             written.map_err(|e| format!("an answer was not sent: {e}"))?;
@@ -384,7 +410,7 @@ trait Ear: Send {
 /// On the wire there is nothing but its parts.
 #[derive(Serialize)]
 #[serde(untagged)]
-enum Answer<T> {
+enum Framed<T> {
     Plain(T),
     Headed(Header, T),
 }
