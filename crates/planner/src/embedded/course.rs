@@ -4,19 +4,30 @@
 //! (Baier & `McIlraith`, ICAPS 2006, and Bonassi, De Giacomo, Favorito, Fuggitti, Gerevini & Scala,
 //! ICAPS 2021, do such things for sequential plans; here happenings overlap):
 //!
-//! - `always`: what would make the last literal of a clause false needs another one to be true.
+//! - `always`: what would make the last literal of a clause false needs another one to hold
+//!   afterwards, which is told by regression.
 //! - `sometime`, `within`: an *observer*, an action that takes no time, sees that the condition
 //!   holds, before its deadline; the goal asks for what it has seen.
 //! - `sometime-before`: always, unless the other condition has been seen.
 //! - `at-most-once`: what ends it says so, and then nothing can begin it.
+//! - `sometime-after`: what makes the one true without the other is owed until that has been seen.
+//! - `always-within`: as `always`, unless an action that *waits* is under way; it ends in time, when
+//!   the other condition holds.
+//! - `hold-during`, `hold-after`: an observer sees the condition in time and *locks* it, until a
+//!   timed initial unlocks it.
 //! - `at end`: a part of the goal.
 //!
-//! Observers are left out of the plan, and the judge sees it under the constraints as they are. The
-//! observers' plans are a little fewer: what they see lasts for ε, and a step that changes several
-//! literals of a clause at once is judged by the state before. So nothing is proved this way.
+//! What timed initials would break, an observer sees and locks before (`timed`). Observers and what
+//! waits are left out of the plan, and the judge sees it under the constraints as they are. There
+//! are a little fewer plans then: what an observer sees lasts for ε, and happenings of one time do
+//! not keep a clause together. So nothing is proved this way. What is proved without the
+//! constraints, is true with them.
 
+mod actions;
 mod clauses;
+mod regression;
 mod rewriting;
+mod timed;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -32,7 +43,7 @@ use super::compile::Unsupported;
 enum Obstacle {
     /// What is not supported.
     Feature(&'static str),
-    /// A constraint that is broken from the beginning.
+    /// Why a constraint is broken whatever is done.
     Broken(String),
 }
 
@@ -107,7 +118,10 @@ pub(super) fn plan(
         }
     }
     match search.under(&demanded, None, settings.first_plan_only) {
-        Ok(answer) => search.answer(answer),
+        Ok(answer) => {
+            let proof = search.proof_without();
+            proof.unwrap_or_else(|| search.answer(answer))
+        }
         Err(answer) => *answer,
     }
 }
@@ -135,8 +149,7 @@ impl Search<'_> {
             Err(Obstacle::Feature(feature)) => {
                 return Err(Box::new(unsupported(self.task, feature)));
             }
-            Err(Obstacle::Broken(constraint)) => {
-                let reason = format!("the constraint {constraint} is broken from the beginning");
+            Err(Obstacle::Broken(reason)) => {
                 return Err(Box::new(Answer::Unsolvable {
                     proof: Proof::Unreachable(vec![reason]),
                     counts: Counts::default(),
@@ -156,6 +169,34 @@ impl Search<'_> {
             }
         });
         Ok(answer)
+    }
+
+    /// The proof that there is no plan even without the constraints, where a search that ended has
+    /// found none.
+    fn proof_without(&mut self) -> Option<Answer> {
+        if self.best.is_some() || self.is_interrupted {
+            return None;
+        }
+        let loose = free_task(self.task, rewriting::loosened(self.task));
+        let settings = Settings {
+            first_plan_only: true,
+            ..self.settings.clone()
+        };
+        let observe = &mut self.observe;
+        let mut is_interrupted = false;
+        let begin = Situation::initial(&loose);
+        let answer = super::search_for_plans(&loose, &begin, &settings, &mut |progress| {
+            // Its plans are none of the task.
+            let flow = observe(&Progress {
+                plan: None,
+                best: None,
+                ..progress.clone()
+            });
+            is_interrupted |= flow.is_break();
+            flow
+        });
+        self.is_interrupted |= is_interrupted;
+        matches!(answer, Answer::Unsolvable { .. }).then_some(answer)
     }
 
     /// Takes over what a search reports.

@@ -98,19 +98,160 @@ fn what_no_plan_can_keep_is_not_kept() {
 }
 
 #[test]
-fn the_other_constraints_are_refused_by_name() {
-    for constraint in [
-        "(sometime-after (at c) (at a))",
-        "(always-within 3 (lit) (seen c))",
-        "(hold-during 1 2 (at a))",
-        "(hold-after 1 (free))",
-    ] {
+fn what_is_owed_comes_later() {
+    let steps = found("(sometime-after (seen c) (at a))");
+    assert!(steps.contains("(go b a)"), "{steps}");
+    // At b, it is paid.
+    let steps = found("(sometime-after (at c) (or (at b) (seen c)))");
+    assert!(!steps.contains("(go c b)"), "{steps}");
+}
+
+#[test]
+fn an_answer_comes_in_time() {
+    // A lamp that is lit on the way to b, and burns no longer than b is near.
+    let steps = found("(and (sometime (lit)) (always-within 3 (lit) (at b)))");
+    assert!(
+        steps.contains("(go a b)") && steps.contains("(shine)"),
+        "{steps}"
+    );
+    assert!(found("(and (within 3 (lit)) (always-within 3 (lit) (at b)))").contains("(shine)"));
+    let late = found("(and (within 0.5 (lit)) (always-within 3 (lit) (at b)))");
+    assert!(late.contains("none found"), "{late}");
+    // From the beginning on: the way to b takes 4.
+    assert!(found("(always-within 4 (at a) (at b))").contains("(go a b)"));
+    assert!(found("(always-within 3 (at a) (at b))").contains("none found"));
+}
+
+#[test]
+fn a_condition_holds_during_a_window() {
+    for constraint in ["(hold-during 5 9 (at b))", "(hold-during 4 9 (at b))"] {
+        let task = world(constraint);
+        let answer = answered(&task);
+        let found = answer.found().expect("a plan");
+        let leaves = found
+            .plan
+            .steps
+            .iter()
+            .find(|step| step.action.name == "(go b c)");
         assert!(
-            found(constraint).contains("does not handle"),
-            "{constraint}"
+            leaves.expect("it goes on to c").start >= 9.into(),
+            "{}",
+            describe(&answer)
         );
     }
-    assert!(found("(at-most-once (or (at a) (at b)))").contains("does not handle"));
+    assert!(found("(hold-during 3 9 (at b))").contains("none found"));
+    // What holds in the end holds for ever.
+    assert!(found("(hold-during 1000 1001 (at c))").contains("(go a c)"));
+}
+
+#[test]
+fn a_condition_holds_from_a_time_on() {
+    let steps = found("(hold-after 14 (at a))");
+    assert!(steps.contains("(go b a)"), "{steps}");
+    assert!(found("(and (hold-after 12 (at a)) (hold-during 0 1 (at a)))").contains("none found"));
+}
+
+#[test]
+fn a_formula_holds_once_at_most() {
+    // Away from a and b, and back.
+    let away = "(and (sometime (and (lit) (at b))) (at end (at b))";
+    let twice = found(&format!("{away})"));
+    assert!(
+        twice.contains("(go a c)") || twice.contains("(go b c)"),
+        "{twice}"
+    );
+    let once = found(&format!("{away} (at-most-once (or (at c) (seen c))))"));
+    assert!(once.contains("(go c b)"), "{once}");
+    let never = found(&format!(
+        "{away} (at-most-once (or (at b) (lit))) (sometime (at a)))"
+    ));
+    assert!(!never.contains("no plan exists"), "{never}");
+}
+
+const TANK: &str = "(:predicates (open) (warm) (done ?n - object))
+    (:functions (level) (used))
+    (:action fill :parameters () :effect (increase (level) 3))
+    (:action warm :parameters () :effect (warm))
+    (:action take :parameters (?n - object) :precondition (not (done ?n))
+      :effect (and (done ?n) (decrease (level) 2)
+                   (when (warm) (decrease (level) 1)) (increase (used) 2)))";
+
+fn of_tank(constraints: &str, more: &str) -> String {
+    let problem = format!(
+        "(:objects one two - object) (:init (= (level) 2) (= (used) 0) {more})
+         (:goal (and (done one) (done two))) (:constraints {constraints})"
+    );
+    let task = task(TANK, &problem);
+    describe(&answered(&task))
+}
+
+#[test]
+fn a_number_stays_within_bounds() {
+    let free = of_tank("(and)", "");
+    assert!(!free.contains("(fill)"), "{free}");
+    let bounded = of_tank("(always (>= (level) 0))", "");
+    assert!(bounded.contains("(fill)"), "{bounded}");
+    // Two fillings would be more than 5, before anything is taken.
+    let both = of_tank(
+        "(and (always (and (>= (level) 0) (<= (level) 5))) (sometime (warm)))",
+        "",
+    );
+    assert!(both.contains("(fill)") && both.contains("(warm)"), "{both}");
+    // One of 3 is more than 4.
+    let full = of_tank("(always (and (>= (level) 0) (<= (level) 4)))", "");
+    assert!(full.contains("(fill)") && full.contains("(take"), "{full}");
+    assert!(of_tank("(always (and (>= (level) 0) (<= (used) 2)))", "").contains("none found"));
+    assert!(of_tank("(always (< (level) 2))", "").contains("broken from the beginning"));
+}
+
+#[test]
+fn timed_initials_are_heeded() {
+    let timed = "(open) (at 5 (not (open)))";
+    assert!(of_tank("(always (open))", timed).contains("is broken at 5"));
+    let warm = of_tank("(always (or (open) (warm)))", timed);
+    assert!(warm.contains("(warm)"), "{warm}");
+    let owed = of_tank("(sometime-after (not (open)) (warm))", timed);
+    assert!(owed.contains("(warm)"), "{owed}");
+    let soon = of_tank("(always-within 2 (not (open)) (warm))", timed);
+    assert!(soon.contains("(warm)"), "{soon}");
+    let locked = of_tank("(hold-during 3 7 (or (open) (warm)))", timed);
+    assert!(locked.contains("(warm)"), "{locked}");
+    let until = of_tank("(hold-during 3 5 (or (open) (warm)))", timed);
+    assert!(!until.contains("(warm)"), "{until}");
+}
+
+#[test]
+fn what_is_out_of_reach_without_constraints_is_proved() {
+    let task = task(
+        DOMAIN,
+        "(:objects a b - room) (:init (at a) (free)) (:goal (seen b))
+         (:constraints (always-within 3 (lit) (seen a)))",
+    );
+    assert!(describe(&answered(&task)).starts_with("no plan exists"));
+}
+
+#[test]
+fn what_cannot_be_told_of_the_state_before_is_refused_by_name() {
+    let of = |functions: &str, action: &str, constraint: &str| {
+        let domain = format!(
+            "(:predicates (p) (q) (both)) {functions} (:derived (both) (and (p) (q)))
+             (:durative-action a :parameters () :duration (= ?duration 2) :condition (and)
+               :effect {action})"
+        );
+        let problem = format!("(:init (q)) (:goal (p)) (:constraints {constraint})");
+        describe(&answered(&task(&domain, &problem)))
+    };
+    let derived = of("", "(at end (p))", "(always (not (both)))");
+    assert!(derived.contains("on derived facts"), "{derived}");
+    let moving = "(and (at end (p)) (increase (x) (* #t 1)))";
+    let moving = of("(:functions (x))", moving, "(hold-after 3 (> 2 (x)))");
+    assert!(moving.contains("change continuously"), "{moving}");
+    let guarded = of(
+        "",
+        "(and (at end (p)) (when (at start (q)) (at end (not (q)))))",
+        "(always (q))",
+    );
+    assert!(guarded.contains("conditions of other moments"), "{guarded}");
 }
 
 #[test]

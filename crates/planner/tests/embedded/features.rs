@@ -264,3 +264,16 @@ fn interchangeable_objects_are_tried_once() {
     );
     assert!(answer(domain, &problem).found().is_some());
 }
+
+#[test]
+fn what_a_conditional_effect_never_makes_true_is_read_all_the_same() {
+    // (p) never changes, but the judge keeps its readers apart from who might change it.
+    let plan = describe(&answer(
+        "(:predicates (p) (q) (g) (seen) (open))
+         (:durative-action a :parameters () :duration (= ?duration 2) :condition (at start (and))
+           :effect (and (when (at start (q)) (at start (p))) (at end (g))))
+         (:action look :parameters () :precondition (and (p) (open)) :effect (seen))",
+        "(:init (p) (open) (at 0.5 (not (open)))) (:goal (and (g) (seen)))",
+    ));
+    assert!(plan.contains("(look)"), "{plan}");
+}

@@ -10,6 +10,7 @@
 mod cancellation;
 mod concurrency;
 mod course;
+mod course_twin;
 mod features;
 mod metric;
 mod portfolio;

@@ -1,12 +1,16 @@
 //! Actions of which grounding has dropped something that the judge still sees.
 
+use std::collections::BTreeSet;
+
 use elbowroom_model::Task;
+use elbowroom_model::problem::{Change, FunctionId, PredicateId};
 use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{ground, problem};
 
 /// In full, as the judge sees them, the actions of which grounding may have dropped something that
-/// reads or writes a changing fact: a conditional effect that never happens, or a part of a
-/// disjunction that other parts decide. These interfere all the same.
+/// reads or writes a changing fact: a conditional effect that never happens, a part of a
+/// disjunction that other parts decide, or what is constant because such an effect never happens.
+/// These interfere all the same.
 ///
 /// `None` if `goes_on` says that it shall end.
 pub(super) fn full_actions(
@@ -15,7 +19,11 @@ pub(super) fn full_actions(
     goes_on: &mut dyn FnMut() -> bool,
 ) -> Option<Vec<Option<ground::Action>>> {
     let schemas = &task.problem().schemas;
-    let is_shortened: Vec<bool> = schemas.iter().map(may_be_shortened).collect();
+    let perhaps = Perhaps::of(schemas);
+    let is_shortened: Vec<bool> = schemas
+        .iter()
+        .map(|schema| may_be_shortened(schema) || perhaps.is_read_by(schema))
+        .collect();
     if !is_shortened.contains(&true) {
         return Some(Vec::new());
     }
@@ -33,11 +41,80 @@ pub(super) fn full_actions(
         .collect()
 }
 
+/// What conditional effects write.
+#[derive(Default)]
+struct Perhaps {
+    predicates: BTreeSet<PredicateId>,
+    functions: BTreeSet<FunctionId>,
+}
+
+impl Perhaps {
+    fn of(schemas: &[problem::Schema]) -> Self {
+        let mut perhaps = Self::default();
+        for schema in schemas {
+            let (first, second) = match &schema.body {
+                problem::Body::Instantaneous { effects, .. } => (effects.as_slice(), &[][..]),
+                problem::Body::Durative {
+                    start_effects,
+                    end_effects,
+                    ..
+                } => (start_effects.as_slice(), end_effects.as_slice()),
+            };
+            for effect in first.iter().chain(second).filter(|e| is_conditional(e)) {
+                match &effect.change {
+                    Change::Add(atom) | Change::Delete(atom) => {
+                        perhaps.predicates.insert(atom.predicate);
+                    }
+                    Change::Update { fluent, .. } => {
+                        perhaps.functions.insert(fluent.function);
+                    }
+                }
+            }
+        }
+        perhaps
+    }
+
+    /// Whether the conditions at the moments of an action read something of this.
+    fn is_read_by(&self, schema: &problem::Schema) -> bool {
+        if self.predicates.is_empty() && self.functions.is_empty() {
+            return false;
+        }
+        match &schema.body {
+            problem::Body::Instantaneous { condition, .. } => self.is_in(condition),
+            problem::Body::Durative {
+                at_start, at_end, ..
+            } => self.is_in(at_start) || self.is_in(at_end),
+        }
+    }
+
+    fn is_in(&self, condition: &problem::Condition) -> bool {
+        use problem::Condition;
+        match condition {
+            Condition::Atom(atom) => self.predicates.contains(&atom.predicate),
+            Condition::Equal(..) => false,
+            Condition::Compare(_, left, right) => [left, right].iter().any(|side| {
+                let mut is_in = false;
+                side.visit_fluents(&mut |fluent| {
+                    is_in |= self.functions.contains(&fluent.function)
+                });
+                is_in
+            }),
+            Condition::Not(part) | Condition::Forall(_, part) | Condition::Exists(_, part) => {
+                self.is_in(part)
+            }
+            Condition::And(parts) | Condition::Or(parts) => {
+                parts.iter().any(|part| self.is_in(part))
+            }
+        }
+    }
+}
+
+fn is_conditional(effect: &problem::Effect) -> bool {
+    let guard = &effect.guard;
+    !(guard.at_start.is_trivial() && guard.over_all.is_trivial() && guard.now.is_trivial())
+}
+
 fn may_be_shortened(schema: &problem::Schema) -> bool {
-    let is_conditional = |effect: &problem::Effect| {
-        let guard = &effect.guard;
-        !(guard.at_start.is_trivial() && guard.over_all.is_trivial() && guard.now.is_trivial())
-    };
     match &schema.body {
         problem::Body::Instantaneous { condition, effects } => {
             !is_conjunction(condition) || effects.iter().any(is_conditional)

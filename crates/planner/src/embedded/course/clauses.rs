@@ -1,68 +1,121 @@
-//! Conditions on facts as clauses.
+//! Conditions as clauses.
 
 use elbowroom_model::Task;
 use elbowroom_model::ground;
-use elbowroom_model::problem::{Atom, Condition, Fluent, ObjectId, PredicateId, Term};
+use elbowroom_model::problem::{
+    Atom, Comparison, Condition, Expression, Fluent, ObjectId, PredicateId, Term,
+};
 
 /// Most clauses of one condition.
 const MOST_CLAUSES: usize = 64;
 
-/// A fact or its negation.
+/// A fact, a comparison of numbers, or the negation of one.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Literal {
-    pub(super) predicate: PredicateId,
-    pub(super) objects: Vec<ObjectId>,
+    pub(super) matter: Matter,
     pub(super) truth: bool,
 }
 
+/// What a literal is about.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Matter {
+    Fact(PredicateId, Vec<ObjectId>),
+    /// By its position among the [`Numbers`].
+    Number(usize),
+}
+
+/// A comparison whose fluents have objects as arguments.
+pub(super) type Number = (Comparison, Expression, Expression);
+
+/// All comparisons among the literals.
+#[derive(Debug, Default)]
+pub(super) struct Numbers(Vec<Number>);
+
+impl Numbers {
+    fn position(&mut self, number: Number) -> usize {
+        let known = self.0.iter().position(|other| *other == number);
+        known.unwrap_or_else(|| {
+            self.0.push(number);
+            self.0.len() - 1
+        })
+    }
+
+    pub(super) fn get(&self, position: usize) -> &Number {
+        &self.0[position]
+    }
+}
+
 impl Literal {
+    /// That a fact without arguments has this truth.
+    pub(super) fn plain(predicate: PredicateId, truth: bool) -> Self {
+        Self {
+            matter: Matter::Fact(predicate, Vec::new()),
+            truth,
+        }
+    }
+
     pub(super) fn negated(mut self) -> Self {
         self.truth = !self.truth;
         self
     }
 
     /// As a condition.
-    pub(super) fn condition(&self) -> Condition {
-        let atom = Condition::Atom(Atom {
-            predicate: self.predicate,
-            arguments: self.objects.iter().copied().map(Term::Object).collect(),
-        });
+    pub(super) fn condition(&self, numbers: &Numbers) -> Condition {
+        let condition = match &self.matter {
+            Matter::Fact(predicate, objects) => fact(*predicate, objects),
+            Matter::Number(position) => {
+                let (comparison, left, right) = numbers.get(*position).clone();
+                Condition::Compare(comparison, left, right)
+            }
+        };
         if self.truth {
-            atom
+            condition
         } else {
-            Condition::Not(Box::new(atom))
+            Condition::Not(Box::new(condition))
         }
     }
 }
 
-/// Clauses that together say that the condition has this truth; `None` if it compares numbers,
-/// reads derived facts, or has too many clauses.
+fn fact(predicate: PredicateId, objects: &[ObjectId]) -> Condition {
+    Condition::Atom(Atom {
+        predicate,
+        arguments: objects.iter().copied().map(Term::Object).collect(),
+    })
+}
+
+/// Clauses that together say that the condition has this truth; `None` if it reads derived facts, or
+/// has too many clauses.
 pub(super) fn clauses(
     task: &Task,
     condition: &ground::Condition,
     truth: bool,
+    numbers: &mut Numbers,
 ) -> Option<Vec<Vec<Literal>>> {
     let (parts, is_all) = match condition {
-        ground::Condition::Compare(..) => return None,
+        ground::Condition::Compare(comparison, left, right) => {
+            let number = (
+                *comparison,
+                lifted_number(task, left),
+                lifted_number(task, right),
+            );
+            let matter = Matter::Number(numbers.position(number));
+            return Some(vec![vec![Literal { matter, truth }]]);
+        }
         ground::Condition::Fact(fact) => {
-            let (predicate, objects) = task.atom(*fact);
             if task.is_derived(*fact) {
                 return None;
             }
-            let literal = Literal {
-                predicate,
-                objects,
-                truth,
-            };
-            return Some(vec![vec![literal]]);
+            let (predicate, objects) = task.atom(*fact);
+            let matter = Matter::Fact(predicate, objects);
+            return Some(vec![vec![Literal { matter, truth }]]);
         }
-        ground::Condition::Not(part) => return clauses(task, part, !truth),
+        ground::Condition::Not(part) => return clauses(task, part, !truth, numbers),
         ground::Condition::And(parts) => (parts, truth),
         ground::Condition::Or(parts) => (parts, !truth),
     };
     let mut all: Vec<Vec<Literal>> = if is_all { Vec::new() } else { vec![Vec::new()] };
     for part in parts {
-        let own = clauses(task, part, truth)?;
+        let own = clauses(task, part, truth, numbers)?;
         if is_all {
             all.extend(own);
         } else {
@@ -85,28 +138,28 @@ pub(super) fn clauses(
 /// The condition with objects in the place of numbers of facts.
 pub(super) fn lifted(task: &Task, condition: &ground::Condition) -> Condition {
     let many = |parts: &[ground::Condition]| parts.iter().map(|p| lifted(task, p)).collect();
-    let expression = |part: &ground::Expression| {
-        part.map_fluents(&mut |fluent| {
-            let (function, objects) = task.application(*fluent);
-            Fluent {
-                function,
-                arguments: objects.into_iter().map(Term::Object).collect(),
-            }
-        })
-    };
     match condition {
         ground::Condition::Fact(fact) => {
             let (predicate, objects) = task.atom(*fact);
-            Condition::Atom(Atom {
-                predicate,
-                arguments: objects.into_iter().map(Term::Object).collect(),
-            })
+            self::fact(predicate, &objects)
         }
-        ground::Condition::Compare(comparison, left, right) => {
-            Condition::Compare(*comparison, expression(left), expression(right))
-        }
+        ground::Condition::Compare(comparison, left, right) => Condition::Compare(
+            *comparison,
+            lifted_number(task, left),
+            lifted_number(task, right),
+        ),
         ground::Condition::Not(part) => Condition::Not(Box::new(lifted(task, part))),
         ground::Condition::And(parts) => Condition::And(many(parts)),
         ground::Condition::Or(parts) => Condition::Or(many(parts)),
     }
+}
+
+fn lifted_number(task: &Task, expression: &ground::Expression) -> Expression {
+    expression.map_fluents(&mut |fluent| {
+        let (function, objects) = task.application(*fluent);
+        Fluent {
+            function,
+            arguments: objects.into_iter().map(Term::Object).collect(),
+        }
+    })
 }

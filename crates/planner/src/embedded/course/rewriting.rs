@@ -4,57 +4,65 @@ use std::collections::BTreeSet;
 
 use elbowroom_model::ground;
 use elbowroom_model::problem::{
-    Atom, Body, Change, Condition, Effect, Guard, ObjectId, Predicate, PredicateId, Problem,
-    Schema, Term, TimedChange, TimedInitial,
+    Change, Condition, Effect, Expression, Guard, Problem, TimedChange,
 };
 use elbowroom_model::{Modal, Task};
 use elbowroom_num::Rational;
 
-use super::clauses::{Literal, clauses, lifted};
+use super::actions::{Changing, add, delete, holds, snaps};
+use super::clauses::{Literal, Matter, Numbers, clauses, lifted};
+use super::regression::{Difficulty, Moment, all, any, not};
 use super::{Obstacle, counts_violations};
 
 /// Most clauses that always hold.
 const MOST_CLAUSES: usize = 5_000;
 
-const NUMBERS: Obstacle = Obstacle::Feature(
-    "`always`, `sometime-before` and `at-most-once` of numbers, derived facts or long formulas",
-);
-const OTHERS: Obstacle = Obstacle::Feature(
-    "the constraints `sometime-after`, `always-within`, `hold-during` and `hold-after`",
-);
+const LONG: Obstacle =
+    Obstacle::Feature("trajectory constraints on derived facts or long formulas");
 const GUARDED: Obstacle = Obstacle::Feature(
-    "trajectory constraints on what conditional effects or timed initials change",
+    "trajectory constraints on what effects under conditions of other moments change",
+);
+const MOVING: Obstacle = Obstacle::Feature(
+    "trajectory constraints on numbers that change continuously, at given times, or in many ways",
 );
 const TOO_MANY: Obstacle = Obstacle::Feature("so many trajectory constraints");
 
-struct Rewriting<'a> {
-    task: &'a Task,
-    problem: Problem,
-    goals: Vec<Condition>,
-    /// Clauses that hold at every moment, with the constraint that each comes from.
-    always: Vec<(Vec<Literal>, String)>,
-    /// Literals that hold once at most, with what says that this is over.
-    once: Vec<(Literal, PredicateId)>,
+/// A clause, and what comes of a happening that makes it false.
+#[derive(Clone, Debug)]
+pub(super) struct Watched {
+    pub(super) clause: Vec<Literal>,
+    /// The constraint that it comes from.
+    pub(super) constraint: String,
+    pub(super) consequence: Consequence,
+    /// The open interval of times outside of which nothing comes of it.
+    pub(super) during: (Rational, Option<Rational>),
+}
+
+/// What comes of a clause that is false.
+#[derive(Clone, Debug)]
+pub(super) enum Consequence {
+    /// No happening makes it false.
+    Never,
+    /// What makes it false, while this holds, has this effect, too.
+    Effect(Condition, Change),
+    /// As above; and what timed initials make of it is settled when this condition is seen later.
+    Owes(Change, Condition),
+}
+
+pub(super) struct Rewriting<'a> {
+    pub(super) task: &'a Task,
+    pub(super) problem: Problem,
+    pub(super) numbers: Numbers,
+    pub(super) goals: Vec<Condition>,
+    pub(super) watched: Vec<Watched>,
+    /// How many predicates are the task's own.
+    own: usize,
 }
 
 /// The problem without constraints, with these preferences (by position among the task's soft
 /// constraints) among those that are kept.
 pub(super) fn without_constraints(task: &Task, demanded: &[usize]) -> Result<Problem, Obstacle> {
-    let mut problem = task.problem().clone();
-    // What is violated of the preferences, the judge counts in the task itself.
-    problem.constraints.clear();
-    problem.action_preferences.clear();
-    problem.domain_constraints = 0;
-    if counts_violations(task) {
-        problem.metric = None;
-    }
-    let mut rewriting = Rewriting {
-        task,
-        goals: vec![problem.goal.clone()],
-        problem,
-        always: Vec::new(),
-        once: Vec::new(),
-    };
+    let mut rewriting = Rewriting::new(task);
     let constraints = task.constraints();
     let soft = demanded
         .iter()
@@ -65,15 +73,45 @@ pub(super) fn without_constraints(task: &Task, demanded: &[usize]) -> Result<Pro
     rewriting.finish()
 }
 
-impl Rewriting<'_> {
+/// A problem of which every plan of the task is one: of the constraints, what holds in the end.
+pub(super) fn loosened(task: &Task) -> Problem {
+    let mut rewriting = Rewriting::new(task);
+    for modal in &task.constraints().hard {
+        if let Modal::AtEnd(c) | Modal::HoldAfter(_, c) = modal {
+            rewriting.goals.push(lifted(task, c));
+        }
+    }
+    rewriting.problem.goal = all(rewriting.goals);
+    rewriting.problem
+}
+
+impl<'a> Rewriting<'a> {
+    fn new(task: &'a Task) -> Self {
+        let mut problem = task.problem().clone();
+        // What is violated of the preferences, the judge counts in the task itself.
+        problem.constraints.clear();
+        problem.action_preferences.clear();
+        problem.domain_constraints = 0;
+        if counts_violations(task) {
+            problem.metric = None;
+        }
+        Self {
+            task,
+            goals: vec![problem.goal.clone()],
+            own: problem.predicates.len(),
+            problem,
+            numbers: Numbers::default(),
+            watched: Vec::new(),
+        }
+    }
+
     fn modal(&mut self, modal: &Modal<ground::Condition>) -> Result<(), Obstacle> {
         let task = self.task;
-        let text = || task.describe_modal(modal);
         match modal {
             Modal::AtEnd(c) => self.goals.push(lifted(task, c)),
             Modal::Always(c) => {
-                for clause in clauses(task, c, true).ok_or(NUMBERS)? {
-                    self.always.push((clause, text()));
+                for clause in self.clauses(c, true)? {
+                    self.watch(modal, clause, Consequence::Never);
                 }
             }
             Modal::Sometime(c) => {
@@ -86,238 +124,343 @@ impl Rewriting<'_> {
             }
             Modal::SometimeBefore(c, d) => {
                 let seen = self.observed(lifted(task, d), None);
-                for mut clause in clauses(task, c, false).ok_or(NUMBERS)? {
-                    clause.push(Literal {
-                        predicate: seen,
-                        objects: Vec::new(),
-                        truth: true,
-                    });
-                    self.always.push((clause, text()));
+                for mut clause in self.clauses(c, false)? {
+                    clause.push(Literal::plain(seen, true));
+                    self.watch(modal, clause, Consequence::Never);
                 }
             }
-            Modal::AtMostOnce(c) => {
-                let found = clauses(task, c, true).ok_or(NUMBERS)?;
-                let [clause] = found.as_slice() else {
-                    return Err(NUMBERS);
-                };
-                let [literal] = clause.as_slice() else {
-                    return Err(NUMBERS);
-                };
-                let over = self.predicate("over");
-                self.once.push((literal.clone(), over));
-            }
-            Modal::SometimeAfter(..)
-            | Modal::AlwaysWithin(..)
-            | Modal::HoldDuring(..)
-            | Modal::HoldAfter(..) => return Err(OTHERS),
+            Modal::AtMostOnce(c) => self.at_most_once(modal, c)?,
+            Modal::SometimeAfter(c, d) => self.sometime_after(modal, c, d)?,
+            Modal::AlwaysWithin(time, c, d) => self.always_within(modal, time, c, d)?,
+            Modal::HoldDuring(from, until, c) => self.hold(modal, from, Some(until), c)?,
+            Modal::HoldAfter(from, c) => self.hold(modal, from, None, c)?,
         }
         Ok(())
     }
 
-    /// A new predicate without arguments.
-    fn predicate(&mut self, name: &str) -> PredicateId {
-        let number = self.problem.predicates.len();
-        self.problem.predicates.push(Predicate {
-            // No name of a text has a space.
-            name: format!("{name} {number}"),
-            parameters: Vec::new(),
-            is_derived: false,
-        });
-        PredicateId::from(number)
+    fn clauses(
+        &mut self,
+        condition: &ground::Condition,
+        truth: bool,
+    ) -> Result<Vec<Vec<Literal>>, Obstacle> {
+        clauses(self.task, condition, truth, &mut self.numbers).ok_or(LONG)
     }
 
-    /// What becomes true when an action that only looks sees that a condition holds, no later than
-    /// `deadline`.
-    fn observed(&mut self, condition: Condition, deadline: Option<&Rational>) -> PredicateId {
-        let seen = self.predicate("seen");
-        let mut needs = vec![condition];
-        if let Some(deadline) = deadline {
-            let open = self.predicate("open");
-            self.problem.initial_facts.push((open, Vec::new()));
-            self.problem.timed.push(TimedInitial {
-                // What looks at the deadline itself is ε before.
-                time: deadline + self.task.epsilon(),
-                change: TimedChange::Delete(open, Vec::new()),
-            });
-            needs.push(holds(open));
-        }
-        let name = format!("look {}", self.problem.schemas.len());
-        self.problem.schemas.push(Schema {
-            name,
-            parameters: Vec::new(),
-            unknowns: Vec::new(),
-            body: Body::Instantaneous {
-                condition: Condition::And(needs),
-                effects: vec![always(Change::Add(atom(seen)))],
-            },
+    /// The clauses that say that `d` holds if `c` does.
+    fn implications(
+        &mut self,
+        c: &ground::Condition,
+        d: &ground::Condition,
+    ) -> Result<Vec<Vec<Literal>>, Obstacle> {
+        let either =
+            ground::Condition::Or(vec![ground::Condition::Not(Box::new(c.clone())), d.clone()]);
+        self.clauses(&either, true)
+    }
+
+    fn watch(
+        &mut self,
+        modal: &Modal<ground::Condition>,
+        clause: Vec<Literal>,
+        consequence: Consequence,
+    ) {
+        self.watched.push(Watched {
+            clause,
+            constraint: self.task.describe_modal(modal),
+            consequence,
+            during: (Rational::ZERO, None),
         });
-        seen
+    }
+
+    /// What ends the condition says that it is over, and then nothing makes it true.
+    fn at_most_once(
+        &mut self,
+        modal: &Modal<ground::Condition>,
+        c: &ground::Condition,
+    ) -> Result<(), Obstacle> {
+        let over = self.predicate("over");
+        for clause in self.clauses(c, true)? {
+            let ends = Consequence::Effect(lifted(self.task, c), add(over));
+            for literal in &clause {
+                for time in self.timed_against(literal) {
+                    // It may end then; whether it does, a timed initial cannot ask.
+                    self.timed(time, TimedChange::Add(over, Vec::new()));
+                }
+            }
+            self.watch(modal, clause, ends);
+        }
+        for mut clause in self.clauses(c, false)? {
+            clause.push(Literal::plain(over, false));
+            self.watch(modal, clause, Consequence::Never);
+        }
+        Ok(())
+    }
+
+    /// What makes `c` true without `d` is owed until an observer sees `d`.
+    fn sometime_after(
+        &mut self,
+        modal: &Modal<ground::Condition>,
+        c: &ground::Condition,
+        d: &ground::Condition,
+    ) -> Result<(), Obstacle> {
+        let paid = self.predicate("paid");
+        let found = self.implications(c, d)?;
+        if found.iter().all(|clause| self.holds_initially(clause)) {
+            self.problem.initial_facts.push((paid, Vec::new()));
+        }
+        let answer = lifted(self.task, d);
+        self.look(vec![answer.clone()], vec![add(paid)]);
+        self.goals.push(holds(paid));
+        for clause in found {
+            let owes = delete(paid);
+            self.watch(modal, clause, Consequence::Owes(owes, answer.clone()));
+        }
+        Ok(())
+    }
+
+    /// `c` without `d` needs an action that waits, which ends in time, when `d` holds.
+    fn always_within(
+        &mut self,
+        modal: &Modal<ground::Condition>,
+        time: &Rational,
+        c: &ground::Condition,
+        d: &ground::Condition,
+    ) -> Result<(), Obstacle> {
+        let found = self.implications(c, d)?;
+        let answer = lifted(self.task, d);
+        let waits = self.wait(time, answer.clone());
+        let mut more = vec![Literal::plain(waits, true)];
+        if !found.iter().all(|clause| self.holds_initially(clause)) {
+            // From the beginning on, nothing needs to wait until `d` has been seen.
+            let grace = self.predicate("grace");
+            self.problem.initial_facts.push((grace, Vec::new()));
+            let open = self.open_until(time);
+            let ends = delete(grace);
+            self.look(vec![answer, holds(open)], vec![ends]);
+            self.goals.push(not(holds(grace)));
+            more.push(Literal::plain(grace, true));
+        }
+        for mut clause in found {
+            clause.extend(more.iter().cloned());
+            self.watch(modal, clause, Consequence::Never);
+        }
+        Ok(())
+    }
+
+    /// An observer sees the condition by the time from which it has to hold, and locks it.
+    fn hold(
+        &mut self,
+        modal: &Modal<ground::Condition>,
+        from: &Rational,
+        until: Option<&Rational>,
+        c: &ground::Condition,
+    ) -> Result<(), Obstacle> {
+        if until.is_some_and(|until| until <= from) {
+            return Ok(());
+        }
+        let found = self.clauses(c, true)?;
+        let literals = found.iter().flatten();
+        let against = literals.flat_map(|literal| self.timed_against(literal));
+        let since = against.filter(|time| time <= from).max();
+        let locked = self.predicate("locked");
+        let open = self.open_until(from);
+        if let Some(since) = &since {
+            self.problem.initial_facts.retain(|(fact, _)| *fact != open);
+            self.timed(since.clone(), TimedChange::Add(open, Vec::new()));
+        }
+        let seen = self.predicate("seen");
+        let needs = vec![lifted(self.task, c), holds(open)];
+        self.look(needs, vec![add(locked), add(seen)]);
+        self.goals.push(holds(seen));
+        if let Some(until) = until {
+            self.timed(until.clone(), TimedChange::Delete(locked, Vec::new()));
+        }
+        for mut clause in found {
+            clause.push(Literal::plain(locked, false));
+            self.watched.push(Watched {
+                clause,
+                constraint: self.task.describe_modal(modal),
+                consequence: Consequence::Never,
+                during: (from.clone(), until.cloned()),
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether a clause holds in the initial state.
+    pub(super) fn holds_initially(&self, clause: &[Literal]) -> bool {
+        let facts = &self.problem.initial_facts;
+        let values = &self.problem.initial_values;
+        clause.iter().any(|literal| {
+            let is_true = match &literal.matter {
+                Matter::Fact(predicate, objects) => facts
+                    .iter()
+                    .any(|(other, own)| other == predicate && own == objects),
+                Matter::Number(position) => {
+                    let (comparison, left, right) = self.numbers.get(*position);
+                    let value = |side: &Expression| {
+                        side.evaluate(&mut |leaf| {
+                            let Expression::Fluent(fluent) = leaf else {
+                                return None;
+                            };
+                            let same = |(function, objects, _): &&(_, Vec<_>, Rational)| {
+                                *function == fluent.function
+                                    && super::regression::objects(&fluent.arguments) == *objects
+                            };
+                            values.iter().find(same).map(|(.., value)| value.clone())
+                        })
+                    };
+                    match (value(left), value(right)) {
+                        (Some(left), Some(right)) => comparison.holds(&left, &right),
+                        _ => return false,
+                    }
+                }
+            };
+            is_true == literal.truth
+        })
     }
 
     fn finish(mut self) -> Result<Problem, Obstacle> {
-        let facts: BTreeSet<(PredicateId, Vec<ObjectId>)> =
-            self.problem.initial_facts.iter().cloned().collect();
-        let changing = changing(&self.problem);
-        let is_true = |literal: &Literal| {
-            facts.contains(&(literal.predicate, literal.objects.clone())) == literal.truth
-        };
-        let mut clauses: BTreeSet<Vec<Literal>> = BTreeSet::new();
-        for (clause, constraint) in std::mem::take(&mut self.always) {
-            if !clause.iter().any(is_true) {
-                return Err(Obstacle::Broken(constraint));
+        self.leave_out_what_stays()?;
+        self.settle_timed()?;
+        let numbers = std::mem::take(&mut self.numbers);
+        let problem = self.problem.clone();
+        for schema in &mut self.problem.schemas {
+            let parameters = schema.parameters.clone();
+            for (condition, effects) in snaps(&mut schema.body) {
+                let moment = Moment {
+                    problem: &problem,
+                    numbers: &numbers,
+                    parameters: &parameters,
+                    effects,
+                };
+                let (needs, more) = consequences(&moment, &self.watched).map_err(told)?;
+                effects.extend(more);
+                if !needs.is_empty() {
+                    let own = std::mem::take(condition);
+                    *condition = all([own].into_iter().chain(needs));
+                }
             }
-            let is_static = |literal: &Literal| !changing.contains(&literal.predicate);
-            if clause.iter().any(|l| is_static(l) && is_true(l)) {
+        }
+        self.problem.goal = all(self.goals);
+        Ok(self.problem)
+    }
+
+    /// Leaves out clauses and literals on what never changes, and says what is broken already.
+    fn leave_out_what_stays(&mut self) -> Result<(), Obstacle> {
+        let changing = Changing::of(&self.problem);
+        let mut known: BTreeSet<Vec<Literal>> = BTreeSet::new();
+        let mut kept = Vec::new();
+        for mut one in std::mem::take(&mut self.watched) {
+            let is_never = matches!(one.consequence, Consequence::Never);
+            if is_never && !self.holds_initially(&one.clause) {
+                let constraint = one.constraint;
+                return Err(Obstacle::Broken(format!(
+                    "the constraint {constraint} is broken from the beginning"
+                )));
+            }
+            let is_static = |literal: &Literal| match &literal.matter {
+                Matter::Fact(predicate, _) => {
+                    predicate.index() < self.own && !changing.predicates.contains(predicate)
+                }
+                Matter::Number(position) => {
+                    let (_, left, right) = self.numbers.get(*position);
+                    let mut is_static = true;
+                    for side in [left, right] {
+                        side.visit_fluents(&mut |fluent| {
+                            is_static &= !changing.functions.contains(&fluent.function);
+                        });
+                    }
+                    is_static
+                }
+            };
+            let (stays, mut rest): (Vec<_>, Vec<_>) = one.clause.into_iter().partition(is_static);
+            if self.holds_initially(&stays) {
                 continue;
             }
-            let mut rest: Vec<Literal> = clause.into_iter().filter(|l| !is_static(l)).collect();
             rest.sort();
             rest.dedup();
-            let is_tautology = rest.iter().any(|l| rest.contains(&l.clone().negated()));
-            if !is_tautology {
-                clauses.insert(rest);
+            if rest.iter().any(|l| rest.contains(&l.clone().negated())) {
+                continue;
             }
-            if clauses.len() > MOST_CLAUSES {
+            for literal in &rest {
+                let Matter::Number(position) = &literal.matter else {
+                    continue;
+                };
+                let (_, left, right) = self.numbers.get(*position);
+                let mut moves = false;
+                for side in [left, right] {
+                    side.visit_fluents(&mut |fluent| {
+                        moves |= changing.moving.contains(&fluent.function)
+                    });
+                }
+                if moves {
+                    return Err(MOVING);
+                }
+            }
+            if is_never && one.during == (Rational::ZERO, None) && !known.insert(rest.clone()) {
+                continue;
+            }
+            one.clause = rest;
+            kept.push(one);
+            if kept.len() > MOST_CLAUSES {
                 return Err(TOO_MANY);
             }
         }
-        let guarded: BTreeSet<PredicateId> = clauses
-            .iter()
-            .flatten()
-            .chain(self.once.iter().map(|(literal, _)| literal))
-            .map(|literal| literal.predicate)
-            .collect();
-        let is_timed = self.problem.timed.iter().any(|timed| match &timed.change {
-            TimedChange::Add(predicate, _) | TimedChange::Delete(predicate, _) => {
-                guarded.contains(predicate)
-            }
-            TimedChange::Assign(..) => false,
-        });
-        if is_timed {
-            return Err(GUARDED);
-        }
-        for schema in &mut self.problem.schemas {
-            for (condition, effects) in snaps(&mut schema.body) {
-                let mut needs = Vec::new();
-                let mut more = Vec::new();
-                for effect in effects.iter() {
-                    let (written, truth) = match &effect.change {
-                        Change::Add(atom) => (atom, true),
-                        Change::Delete(atom) => (atom, false),
-                        Change::Update { .. } => continue,
-                    };
-                    if !guarded.contains(&written.predicate) {
+        self.watched = kept;
+        Ok(())
+    }
+}
+
+fn told(difficulty: Difficulty) -> Obstacle {
+    match difficulty {
+        Difficulty::Guarded => GUARDED,
+        Difficulty::Moving => MOVING,
+    }
+}
+
+/// What a happening needs, and does besides, because of the clauses that it can make false.
+fn consequences(
+    moment: &Moment<'_>,
+    watched: &[Watched],
+) -> Result<(Vec<Condition>, Vec<Effect>), Difficulty> {
+    let mut needs = Vec::new();
+    let mut more = Vec::new();
+    for effect in moment.effects {
+        for one in watched {
+            for literal in &one.clause {
+                let Some(falsifies) = moment.falsifies(effect, literal)? else {
+                    continue;
+                };
+                // Another literal holds after; or this one, because of another effect.
+                let is_regained = match &literal.matter {
+                    Matter::Fact(..) => literal.truth && moment.adds(literal),
+                    Matter::Number(_) => true,
+                };
+                let others = one.clause.iter();
+                let mut ways =
+                    moment.before_any(others.filter(|other| is_regained || *other != literal))?;
+                let (when, change) = match &one.consequence {
+                    Consequence::Never => {
+                        ways.insert(0, not(falsifies));
+                        needs.push(any(ways));
                         continue;
                     }
-                    if effect.guard != Guard::default() || !effect.variables.is_empty() {
-                        return Err(GUARDED);
-                    }
-                    let is_written = |literal: &Literal| literal.predicate == written.predicate;
-                    for clause in &clauses {
-                        let lost = clause.iter().filter(|l| is_written(l) && l.truth != truth);
-                        for literal in lost {
-                            let others = clause.iter().filter(|other| *other != literal);
-                            let mut any = differs(written, &literal.objects);
-                            any.extend(others.map(Literal::condition));
-                            needs.push(Condition::Or(any));
-                        }
-                    }
-                    for (literal, over) in self.once.iter().filter(|(l, _)| is_written(l)) {
-                        let mut any = differs(written, &literal.objects);
-                        if literal.truth == truth {
-                            any.push(Condition::Not(Box::new(holds(*over))));
-                            needs.push(Condition::Or(any));
-                        } else {
-                            // It ends, if it held.
-                            any.push(literal.clone().negated().condition());
-                            more.push(Effect {
-                                variables: Vec::new(),
-                                guard: Guard {
-                                    now: Condition::Not(Box::new(Condition::Or(any))),
-                                    ..Guard::default()
-                                },
-                                change: Change::Add(atom(*over)),
-                            });
-                        }
-                    }
-                }
-                effects.extend(more);
-                if !needs.is_empty() {
-                    needs.insert(0, std::mem::take(condition));
-                    *condition = Condition::And(needs);
-                }
-            }
-        }
-        self.problem.goal = Condition::And(self.goals);
-        Ok(self.problem)
-    }
-}
-
-/// The predicates of which some fact can change.
-fn changing(problem: &Problem) -> BTreeSet<PredicateId> {
-    let mut changing = BTreeSet::new();
-    for timed in &problem.timed {
-        if let TimedChange::Add(predicate, _) | TimedChange::Delete(predicate, _) = &timed.change {
-            changing.insert(*predicate);
-        }
-    }
-    for schema in &problem.schemas {
-        let (first, second) = match &schema.body {
-            Body::Instantaneous { effects, .. } => (effects.as_slice(), [].as_slice()),
-            Body::Durative {
-                start_effects,
-                end_effects,
-                ..
-            } => (start_effects.as_slice(), end_effects.as_slice()),
-        };
-        for effect in first.iter().chain(second) {
-            if let Change::Add(atom) | Change::Delete(atom) = &effect.change {
-                changing.insert(atom.predicate);
+                    Consequence::Effect(when, change) => (when.clone(), change),
+                    Consequence::Owes(change, _) => (Condition::TRUE, change),
+                };
+                let now = all([when, falsifies]
+                    .into_iter()
+                    .chain(ways.into_iter().map(not)));
+                more.push(Effect {
+                    variables: Vec::new(),
+                    guard: Guard {
+                        now,
+                        ..Guard::default()
+                    },
+                    change: change.clone(),
+                });
             }
         }
     }
-    changing
-}
-
-/// The conditions of an action that are read at one moment, with what it does then.
-fn snaps(body: &mut Body) -> Vec<(&mut Condition, &mut Vec<Effect>)> {
-    match body {
-        Body::Instantaneous { condition, effects } => vec![(condition, effects)],
-        Body::Durative {
-            at_start,
-            at_end,
-            start_effects,
-            end_effects,
-            ..
-        } => vec![(at_start, start_effects), (at_end, end_effects)],
-    }
-}
-
-/// The ways in which the arguments of an atom can be other objects than these.
-fn differs(atom: &Atom, objects: &[ObjectId]) -> Vec<Condition> {
-    let pairs = atom.arguments.iter().zip(objects);
-    pairs
-        .map(|(&term, &object)| {
-            Condition::Not(Box::new(Condition::Equal(term, Term::Object(object))))
-        })
-        .collect()
-}
-
-fn atom(predicate: PredicateId) -> Atom {
-    Atom {
-        predicate,
-        arguments: Vec::new(),
-    }
-}
-
-fn holds(predicate: PredicateId) -> Condition {
-    Condition::Atom(atom(predicate))
-}
-
-fn always(change: Change) -> Effect {
-    Effect {
-        variables: Vec::new(),
-        guard: Guard::default(),
-        change,
-    }
+    Ok((needs, more))
 }
