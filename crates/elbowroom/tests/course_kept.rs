@@ -3,8 +3,14 @@
 
 #![allow(clippy::unwrap_used, reason = "the helpers of a test are part of it")]
 
-use std::fmt::Write as _;
+mod shared;
 
+use std::fmt::Write as _;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom::flow;
+use elbowroom_envelope::{Guarantee, Oracle, irr};
 use elbowroom_model::validate::Settings;
 use elbowroom_model::{Task, Verdict, validate};
 use elbowroom_num::Rational;
@@ -128,6 +134,54 @@ fn a_constraint_on_the_course_holds_in_every_schedule() {
         assert!(valid > 5, "{form}: {valid} valid plans");
     }
     assert!(needed > 100, "{needed}");
+}
+
+/// Whatever values a plan's durations take in its box, and whatever schedule they leave, the
+/// constraint is kept.
+#[test]
+fn a_constraint_on_the_course_holds_throughout_the_box() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut broken = 0;
+    for form in FORMS {
+        let (mut boxes, mut is_wide) = (0, false);
+        for _ in 0..200 {
+            let (task, text) = case(form, &mut rng);
+            let (plan, _) = read_plan(&Source::new("plan", text.clone()), &task).unwrap();
+            if boxes == 6 || !validate(&task, &plan, &Settings::default()).is_valid() {
+                continue;
+            }
+            let freed = flow::free(&task, &plan).unwrap();
+            let plan = Arc::new(flow::open(&task, freed, &[]).unwrap());
+            let task = Arc::new(task);
+            let mut oracle = Oracle::new(&task, &plan, Guarantee::Weak).unwrap();
+            let settings = elbowroom_envelope::Settings::default();
+            let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(()));
+            let envelope = run.unwrap().envelope.unwrap();
+            boxes += 1;
+            is_wide |= envelope
+                .intervals()
+                .iter()
+                .any(|one| one.width() != Some(Rational::ZERO));
+            for _ in 0..12 {
+                let valuation = shared::draw::valuation(&envelope, &mut rng);
+                let fixed = plan.plan.at(&valuation);
+                let schedule = shared::draw::schedule(&plan.plan, &valuation, &mut rng);
+                let schedule = schedule.unwrap_or_else(|| panic!("{form}\n{text}"));
+                let verdict = validate(&task, &fixed.scheduled(&schedule), &Settings::default());
+                assert!(verdict.is_valid(), "{form}\n{text}{verdict:?}");
+                // Without the constraints between happenings, some would be broken.
+                let mut loose = fixed.clone();
+                loose.constraints.retain(|one| one.reason != Reason::Course);
+                if let Some(schedule) = shared::draw::schedule(&loose, &valuation, &mut rng) {
+                    let verdict =
+                        validate(&task, &loose.scheduled(&schedule), &Settings::default());
+                    broken += usize::from(!verdict.is_valid());
+                }
+            }
+        }
+        assert!(boxes > 3 && is_wide, "{form}: {boxes} boxes");
+    }
+    assert!(broken > 100, "{broken}");
 }
 
 #[test]
