@@ -30,6 +30,7 @@ mod needless;
 mod network;
 mod pairs;
 mod reasons;
+mod refine;
 mod relaxed;
 mod relevance;
 mod root;
@@ -171,6 +172,10 @@ fn search_for_plans(
         compiled: &compiled,
         progress,
         best: None,
+        best_steps: Vec::new(),
+        is_fresh: false,
+        unreported: 0,
+        refiner: None,
         has_reservoirs: tuning.uses(Technique::Reservoirs)
             && !relaxed::floors(&compiled).is_empty(),
     }

@@ -74,6 +74,8 @@ pub(crate) struct Relaxed<'a> {
     /// How many preconditions an operator waits for.
     missing: Vec<u32>,
     operator_cost: Vec<u32>,
+    /// What each operator counts for.
+    own_cost: Vec<u32>,
     is_used: Vec<bool>,
     is_wanted: Vec<bool>,
     gaps: Vec<f64>,
@@ -104,6 +106,7 @@ impl<'a> Relaxed<'a> {
             repetitions: vec![1; propositions],
             missing: Vec::with_capacity(operators),
             operator_cost: vec![0; operators],
+            own_cost: own_costs(&graph),
             is_used: vec![false; operators],
             is_wanted: vec![false; propositions],
             gaps: vec![0.0; compiled.tests.len()],
@@ -120,6 +123,30 @@ impl<'a> Relaxed<'a> {
     /// From now on a step counts for what it costs, not for one.
     pub(crate) fn weigh(&mut self, step_costs: &StepCosts) {
         self.graph.weigh(step_costs);
+        self.own_cost = own_costs(&self.graph);
+    }
+
+    /// From now on the starts and ends of these actions count for so much, instead of what they
+    /// count for by themselves.
+    pub(crate) fn set_costs(&mut self, costs: impl Iterator<Item = (u32, u32)>) {
+        for (action, cost) in costs {
+            let (start, end) = self.graph.operators_of(action);
+            for operator in [start, end] {
+                if let Some(own) = self.own_cost.get_mut(operator as usize) {
+                    *own = cost;
+                }
+            }
+        }
+    }
+
+    /// The cost of an action by itself, start and end.
+    pub(crate) fn cost_of(&self, action: u32) -> u32 {
+        let (start, end) = self.graph.operators_of(action);
+        let cost = |operator: u32| {
+            let operator = self.graph.operators.get(operator as usize);
+            operator.map_or(0, |operator| operator.cost)
+        };
+        cost(start).max(cost(end))
     }
 
     /// From now on, what a relaxed plan uses up is counted, and filled up.
@@ -253,9 +280,7 @@ impl<'a> Relaxed<'a> {
             .then(|| Spans::of(self.compiled, state));
         self.cost.fill(UNREACHED);
         self.missing.clone_from(&self.graph.precondition_counts);
-        for (cost, operator) in self.operator_cost.iter_mut().zip(&self.graph.operators) {
-            *cost = operator.cost;
-        }
+        self.operator_cost.clone_from(&self.own_cost);
         self.applicable.clear();
         for open in &state.open {
             for &operator in &self.graph.kept_out[open.action as usize] {
@@ -376,7 +401,8 @@ impl<'a> Relaxed<'a> {
     fn fire(&mut self, operator: u32) {
         let data = &self.graph.operators[operator as usize];
         let cost = self.operator_cost[operator as usize];
-        if cost == data.cost && data.is_step {
+        let own = self.own_cost[operator as usize];
+        if cost == own && data.is_step {
             self.applicable.push(operator);
         }
         for position in data.effects.clone() {
@@ -395,7 +421,7 @@ impl<'a> Relaxed<'a> {
                 continue;
             };
             let total = cost
-                .saturating_add((times - 1).saturating_mul(data.cost))
+                .saturating_add((times - 1).saturating_mul(own))
                 .min(MOST);
             Self::lower(
                 &mut self.cost,
@@ -425,6 +451,10 @@ impl<'a> Relaxed<'a> {
             buckets[cost as usize].push(proposition);
         }
     }
+}
+
+fn own_costs(graph: &Graph) -> Vec<u32> {
+    graph.operators.iter().map(|operator| operator.cost).collect()
 }
 
 /// The time at which the literal of a timetable last becomes false.

@@ -1,6 +1,7 @@
 //! One run of the planner: which search gets how many turns, and what becomes of the plans.
 
 mod improve;
+mod refining;
 
 use std::ops::ControlFlow;
 
@@ -15,6 +16,7 @@ use super::extract;
 use super::formula::Literal;
 use super::needless::without_needless;
 use super::reasons::{self, Names};
+use super::refine::Refiner;
 use super::relaxed;
 use super::search::{Aim, Search, Strategy, Turn};
 use super::symmetry::Symmetry;
@@ -50,6 +52,14 @@ pub(super) struct Planner<'a> {
     pub(super) best: Option<Found>,
     /// Whether something is used up and filled up.
     pub(super) has_reservoirs: bool,
+    /// The choices of the best plan.
+    pub(super) best_steps: Vec<Step>,
+    /// Whether no better plan has been looked for near it.
+    pub(super) is_fresh: bool,
+    /// The work near the best plan since the last report.
+    pub(super) unreported: u64,
+    /// What makes better plans of the best one.
+    pub(super) refiner: Option<Refiner<'a>>,
 }
 
 impl Planner<'_> {
@@ -77,7 +87,9 @@ impl Planner<'_> {
             return Answer::Unsolvable { proof, counts };
         }
         let tuning = &compiled.tuning;
-        let mut budget = if self.needs_concurrency() {
+        let mut budget = if self.is_refining() {
+            tuning.improving_round
+        } else if self.needs_concurrency() {
             tuning.first_round_with_concurrency
         } else if self.has_reservoirs {
             tuning.first_round_with_reservoirs
@@ -87,6 +99,7 @@ impl Planner<'_> {
         let most = tuning.first_round_work / (1 + searches[0].size());
         budget = budget.min(most.max(tuning.root_check_after));
         while stopped.is_none() && !self.is_first_plan_enough() {
+            let was_refining = self.is_refining();
             for (number, is_over) in is_over.iter_mut().enumerate() {
                 if *is_over {
                     continue;
@@ -96,13 +109,21 @@ impl Planner<'_> {
                     searches.push(Search::new(compiled, self.symmetry, strategy));
                 }
                 let search = &mut searches[number];
-                match self.work(search, share(search, budget, compiled)) {
+                if self.is_refining() && !was_refining {
+                    budget = budget.min(tuning.improving_round);
+                }
+                let share = share(search, budget, compiled);
+                match self.work(search, share) {
                     Outcome::Stop(reason) => stopped = Some(reason),
                     Outcome::Better | Outcome::BudgetSpent => {}
                     Outcome::Over if search.is_incomplete() => *is_over = true,
                     Outcome::Over => stopped = Some(Stopped::Exhausted),
                 }
                 if stopped.is_some() || self.is_first_plan_enough() {
+                    break;
+                }
+                stopped = self.refine(share);
+                if stopped.is_some() {
                     break;
                 }
             }
@@ -308,6 +329,20 @@ impl Planner<'_> {
 
     /// Looks at the choices that a search takes for a plan.
     fn consider(&mut self, steps: &[Step], search: &mut Search<'_>) -> Option<Outcome> {
+        match self.judge(steps) {
+            Judged::Refused => search.has_lost = true,
+            Judged::NoBetter => {}
+            Judged::Stop(stopped) => return Some(Outcome::Stop(stopped)),
+            Judged::Better if self.compiled.metric.is_some() || self.is_refining() => {
+                return Some(Outcome::Better);
+            }
+            Judged::Better => self.demand_better(search),
+        }
+        None
+    }
+
+    /// Asks the judge about the plan of these choices, and reports it if it is better than the best.
+    fn judge(&mut self, steps: &[Step]) -> Judged {
         let (task, situation) = (self.task, self.situation);
         let mut is_interrupted = false;
         let mut goes_on = || {
@@ -316,11 +351,10 @@ impl Planner<'_> {
         };
         let judged = extract::plan_of(task, situation, self.compiled, steps, &mut goes_on);
         if is_interrupted {
-            return Some(Outcome::Stop(Stopped::Interrupted));
+            return Judged::Stop(Stopped::Interrupted);
         }
         let Some((plan, report)) = judged else {
-            search.has_lost = true;
-            return None;
+            return Judged::Refused;
         };
         let worth = |found: &Found| (found.value.clone(), found.makespan.clone());
         let whole = self.value(plan.clone(), &report);
@@ -341,24 +375,26 @@ impl Planner<'_> {
             .as_ref()
             .is_some_and(|best| worth(best) <= worth(&found))
         {
-            return is_interrupted.then_some(Outcome::Stop(Stopped::Interrupted));
+            return if is_interrupted {
+                Judged::Stop(Stopped::Interrupted)
+            } else {
+                Judged::NoBetter
+            };
         }
         self.progress.best = Some(found.value.clone());
         self.progress.plan = Some(found.clone());
         self.best = Some(found);
+        self.best_steps = steps.to_vec();
+        self.is_fresh = true;
         let flow = (self.observe)(&self.progress);
         self.progress.plan = None;
         if flow.is_break() || is_interrupted {
-            return Some(Outcome::Stop(Stopped::Interrupted));
+            return Judged::Stop(Stopped::Interrupted);
         }
         if self.settings.first_plan_only {
-            return Some(Outcome::Stop(Stopped::FirstPlan));
+            return Judged::Stop(Stopped::FirstPlan);
         }
-        if self.compiled.metric.is_some() {
-            return Some(Outcome::Better);
-        }
-        self.demand_better(search);
-        None
+        Judged::Better
     }
 
     /// From now on only plans count that are better than the best one.
@@ -418,4 +454,12 @@ enum Outcome {
     Better,
     Over,
     BudgetSpent,
+}
+
+/// What became of choices that were taken for a plan.
+enum Judged {
+    Refused,
+    NoBetter,
+    Better,
+    Stop(Stopped),
 }

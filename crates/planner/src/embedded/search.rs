@@ -30,6 +30,7 @@ use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
 use super::tuning::Technique;
 use dead_ends::DeadEnds;
+pub(crate) use goals::is_goal;
 use novelty::{Novelty, Progress};
 use queue::Queue;
 use strategy::NoveltyOf;
@@ -352,7 +353,7 @@ impl<'a> Search<'a> {
             .as_ref()
             .map_or(0, |projection| projection.size());
         self.memory += state.size() + projection_size + size_of::<Node>() + 64;
-        let is_goal = self.is_goal(&state);
+        let is_goal = is_goal(self.compiled, &state);
         self.nodes.push(Node {
             parent,
             step,

@@ -36,6 +36,8 @@ pub enum Technique {
     Consumables,
     /// Relaxed plans fill up what they use up.
     Reservoirs,
+    /// Better plans are looked for near the best one.
+    Refinement,
 }
 
 impl Technique {
@@ -53,6 +55,7 @@ impl Technique {
         (Self::Nesting, "nesting"),
         (Self::Consumables, "consumables"),
         (Self::Reservoirs, "reservoirs"),
+        (Self::Refinement, "refinement"),
     ];
 }
 
@@ -219,6 +222,8 @@ constants! {
     incomplete_share: u64 = 8;
     /// How many states each search for better plans looks at in its first round. Not measured.
     improving_round: u64 = 4_096;
+    /// How long the search near the best plan takes for each unit of time of another search.
+    refining_share: u64 = 2;
 
     /// How many turns the preferred successors get for a better estimate. The value of LAMA
     /// (Richter & Westphal, JAIR 2010); not measured here.

@@ -34,9 +34,10 @@ impl Relaxed<'_> {
         }
         for &operator in &used {
             let data = &self.graph.operators[operator as usize];
-            estimate.steps += data.cost;
+            let own = self.own_cost[operator as usize];
+            estimate.steps += own;
             self.is_used[operator as usize] = false;
-            let is_next = self.operator_cost[operator as usize] == data.cost;
+            let is_next = self.operator_cost[operator as usize] == own;
             if is_next || matches!(data.kind, Kind::Timed(_)) {
                 push_steps(data.kind, state, &mut estimate.preferred);
             }

@@ -57,12 +57,13 @@ impl Planner<'_> {
                 let search = entrant
                     .search
                     .get_or_insert_with(|| Search::new(compiled, symmetry, strategy));
-                let mut left = share(search, budget, compiled);
+                let states = share(search, budget, compiled);
+                let mut left = states;
                 // Who finds better plans may go on.
                 loop {
                     match self.work(search, left) {
                         Outcome::Stop(reason) => return reason,
-                        Outcome::Better => left = share(search, budget, compiled),
+                        Outcome::Better => left = states,
                         Outcome::BudgetSpent => break,
                         Outcome::Over if search.is_incomplete() => {
                             entrant.is_over = true;
@@ -73,6 +74,9 @@ impl Planner<'_> {
                             return Stopped::Exhausted;
                         }
                     }
+                }
+                if let Some(stopped) = self.refine(states) {
+                    return stopped;
                 }
             }
             budget = budget.saturating_mul(2);

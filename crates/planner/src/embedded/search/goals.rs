@@ -3,32 +3,32 @@
 use std::borrow::Cow;
 
 use super::super::apply::{Step, Stepper};
+use super::super::compile::Compiled;
 use super::super::state::State;
 use super::{ROOT, Search};
 
-impl Search<'_> {
-    /// Whether the plan could end here.
-    pub(super) fn is_goal(&self, state: &State) -> bool {
-        let compiled = self.compiled;
-        if !state.open.is_empty() {
+/// Whether a plan could end here.
+pub(crate) fn is_goal(compiled: &Compiled, state: &State) -> bool {
+    if !state.open.is_empty() {
+        return false;
+    }
+    // The goal is read after all that happens by itself.
+    let mut stepper = Stepper::new(compiled);
+    let mut state = Cow::Borrowed(state);
+    while state.timed < compiled.timed_until_goal {
+        if stepper.advance(state.to_mut(), Step::Timed).is_none() {
             return false;
         }
-        // The goal is read after all that happens by itself.
-        let mut stepper = Stepper::new(compiled);
-        let mut state = Cow::Borrowed(state);
-        while state.timed < compiled.timed_until_goal {
-            if stepper.advance(state.to_mut(), Step::Timed).is_none() {
-                return false;
-            }
-        }
-        if state.symbolic.is_some() {
-            stepper.reach_goal(state.to_mut()).is_some()
-        } else {
-            let mut passes = |test| state.passes(compiled, test, None);
-            compiled.goal.holds(&state.facts, &mut passes)
-        }
     }
+    if state.symbolic.is_some() {
+        stepper.reach_goal(state.to_mut()).is_some()
+    } else {
+        let mut passes = |test| state.passes(compiled, test, None);
+        compiled.goal.holds(&state.facts, &mut passes)
+    }
+}
 
+impl Search<'_> {
     /// The choices that lead to a state.
     pub(super) fn steps_to(&self, mut number: u32) -> Vec<Step> {
         let mut steps = Vec::new();

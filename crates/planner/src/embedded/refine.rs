@@ -1,0 +1,336 @@
+//! Better plans from the plan that was found: parts of it are done otherwise (large neighbourhood
+//! search; Shaw, CP 1998).
+//!
+//! Two things are tried in turn, at random but alike in each run:
+//!
+//! - `schedule`: the same actions in another order. The order of choices decides what waits for
+//!   what, and so when the plan ends.
+//! - `removal` and `repair`: actions are taken out, and a search among what is left of the plan puts
+//!   others in.
+//!
+//! A plan is kept if it is no worse than the one before. The judge sees each that is better.
+
+mod incumbent;
+mod random;
+mod removal;
+mod repair;
+mod schedule;
+mod sequence;
+
+use elbowroom_num::Rational;
+
+use super::apply::{Step, Stepper};
+use super::bound::MetricBound;
+use super::compile::{Compiled, Compressibility, Metric, NONE};
+use super::relaxed::Relaxed;
+use super::search::is_goal;
+use super::state::State;
+use super::step_costs::StepCosts;
+use super::time::{NEVER, Ticks};
+use incumbent::{Incumbent, Worth};
+use random::Random;
+use repair::Repair;
+use schedule::Schedule;
+use sequence::{Item, Kind, Scene, items_of};
+
+/// Counts work, and asks now and then whether to go on.
+pub(crate) struct Ticker<'a> {
+    /// What one estimate counts for.
+    pub(crate) weight: u64,
+    /// What was done so far.
+    pub(crate) work: u64,
+    /// How many states were estimated.
+    pub(crate) evaluated: u64,
+    /// Asked with the work done so far, and the number of states.
+    pub(crate) goes_on: &'a mut dyn FnMut(u64, u64) -> bool,
+    /// Whether it was told to stop.
+    pub(crate) is_stopped: bool,
+}
+
+/// What a step counts for, beside what an operator of an estimate does.
+const STEP_WORK: u64 = 200;
+
+impl Ticker<'_> {
+    fn evaluated(&mut self) -> bool {
+        self.evaluated += 1;
+        self.work += self.weight;
+        self.ask()
+    }
+
+    fn stepped(&mut self) {
+        self.work += STEP_WORK;
+    }
+
+    fn tried(&mut self) {
+        self.work += STEP_WORK / 8;
+    }
+
+    fn ask(&mut self) -> bool {
+        self.is_stopped = self.is_stopped || !(self.goes_on)(self.work, self.evaluated);
+        !self.is_stopped
+    }
+}
+
+/// See the module.
+pub(crate) struct Refiner<'a> {
+    compiled: &'a Compiled,
+    stepper: Stepper<'a>,
+    relaxed: Relaxed<'a>,
+    random: Random,
+    compresses: Option<Compressibility>,
+    incumbent: Option<Incumbent>,
+    /// The costs of the actions, in whole numbers.
+    base_costs: Vec<u32>,
+    /// Their durations, the mean being four.
+    durations: Vec<u32>,
+    next_block: u32,
+    /// How many actions are taken out at most.
+    most_removed: usize,
+}
+
+impl<'a> Refiner<'a> {
+    pub(crate) fn new(compiled: &'a Compiled, compresses: Option<Compressibility>) -> Self {
+        let mut relaxed = Relaxed::new(compiled, compresses);
+        if let Some(metric) = &compiled.metric {
+            relaxed.weigh(&StepCosts::of(compiled, metric));
+        }
+        let numbers = || 0..u32::try_from(compiled.actions.len()).unwrap_or(u32::MAX);
+        let base_costs: Vec<u32> = numbers().map(|action| relaxed.cost_of(action)).collect();
+        let least = |action: u32| compiled.action(action).duration.least.to_f64().max(0.0);
+        let total: f64 = numbers().map(least).sum();
+        #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52 actions")]
+        let mean = (total / compiled.actions.len().max(1) as f64).max(1e-9);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to a small positive range"
+        )]
+        let durations = numbers().map(|action| (4.0 * least(action) / mean).min(32.0) as u32);
+        Self {
+            durations: durations.collect(),
+            compiled,
+            stepper: Stepper::new(compiled),
+            relaxed,
+            random: Random::new(1),
+            compresses,
+            incumbent: None,
+            base_costs,
+            next_block: 0,
+            most_removed: 4,
+        }
+    }
+
+    /// What one estimate comes to.
+    pub(crate) fn weight(&self) -> u64 {
+        self.relaxed.weight()
+    }
+
+    /// Goes on from the plan of these choices, if it is better than its own or there is none.
+    pub(crate) fn take(&mut self, steps: &[Step], ticker: &mut Ticker<'_>) {
+        let Some(items) = items_of(self.compiled, steps) else {
+            return;
+        };
+        let Some(incumbent) = Incumbent::of(self.compiled, &items) else {
+            return;
+        };
+        let is_better = self
+            .incumbent
+            .as_ref()
+            .is_none_or(|own| incumbent.worth < own.worth);
+        if is_better {
+            self.incumbent = Some(incumbent);
+            self.leave_out_needless(ticker);
+        }
+    }
+
+    /// The judge does not accept the plan: goes on from another one.
+    pub(crate) fn forget(&mut self) {
+        self.incumbent = None;
+    }
+
+    /// Tries one change; the choices of a plan that is better, if that is one.
+    pub(crate) fn turn(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Step>> {
+        let incumbent = self.incumbent.as_ref()?;
+        let before = incumbent.worth.clone();
+        // The same actions cost the same, most of the time.
+        let is_timed = |metric: &Metric| !metric.time.is_zero();
+        let reschedules = if self.compiled.metric.as_ref().is_none_or(is_timed) {
+            self.random.once_in(2)
+        } else {
+            self.random.once_in(16)
+        };
+        let items = if reschedules {
+            self.reschedule(ticker)
+        } else {
+            self.repair(ticker)
+        };
+        if !ticker.ask() {
+            return None;
+        }
+        let items = items?;
+        ticker.work += 4 * STEP_WORK * items.len() as u64;
+        let candidate = Incumbent::of(self.compiled, &items)?;
+        if candidate.worth > before {
+            return None;
+        }
+        let is_better =
+            (&candidate.worth.metric, candidate.worth.end) < (&before.metric, before.end);
+        self.incumbent = Some(candidate);
+        if !is_better {
+            return None;
+        }
+        self.leave_out_needless(ticker);
+        self.incumbent.as_ref().map(|own| own.steps.clone())
+    }
+
+    fn reschedule(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
+        let incumbent = self.incumbent.as_ref()?;
+        self.stepper.horizon = incumbent.worth.end;
+        let mut schedule = Schedule {
+            compiled: self.compiled,
+            stepper: &mut self.stepper,
+            random: &mut self.random,
+            incumbent,
+        };
+        schedule.next(ticker)
+    }
+
+    fn repair(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
+        let Self {
+            compiled,
+            stepper,
+            relaxed,
+            random,
+            incumbent,
+            ..
+        } = self;
+        let incumbent = incumbent.as_ref()?;
+        let removed = removal::removed(compiled, incumbent, self.most_removed, random);
+        let is_removed = |item: &Item| removed.contains(&item.block);
+        let first = incumbent.items.iter().position(is_removed)?;
+        let first = first - random.below(first + 1).min(random.below(first + 1));
+        stepper.horizon = NEVER;
+        let begin = scene_at(compiled, stepper, &incumbent.items[..first], ticker)?;
+        let rest = &incumbent.items[first..];
+        let rest: Vec<Item> = rest.iter().copied().filter(|i| !is_removed(i)).collect();
+        let counts_time = compiled.metric.is_none() && random.once_in(2);
+        let costs: Vec<u32> = self
+            .base_costs
+            .iter()
+            .zip(&self.durations)
+            .map(|(base, duration)| {
+                let own = if counts_time { 2 + duration } else { 4 * base };
+                #[allow(clippy::cast_possible_truncation, reason = "a small number")]
+                let noise = random.below(4) as u32;
+                own + noise
+            })
+            .collect();
+        relaxed.set_costs((0..).zip(costs.iter().copied()));
+        let may_equal = random.once_in(2);
+        let worth = &incumbent.worth;
+        let latest_end = |state: &State| latest_end(compiled, worth, may_equal, state);
+        let next_block = incumbent.blocks.keys().next_back().map_or(0, |last| last + 1);
+        let mut repair = Repair {
+            compiled,
+            stepper,
+            relaxed,
+            random,
+            rest: &rest,
+            costs: &costs,
+            next_block: next_block.max(self.next_block),
+            compresses: self.compresses,
+            most_states: 60 + 20 * removed.len() as u64,
+            latest_end: &latest_end,
+        };
+        let tail = repair.run(&begin, ticker)?;
+        let mut items = incumbent.items[..first].to_vec();
+        items.extend(tail);
+        Some(items)
+    }
+
+    /// Leaves out actions that the plan works without, and what is not possible without them
+    /// (action elimination; Nakhost & Müller, ICAPS 2010).
+    fn leave_out_needless(&mut self, ticker: &mut Ticker<'_>) {
+        let Some(incumbent) = self.incumbent.take() else {
+            return;
+        };
+        let compiled = self.compiled;
+        self.stepper.horizon = NEVER;
+        let mut items = incumbent.items.clone();
+        let mut scene = Scene::beginning(compiled);
+        let mut place = 0;
+        while place < items.len() {
+            let item = items[place];
+            if item.kind != Kind::End && item.block != NONE {
+                let mut rest = scene.clone();
+                let mut kept: Vec<Item> = items[..place].to_vec();
+                let mut is_possible = true;
+                for &other in items[place..].iter().filter(|o| o.block != item.block) {
+                    ticker.stepped();
+                    match rest.after(&mut self.stepper, other) {
+                        Some(next) => {
+                            rest = next;
+                            kept.push(other);
+                        }
+                        None if other.kind == Kind::Timed || rest.open.contains(&other.block) => {
+                            is_possible = false;
+                            break;
+                        }
+                        None => {}
+                    }
+                }
+                if !ticker.ask() {
+                    break;
+                }
+                if is_possible && is_goal(compiled, &rest.state) {
+                    items = kept;
+                    continue;
+                }
+            }
+            match scene.after(&mut self.stepper, item) {
+                Some(next) => scene = next,
+                None => break,
+            }
+            place += 1;
+        }
+        let fewer = (items.len() < incumbent.items.len())
+            .then(|| Incumbent::of(compiled, &items))
+            .flatten()
+            .filter(|fewer| fewer.worth <= incumbent.worth);
+        self.incumbent = Some(fewer.unwrap_or(incumbent));
+    }
+}
+
+/// The scene after these items.
+fn scene_at(
+    compiled: &Compiled,
+    stepper: &mut Stepper<'_>,
+    items: &[Item],
+    ticker: &mut Ticker<'_>,
+) -> Option<Scene> {
+    let mut scene = Scene::beginning(compiled);
+    for &item in items {
+        ticker.stepped();
+        scene = scene.after(stepper, item)?;
+    }
+    Some(scene)
+}
+
+/// The latest time at which a plan may end that begins like this and is to be better than `worth`,
+/// or as good.
+fn latest_end(
+    compiled: &Compiled,
+    worth: &Worth,
+    may_equal: bool,
+    state: &State,
+) -> Option<Ticks> {
+    let Some(metric) = &compiled.metric else {
+        return Some(worth.end - i64::from(!may_equal));
+    };
+    let offset: &Rational = &worth.metric;
+    let bound = MetricBound {
+        value: offset.clone(),
+        may_equal,
+    };
+    bound.latest_end(metric, compiled.scale, state)
+}

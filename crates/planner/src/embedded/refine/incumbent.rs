@@ -1,0 +1,269 @@
+//! The plan that is being improved, and what there is to know of it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_num::Rational;
+
+use super::super::apply::Step;
+use super::super::compile::{Compiled, NONE};
+use super::super::formula::{Formula, Literal};
+use super::super::time::Ticks;
+use super::sequence::{Course, Item, Kind, split};
+
+/// What a plan is worth; less is better.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Worth {
+    /// The metric, if it is one other than the makespan; else zero.
+    pub(super) metric: Rational,
+    pub(super) end: Ticks,
+    /// The sum of the times at which its actions are over: among plans that are equally good, those
+    /// that leave more room can be improved more easily.
+    pub(super) ends: Ticks,
+}
+
+/// See the module.
+#[derive(Debug)]
+pub(super) struct Incumbent {
+    pub(super) items: Vec<Item>,
+    pub(super) steps: Vec<Step>,
+    pub(super) worth: Worth,
+    /// The instances, by the number of their block.
+    pub(super) blocks: BTreeMap<u32, Block>,
+    /// The items whose times the end of the plan depends on, one pushing the next one; the latest
+    /// first.
+    pub(super) critical: Vec<Item>,
+}
+
+/// An instance of an action.
+#[derive(Clone, Debug)]
+pub(super) struct Block {
+    pub(super) action: u32,
+    /// Where its first item is; `None` if it was under way before.
+    pub(super) first: Option<usize>,
+    pub(super) last: usize,
+    /// A bit for each literal of the goal that it has a part in.
+    pub(super) serves: Vec<u64>,
+}
+
+impl Incumbent {
+    /// The plan of these items; `None` if they are none, or its worth is not known.
+    pub(super) fn of(compiled: &Compiled, items: &[Item]) -> Option<Self> {
+        let items = split(compiled, items);
+        let course = Course::of(compiled, &items)?;
+        let worth = worth(compiled, &items, &course)?;
+        let (order, critical) = order_of_time(&items, &course);
+        let mut incumbent = Self {
+            items,
+            steps: course.steps,
+            worth,
+            blocks: BTreeMap::new(),
+            critical,
+        };
+        let sorted: Vec<Item> = order.iter().map(|&n| incumbent.items[n]).collect();
+        // Only the order of what does not interfere has changed.
+        if let Some(course) = Course::of(compiled, &sorted) {
+            incumbent.items = sorted;
+            incumbent.steps = course.steps;
+        }
+        incumbent.find_blocks(compiled);
+        Some(incumbent)
+    }
+
+    fn find_blocks(&mut self, compiled: &Compiled) {
+        let goals = compiled.goal.literals.len();
+        for (place, item) in self.items.iter().enumerate() {
+            if item.block == NONE {
+                continue;
+            }
+            let begins = item.kind != Kind::End;
+            let block = self.blocks.entry(item.block).or_insert_with(|| Block {
+                action: item.action,
+                first: begins.then_some(place),
+                last: place,
+                serves: vec![0; goals.div_ceil(64)],
+            });
+            block.last = place;
+        }
+        self.find_goals_served(compiled);
+    }
+
+    /// Follows the links from the goal back: who makes true last what is read.
+    fn find_goals_served(&mut self, compiled: &Compiled) {
+        let links = links(compiled, &self.items);
+        for (number, literal) in compiled.goal.literals.iter().enumerate() {
+            let mut waiting: Vec<u32> = links.last.get(literal).copied().into_iter().collect();
+            while let Some(block) = waiting.pop() {
+                let Some(data) = self.blocks.get_mut(&block) else {
+                    continue;
+                };
+                let word = &mut data.serves[number / 64];
+                if *word >> (number % 64) & 1 == 1 {
+                    continue;
+                }
+                *word |= 1 << (number % 64);
+                waiting.extend(links.suppliers.get(&block).into_iter().flatten());
+            }
+        }
+    }
+}
+
+/// Who supplies whom.
+#[derive(Debug, Default)]
+struct Links {
+    /// For each block those that it needs something of.
+    suppliers: BTreeMap<u32, BTreeSet<u32>>,
+    /// Who last made a literal true.
+    last: BTreeMap<Literal, u32>,
+}
+
+fn links(compiled: &Compiled, items: &[Item]) -> Links {
+    let mut links = Links::default();
+    let need = |links: &mut Links, block: u32, condition: &Formula| {
+        condition.visit_literals(&mut |literal| {
+            if let Some(&supplier) = links.last.get(&literal)
+                && supplier != block
+            {
+                links.suppliers.entry(block).or_default().insert(supplier);
+            }
+        });
+    };
+    let change = |links: &mut Links, block: u32, snap: u32| {
+        let snap = compiled.snap(snap);
+        for &fact in &snap.deletes {
+            links.last.insert(Literal::new(fact, false), block);
+            links.last.remove(&Literal::new(fact, true));
+        }
+        for &fact in &snap.adds {
+            links.last.insert(Literal::new(fact, true), block);
+            links.last.remove(&Literal::new(fact, false));
+        }
+    };
+    for item in items.iter().filter(|item| item.block != NONE) {
+        let action = compiled.action(item.action);
+        let has_end = action.end != NONE;
+        if item.kind != Kind::End {
+            need(&mut links, item.block, &compiled.snap(action.start).condition);
+            change(&mut links, item.block, action.start);
+            if has_end {
+                need(&mut links, item.block, &action.over_all);
+            }
+        }
+        if item.kind != Kind::Start && has_end {
+            need(&mut links, item.block, &compiled.snap(action.end).condition);
+            change(&mut links, item.block, action.end);
+        }
+    }
+    links
+}
+
+/// The worth of a plan whose items have been carried out, the goal being reached.
+fn worth(compiled: &Compiled, items: &[Item], course: &Course) -> Option<Worth> {
+    let (state, network) = (&course.state, course.network());
+    let end = state.earliest_end();
+    let metric = match &compiled.metric {
+        None => Rational::ZERO,
+        Some(metric) => {
+            let time = &metric.time * compiled.scale.units(end);
+            state.spent(metric)? + time
+        }
+    };
+    let ends = items.iter().zip(&course.nodes);
+    let ends = ends.filter(|(item, _)| matches!(item.kind, Kind::End | Kind::Whole));
+    let ends = ends.map(|(_, nodes)| network.earliest(nodes.1) - compiled.now);
+    Some(Worth {
+        metric,
+        end,
+        ends: ends.sum(),
+    })
+}
+
+/// The items in the order of time, as far as the network leaves that open; and those on the
+/// critical path.
+fn order_of_time(items: &[Item], course: &Course) -> (Vec<usize>, Vec<Item>) {
+    let network = course.network();
+    let count = network.node_count();
+    let mut item_of = vec![usize::MAX; count];
+    for (number, (item, nodes)) in items.iter().zip(&course.nodes).enumerate() {
+        if item.kind != Kind::Timed {
+            item_of[nodes.0 as usize] = number;
+            item_of[nodes.1 as usize] = number;
+        }
+    }
+    let mut before = vec![0_usize; items.len()];
+    let mut followers = vec![Vec::new(); items.len()];
+    // For each node the one that pushes it.
+    let mut pushed_by: Vec<Option<usize>> = vec![None; count];
+    let mut link = |from: usize, to: usize| {
+        if from != to {
+            before[to] += 1;
+            followers[from].push(to);
+        }
+    };
+    for (from, to, distance) in network.edges() {
+        let pushes = network.earliest(from) + distance == network.earliest(to);
+        let (from, to) = (from as usize, to as usize);
+        if distance >= 0 {
+            link(item_of[from], item_of[to]);
+            if pushes {
+                pushed_by[to] = Some(from);
+            }
+        }
+    }
+    // Timed initials keep their place.
+    let mut segment = 0;
+    let segments: Vec<usize> = items
+        .iter()
+        .map(|item| {
+            segment += usize::from(item.kind == Kind::Timed);
+            let own = segment;
+            segment += usize::from(item.kind == Kind::Timed);
+            own
+        })
+        .collect();
+    let time = |number: usize| {
+        let node = course.nodes[number].0;
+        let time = if (node as usize) < count {
+            network.earliest(node)
+        } else {
+            Ticks::MAX
+        };
+        (segments[number], time, number)
+    };
+    let free = |before: &[usize], number: usize| before[number] == 0;
+    let mut ready: BTreeSet<(usize, Ticks, usize)> = (0..items.len())
+        .filter(|&number| free(&before, number))
+        .map(time)
+        .collect();
+    let mut order = Vec::with_capacity(items.len());
+    while let Some((_, _, number)) = ready.pop_first() {
+        order.push(number);
+        for &follower in &followers[number] {
+            before[follower] -= 1;
+            if free(&before, follower) {
+                ready.insert(time(follower));
+            }
+        }
+    }
+    let latest = (0..count).max_by_key(|&node| {
+        (
+            network.earliest(u16::try_from(node).unwrap_or(u16::MAX)),
+            node,
+        )
+    });
+    let mut critical = Vec::new();
+    let mut at = latest;
+    let mut steps = 0;
+    while let Some(node) = at.filter(|_| steps <= count) {
+        steps += 1;
+        if let Some(item) = items.get(item_of[node])
+            && critical.last() != Some(item)
+        {
+            critical.push(*item);
+        }
+        at = pushed_by[node];
+    }
+    if order.len() < items.len() {
+        order = (0..items.len()).collect();
+    }
+    (order, critical)
+}

@@ -1,0 +1,220 @@
+//! The same actions in another order.
+//!
+//! An order of priorities becomes a plan by a schedule generation scheme (Kolisch, EJOR 90, 1996).
+//! The *serial* one carries out choices in the given order, each as soon as it is possible. The
+//! *parallel* one goes through time: what has priority starts if nothing that is under way ends
+//! before, and otherwise that ends. Both are changed at the critical path, by exchanging what pushes
+//! and what is pushed (van Laarhoven, Aarts & Lenstra, Operations Research 40, 1992).
+
+use super::super::apply::Stepper;
+use super::super::compile::Compiled;
+use super::super::network::SETTLED;
+use super::super::search::is_goal;
+use super::super::time::Ticks;
+use super::Ticker;
+use super::incumbent::Incumbent;
+use super::random::Random;
+use super::sequence::{Item, Kind, Scene};
+
+/// How many items may wait at the same time for their conditions.
+const MOST_WAITING: usize = 24;
+
+/// See the module.
+pub(super) struct Schedule<'a, 'b> {
+    pub(super) compiled: &'a Compiled,
+    pub(super) stepper: &'b mut Stepper<'a>,
+    pub(super) random: &'b mut Random,
+    pub(super) incumbent: &'b Incumbent,
+}
+
+impl Schedule<'_, '_> {
+    /// Another order, if it makes a plan.
+    pub(super) fn next(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
+        if self.random.once_in(2) {
+            let (items, first) = self.exchanged()?;
+            return self.serial(&items, first, ticker);
+        }
+        let is_start = |item: &&Item| item.kind != Kind::End && item.kind != Kind::Timed;
+        let items = self.incumbent.items.iter().filter(is_start);
+        let mut starts: Vec<Item> = items.copied().collect();
+        self.change_priorities(&mut starts);
+        let window = [1, 2, 4, 8, 16, 64][self.random.below(6)];
+        self.parallel(starts, window, ticker)
+    }
+
+    /// An item of the critical path and the one that pushes it, of another instance.
+    fn critical_pair(&mut self) -> Option<(Item, Item)> {
+        let critical = &self.incumbent.critical;
+        let pairs = critical.windows(2);
+        let differ = |pair: &&[Item]| pair[0].block != pair[1].block;
+        let pairs: Vec<&[Item]> = pairs.filter(differ).collect();
+        let pair = self.random.of(&pairs)?;
+        Some((pair[0], pair[1]))
+    }
+
+    /// The items with one of the critical path put before the one that pushes it, and where that
+    /// is.
+    fn exchanged(&mut self) -> Option<(Vec<Item>, usize)> {
+        let (later, earlier) = self.critical_pair()?;
+        let mut items = self.incumbent.items.clone();
+        let from = items.iter().position(|item| *item == later)?;
+        let to = items.iter().position(|item| *item == earlier)?;
+        if from < to {
+            return None;
+        }
+        if self.random.once_in(2) {
+            items.remove(from);
+            items.insert(to, later);
+        } else {
+            items.remove(to);
+            items.insert(from, earlier);
+        }
+        Some((items, to))
+    }
+
+    fn change_priorities(&mut self, starts: &mut Vec<Item>) {
+        if self.random.once_in(8) {
+            return;
+        }
+        let place = |starts: &[Item], block: u32| starts.iter().position(|s| s.block == block);
+        let changes = 1 + self.random.below(3);
+        for _ in 0..changes {
+            let pair = self.critical_pair().and_then(|(later, earlier)| {
+                Some((place(starts, later.block)?, place(starts, earlier.block)?))
+            });
+            let (from, to) = match pair.filter(|_| !self.random.once_in(4)) {
+                Some(pair) => pair,
+                None if starts.is_empty() => return,
+                None => {
+                    let from = self.random.below(starts.len());
+                    (from, (from + 8).min(starts.len() - 1) - self.random.below(8).min(from))
+                }
+            };
+            let moved = starts.remove(from);
+            starts.insert(to, moved);
+        }
+    }
+
+    /// Carries out the items, the first ones first: what is not possible waits until it is. What
+    /// remains impossible is left out, if the goal is reached without it. Up to `first` they are as
+    /// in the plan.
+    fn serial(
+        &mut self,
+        items: &[Item],
+        first: usize,
+        ticker: &mut Ticker<'_>,
+    ) -> Option<Vec<Item>> {
+        let mut scene = super::scene_at(self.compiled, self.stepper, &items[..first], ticker)?;
+        let mut order = items[..first].to_vec();
+        let mut waiting: Vec<Item> = Vec::new();
+        for &item in &items[first..] {
+            ticker.stepped();
+            let is_in_turn = waiting.iter().all(|other| other.block != item.block);
+            let next = is_in_turn.then(|| scene.after(self.stepper, item)).flatten();
+            let Some(next) = next else {
+                waiting.push(item);
+                if waiting.len() > MOST_WAITING {
+                    return None;
+                }
+                continue;
+            };
+            scene = next;
+            order.push(item);
+            let mut place = 0;
+            while place < waiting.len() {
+                ticker.tried();
+                if let Some(next) = scene.after(self.stepper, waiting[place]) {
+                    scene = next;
+                    order.push(waiting.remove(place));
+                    place = 0;
+                } else {
+                    place += 1;
+                }
+            }
+        }
+        is_goal(self.compiled, &scene.state).then_some(order)
+    }
+
+    /// Goes through time: of the first `window` starts that wait, the first starts that can before
+    /// something ends.
+    fn parallel(
+        &mut self,
+        mut starts: Vec<Item>,
+        window: usize,
+        ticker: &mut Ticker<'_>,
+    ) -> Option<Vec<Item>> {
+        let mut scene = Scene::beginning(self.compiled);
+        let mut order = Vec::new();
+        loop {
+            let mut ends = ends(&scene);
+            let next_timed = self.compiled.timed.get(scene.state.timed as usize);
+            let until = ends.first().map_or(Ticks::MAX, |end| end.0);
+            let until = next_timed.map_or(until, |timed| until.min(timed.time));
+            let mut chosen = None;
+            for place in 0..starts.len().min(window) {
+                ticker.tried();
+                let Some(next) = scene.after(self.stepper, starts[place]) else {
+                    continue;
+                };
+                // What starts while another one ends would push that end.
+                if begin(&scene, &next) <= until - self.compiled.epsilon {
+                    chosen = Some((starts.remove(place), next));
+                    break;
+                }
+            }
+            if chosen.is_none()
+                && let Some(timed) = next_timed
+                && ends.first().is_none_or(|end| timed.time <= end.0)
+            {
+                let item = Item::TIMED;
+                chosen = scene.after(self.stepper, item).map(|next| (item, next));
+            }
+            while chosen.is_none() && !ends.is_empty() {
+                ticker.stepped();
+                let (_, item) = ends.remove(0);
+                chosen = scene.after(self.stepper, item).map(|next| (item, next));
+            }
+            let Some((item, next)) = chosen else {
+                break;
+            };
+            order.push(item);
+            ticker.stepped();
+            scene = next;
+        }
+        is_goal(self.compiled, &scene.state).then_some(order)
+    }
+}
+
+/// The ends of what is under way, the earliest first.
+fn ends(scene: &Scene) -> Vec<(Ticks, Item)> {
+    let open = scene.state.open.iter().zip(&scene.open);
+    let mut ends: Vec<(Ticks, Item)> = open
+        .map(|(open, &block)| {
+            let start = if open.node == SETTLED {
+                open.start
+            } else {
+                scene.state.network.earliest(open.node)
+            };
+            let item = Item {
+                kind: Kind::End,
+                action: open.action,
+                block,
+            };
+            (start + open.least, item)
+        })
+        .collect();
+    ends.sort_by_key(|(time, item)| (*time, item.block));
+    ends
+}
+
+/// When what has just started began, as far as that is known.
+fn begin(before: &Scene, after: &Scene) -> Ticks {
+    let new = after.open.iter().zip(&after.state.open);
+    let mut new = new.filter(|(block, _)| !before.open.contains(block));
+    match new.next() {
+        Some((_, open)) if open.node == SETTLED => open.start,
+        Some((_, open)) => after.state.network.earliest(open.node),
+        // It takes no time.
+        None => Ticks::MIN,
+    }
+}
