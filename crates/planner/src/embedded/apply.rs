@@ -84,7 +84,9 @@ impl<'a> Stepper<'a> {
                 return None;
             }
             let fails = |&test: &u32| {
-                let reads_duration = self.compiled.tests[test as usize].difference.reads_duration();
+                let reads_duration = self.compiled.tests[test as usize]
+                    .difference
+                    .reads_duration();
                 !reads_duration && !state.passes(self.compiled, test, None)
             };
             if state.symbolic.is_none() && snap.condition.tests.iter().any(fails) {

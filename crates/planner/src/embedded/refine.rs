@@ -229,7 +229,11 @@ impl<'a> Refiner<'a> {
         let may_equal = random.once_in(2);
         let worth = &incumbent.worth;
         let latest_end = |state: &State| latest_end(compiled, worth, may_equal, state);
-        let next_block = incumbent.blocks.keys().next_back().map_or(0, |last| last + 1);
+        let next_block = incumbent
+            .blocks
+            .keys()
+            .next_back()
+            .map_or(0, |last| last + 1);
         let mut repair = Repair {
             compiled,
             stepper,
@@ -318,12 +322,7 @@ fn scene_at(
 
 /// The latest time at which a plan may end that begins like this and is to be better than `worth`,
 /// or as good.
-fn latest_end(
-    compiled: &Compiled,
-    worth: &Worth,
-    may_equal: bool,
-    state: &State,
-) -> Option<Ticks> {
+fn latest_end(compiled: &Compiled, worth: &Worth, may_equal: bool, state: &State) -> Option<Ticks> {
     let Some(metric) = &compiled.metric else {
         return Some(worth.end - i64::from(!may_equal));
     };

@@ -454,7 +454,11 @@ impl<'a> Relaxed<'a> {
 }
 
 fn own_costs(graph: &Graph) -> Vec<u32> {
-    graph.operators.iter().map(|operator| operator.cost).collect()
+    graph
+        .operators
+        .iter()
+        .map(|operator| operator.cost)
+        .collect()
 }
 
 /// The time at which the literal of a timetable last becomes false.

@@ -142,7 +142,11 @@ fn links(compiled: &Compiled, items: &[Item]) -> Links {
         let action = compiled.action(item.action);
         let has_end = action.end != NONE;
         if item.kind != Kind::End {
-            need(&mut links, item.block, &compiled.snap(action.start).condition);
+            need(
+                &mut links,
+                item.block,
+                &compiled.snap(action.start).condition,
+            );
             change(&mut links, item.block, action.start);
             if has_end {
                 need(&mut links, item.block, &action.over_all);

@@ -64,7 +64,8 @@ impl Repair<'_, '_> {
             *left.entry(item.action).or_default() += 1;
         }
         let mut standing = 0;
-        self.relaxed.set_costs(left.keys().map(|&action| (action, 0)));
+        self.relaxed
+            .set_costs(left.keys().map(|&action| (action, 0)));
         queue.insert(
             (0, 0),
             Waiting {
@@ -198,8 +199,10 @@ impl Repair<'_, '_> {
                 );
             }
         }
-        self.relaxed
-            .set_costs(left.keys().map(|&action| (action, self.costs[action as usize])));
+        self.relaxed.set_costs(
+            left.keys()
+                .map(|&action| (action, self.costs[action as usize])),
+        );
         let (mut number, tail) = found?;
         let mut items = Vec::new();
         while number != usize::MAX {

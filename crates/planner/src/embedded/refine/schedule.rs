@@ -87,7 +87,10 @@ impl Schedule<'_, '_> {
                 None if starts.is_empty() => return,
                 None => {
                     let from = self.random.below(starts.len());
-                    (from, (from + 8).min(starts.len() - 1) - self.random.below(8).min(from))
+                    (
+                        from,
+                        (from + 8).min(starts.len() - 1) - self.random.below(8).min(from),
+                    )
                 }
             };
             let moved = starts.remove(from);
@@ -110,7 +113,9 @@ impl Schedule<'_, '_> {
         for &item in &items[first..] {
             ticker.stepped();
             let is_in_turn = waiting.iter().all(|other| other.block != item.block);
-            let next = is_in_turn.then(|| scene.after(self.stepper, item)).flatten();
+            let next = is_in_turn
+                .then(|| scene.after(self.stepper, item))
+                .flatten();
             let Some(next) = next else {
                 waiting.push(item);
                 if waiting.len() > MOST_WAITING {
@@ -157,7 +162,9 @@ impl Schedule<'_, '_> {
                     continue;
                 };
                 // What starts while another one ends would push that end.
-                if begin(&scene, &next) <= until - self.compiled.epsilon {
+                if begin(&scene, &next) <= until - self.compiled.epsilon
+                    && !keeps_from_ending(self.compiled, &scene, &next)
+                {
                     chosen = Some((starts.remove(place), next));
                     break;
                 }
@@ -205,6 +212,20 @@ fn ends(scene: &Scene) -> Vec<(Ticks, Item)> {
         .collect();
     ends.sort_by_key(|(time, item)| (*time, item.block));
     ends
+}
+
+/// Whether something under way could end before, as far as conditions go, and not after.
+fn keeps_from_ending(compiled: &Compiled, before: &Scene, after: &Scene) -> bool {
+    let can_end = |scene: &Scene, action: u32| {
+        let condition = &compiled.snap(compiled.action(action).end).condition;
+        let state = &scene.state;
+        condition.holds(&state.facts, &mut |test| {
+            let test_data = &compiled.tests[test as usize];
+            test_data.difference.reads_duration() || state.passes(compiled, test, None)
+        })
+    };
+    let mut open = before.state.open.iter();
+    open.any(|open| can_end(before, open.action) && !can_end(after, open.action))
 }
 
 /// When what has just started began, as far as that is known.
