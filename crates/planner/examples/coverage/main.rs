@@ -213,7 +213,10 @@ impl Clock {
 
     fn elapsed(&self) -> Duration {
         let spent = self.spent.zip(processor_time());
-        spent.map_or_else(|| self.begin.elapsed(), |(begin, now)| now - begin)
+        spent.map_or_else(
+            || self.begin.elapsed(),
+            |(begin, now)| now.saturating_sub(begin),
+        )
     }
 }
 

@@ -17,8 +17,6 @@ mod repair;
 mod schedule;
 mod sequence;
 
-use elbowroom_num::Rational;
-
 use super::apply::{Step, Stepper};
 use super::bound::MetricBound;
 use super::compile::{Compiled, Compressibility, Metric, NONE};
@@ -27,6 +25,7 @@ use super::search::is_goal;
 use super::state::State;
 use super::step_costs::StepCosts;
 use super::time::{NEVER, Ticks};
+use super::tuning::Technique;
 use incumbent::{Incumbent, Worth};
 use random::Random;
 use repair::Repair;
@@ -83,9 +82,6 @@ pub(crate) struct Refiner<'a> {
     base_costs: Vec<u32>,
     /// Their durations, the mean being four.
     durations: Vec<u32>,
-    next_block: u32,
-    /// How many actions are taken out at most.
-    most_removed: usize,
 }
 
 impl<'a> Refiner<'a> {
@@ -115,8 +111,6 @@ impl<'a> Refiner<'a> {
             compresses,
             incumbent: None,
             base_costs,
-            next_block: 0,
-            most_removed: 4,
         }
     }
 
@@ -152,13 +146,7 @@ impl<'a> Refiner<'a> {
     pub(crate) fn turn(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Step>> {
         let incumbent = self.incumbent.as_ref()?;
         let before = incumbent.worth.clone();
-        // The same actions cost the same, most of the time.
-        let is_timed = |metric: &Metric| !metric.time.is_zero();
-        let reschedules = if self.compiled.metric.as_ref().is_none_or(is_timed) {
-            self.random.once_in(2)
-        } else {
-            self.random.once_in(16)
-        };
+        let reschedules = self.is_turn_to_reschedule();
         let items = if reschedules {
             self.reschedule(ticker)
         } else {
@@ -183,6 +171,18 @@ impl<'a> Refiner<'a> {
         self.incumbent.as_ref().map(|own| own.steps.clone())
     }
 
+    /// Whether other orders are tried next; they seldom change what the same actions cost.
+    fn is_turn_to_reschedule(&mut self) -> bool {
+        let tuning = &self.compiled.tuning;
+        if !tuning.uses(Technique::Repair) {
+            return true;
+        }
+        let is_timed = |metric: &Metric| !metric.time.is_zero();
+        let matters = self.compiled.metric.as_ref().is_none_or(is_timed);
+        let is_its_turn = self.random.once_in(if matters { 2 } else { 16 });
+        is_its_turn && tuning.uses(Technique::Rescheduling)
+    }
+
     fn reschedule(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
         let incumbent = self.incumbent.as_ref()?;
         self.stepper.horizon = incumbent.worth.end;
@@ -205,7 +205,7 @@ impl<'a> Refiner<'a> {
             ..
         } = self;
         let incumbent = incumbent.as_ref()?;
-        let removed = removal::removed(compiled, incumbent, self.most_removed, random);
+        let removed = removal::removed(compiled, incumbent, compiled.tuning.most_removed, random);
         let is_removed = |item: &Item| removed.contains(&item.block);
         let first = incumbent.items.iter().position(is_removed)?;
         let first = first - random.below(first + 1).min(random.below(first + 1));
@@ -234,6 +234,7 @@ impl<'a> Refiner<'a> {
             .keys()
             .next_back()
             .map_or(0, |last| last + 1);
+        let tuning = &compiled.tuning;
         let mut repair = Repair {
             compiled,
             stepper,
@@ -241,9 +242,10 @@ impl<'a> Refiner<'a> {
             random,
             rest: &rest,
             costs: &costs,
-            next_block: next_block.max(self.next_block),
+            next_block,
             compresses: self.compresses,
-            most_states: 60 + 20 * removed.len() as u64,
+            most_states: tuning.repair_states
+                + tuning.repair_states_per_action * removed.len() as u64,
             latest_end: &latest_end,
         };
         let tail = repair.run(&begin, ticker)?;
@@ -326,9 +328,8 @@ fn latest_end(compiled: &Compiled, worth: &Worth, may_equal: bool, state: &State
     let Some(metric) = &compiled.metric else {
         return Some(worth.end - i64::from(!may_equal));
     };
-    let offset: &Rational = &worth.metric;
     let bound = MetricBound {
-        value: offset.clone(),
+        value: worth.metric.clone(),
         may_equal,
     };
     bound.latest_end(metric, compiled.scale, state)

@@ -36,8 +36,10 @@ pub enum Technique {
     Consumables,
     /// Relaxed plans fill up what they use up.
     Reservoirs,
-    /// Better plans are looked for near the best one.
-    Refinement,
+    /// The best plan's actions are tried in other orders.
+    Rescheduling,
+    /// Parts of the best plan are taken out and done otherwise.
+    Repair,
 }
 
 impl Technique {
@@ -55,7 +57,8 @@ impl Technique {
         (Self::Nesting, "nesting"),
         (Self::Consumables, "consumables"),
         (Self::Reservoirs, "reservoirs"),
-        (Self::Refinement, "refinement"),
+        (Self::Rescheduling, "rescheduling"),
+        (Self::Repair, "repair"),
     ];
 }
 
@@ -222,8 +225,16 @@ constants! {
     incomplete_share: u64 = 8;
     /// How many states each search for better plans looks at in its first round. Not measured.
     improving_round: u64 = 4_096;
-    /// How long the search near the best plan takes for each unit of time of another search.
+    /// How long the search near the best plan takes for each unit of time of another search. Not
+    /// measured; it finds most of the better plans, but only the others prove that there is none.
     refining_share: u64 = 2;
+    /// How many actions, about, are taken out of a plan at most, to be done otherwise. Not measured.
+    most_removed: usize = 4;
+    /// How many states a repair looks at: so many, and some more for each action that was taken
+    /// out. Not measured; a repair that takes longer seldom succeeds.
+    repair_states: u64 = 60;
+    /// How many more.
+    repair_states_per_action: u64 = 20;
 
     /// How many turns the preferred successors get for a better estimate. The value of LAMA
     /// (Richter & Westphal, JAIR 2010); not measured here.

@@ -14,6 +14,7 @@ mod course_twin;
 mod features;
 mod metric;
 mod portfolio;
+mod refinement;
 mod resources;
 mod situations;
 mod twin;

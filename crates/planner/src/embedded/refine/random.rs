@@ -1,4 +1,4 @@
-//! Numbers that look random and are the same in each run (SplitMix64; Steele, Lea & Flood, OOPSLA
+//! Numbers that look random and are the same in each run (`SplitMix64`; Steele, Lea & Flood, OOPSLA
 //! 2014).
 
 /// See the module.

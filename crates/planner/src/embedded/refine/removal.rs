@@ -103,9 +103,9 @@ fn of_goals(
         }
         let others: Vec<u32> = blocks.keys().copied().collect();
         next = random.of(&others).and_then(|other| {
-            let serves = &blocks[other].serves;
+            let bits = &blocks[other].serves;
             let goals: Vec<usize> = (0..count)
-                .filter(|&g| is_in(serves, g) && !is_in(&chosen, g))
+                .filter(|&g| is_in(bits, g) && !is_in(&chosen, g))
                 .collect();
             random.of(&goals).copied()
         });

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::super::apply::{Step, Stepper};
 use super::super::compile::{Compiled, Compressibility, NONE};
 use super::super::hash::Map;
-use super::super::relaxed::Relaxed;
+use super::super::relaxed::{Estimate, Relaxed};
 use super::super::search::is_goal;
 use super::super::state::State;
 use super::super::time::Ticks;
@@ -35,6 +35,7 @@ pub(super) struct Repair<'a, 'b> {
     pub(super) latest_end: &'b dyn Fn(&State) -> Option<Ticks>,
 }
 
+#[derive(Clone)]
 struct Node {
     scene: Scene,
     /// How much of the rest is behind it.
@@ -44,174 +45,170 @@ struct Node {
     item: Option<Item>,
 }
 
-/// A node that waits for its turn.
-struct Waiting {
-    scene: Scene,
-    place: usize,
-    parent: usize,
-    item: Option<Item>,
+/// What a search knows.
+#[derive(Default)]
+struct Tree {
+    nodes: Vec<Node>,
+    queue: BTreeMap<(u32, u64), Node>,
+    known: Map<(u64, usize), Vec<Ticks>>,
+    /// How often each action is among what is left, from where the estimates stand on.
+    left: BTreeMap<u32, u32>,
+    standing: usize,
+}
+
+impl Tree {
+    /// Whether a node differs from all before it, as far as that is looked at.
+    fn is_new(&mut self, node: &Node) -> bool {
+        let state = &node.scene.state;
+        let times = self.known.entry((state.discrete_hash(), node.place));
+        let times = times.or_default();
+        let end = state.earliest_end();
+        let is_new = !times.contains(&end);
+        if is_new {
+            times.push(end);
+        }
+        is_new
+    }
+
+    /// The items that lead to a node.
+    fn items_to(&self, mut number: usize) -> Vec<Item> {
+        let mut items = Vec::new();
+        while let Some(node) = self.nodes.get(number) {
+            items.extend(node.item);
+            number = node.parent;
+        }
+        items.reverse();
+        items
+    }
 }
 
 impl Repair<'_, '_> {
     /// The items from `begin` on, of a plan that reaches the goal in time.
     pub(super) fn run(&mut self, begin: &Scene, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
-        let mut nodes: Vec<Node> = Vec::new();
-        let mut queue: BTreeMap<(u32, u64), Waiting> = BTreeMap::new();
-        let mut known: Map<(u64, usize), Vec<Ticks>> = Map::default();
-        // How often each action is among what is left, from where the estimates stand on.
-        let mut left: BTreeMap<u32, u32> = BTreeMap::new();
+        let mut tree = Tree::default();
         for item in self.rest.iter().filter(|item| item.block != NONE) {
-            *left.entry(item.action).or_default() += 1;
+            *tree.left.entry(item.action).or_default() += 1;
         }
-        let mut standing = 0;
         self.relaxed
-            .set_costs(left.keys().map(|&action| (action, 0)));
-        queue.insert(
-            (0, 0),
-            Waiting {
-                scene: begin.clone(),
-                place: 0,
-                parent: usize::MAX,
-                item: None,
-            },
-        );
+            .set_costs(tree.left.keys().map(|&action| (action, 0)));
+        let root = Node {
+            scene: begin.clone(),
+            place: 0,
+            parent: usize::MAX,
+            item: None,
+        };
+        tree.queue.insert((0, 0), root);
         let mut evaluated = 0;
-        let mut found = None;
-        while let Some((_, waiting)) = queue.pop_first() {
-            if evaluated >= self.most_states {
-                break;
-            }
-            let Waiting {
-                scene,
-                place,
-                parent,
-                item,
-            } = waiting;
-            let Some(latest) = (self.latest_end)(&scene.state) else {
+        while evaluated < self.most_states
+            && let Some((_, node)) = tree.queue.pop_first()
+        {
+            let latest = (self.latest_end)(&node.scene.state);
+            let is_in_time = latest.is_some_and(|l| node.scene.state.earliest_end() <= l);
+            let Some(latest) = latest.filter(|_| is_in_time && tree.is_new(&node)) else {
                 continue;
             };
-            if scene.state.earliest_end() > latest {
-                continue;
-            }
-            let times = known
-                .entry((scene.state.discrete_hash(), place))
-                .or_default();
-            let end = scene.state.earliest_end();
-            if times.contains(&end) {
-                continue;
-            }
-            times.push(end);
-            self.move_to(place, &mut standing, &mut left);
+            self.move_to(node.place, &mut tree.standing, &mut tree.left);
             self.relaxed.horizon = latest;
             self.stepper.horizon = latest;
             evaluated += 1;
             if !ticker.evaluated() {
-                break;
+                return None;
             }
-            let Some(estimate) = self.relaxed.evaluate(&scene.state) else {
+            let Some(estimate) = self.relaxed.evaluate(&node.scene.state) else {
                 continue;
             };
-            let number = nodes.len();
-            let needs = estimate.steps;
-            nodes.push(Node {
-                scene,
-                place,
-                parent,
-                item,
-            });
-            if needs == 0
-                && let Some(tail) = self.follow(&nodes[number], ticker)
+            if estimate.steps == 0
+                && let Some(tail) = self.follow(&node, ticker)
             {
-                found = Some((number, tail));
-                break;
+                tree.nodes.push(node);
+                let mut items = tree.items_to(tree.nodes.len() - 1);
+                items.extend(tail);
+                return Some(items);
             }
-            let rank = |random: &mut Random, cost: u32, order: u64| {
-                (cost, order << 32 | random.next() >> 32)
+            self.put_in(&node, &estimate, &mut tree);
+            self.go_on(&node, estimate.steps, &mut tree);
+            tree.nodes.push(node);
+        }
+        None
+    }
+
+    /// Lets what may be put in after the node wait for its turn: it is estimated to save what it
+    /// costs. Of the same estimate, most of it comes before what is left.
+    fn put_in(&mut self, node: &Node, estimate: &Estimate, tree: &mut Tree) {
+        let rest = &self.rest[node.place..];
+        for &step in &estimate.preferred {
+            let (is_left, cost) = match step {
+                Step::Start(action) | Step::Compressed(action) => {
+                    let is_left = tree.left.contains_key(&action);
+                    (is_left, self.costs[action as usize])
+                }
+                Step::End(at) => {
+                    let block = node.scene.open.get(at as usize);
+                    let is_due = |item: &Item| Some(&item.block) == block;
+                    (rest.iter().any(is_due), 1)
+                }
+                Step::Timed => (true, 0),
             };
-            // What is new comes first or last, by chance; what is left is taken as it stands.
-            for &step in &estimate.preferred {
-                let is_left = match step {
-                    Step::Start(action) | Step::Compressed(action) => left.contains_key(&action),
-                    Step::End(at) => {
-                        let block = nodes[number].scene.open.get(at as usize);
-                        let rest = &self.rest[place..];
-                        block.is_some_and(|block| rest.iter().any(|item| item.block == *block))
-                    }
-                    Step::Timed => true,
-                };
-                if is_left {
-                    continue;
-                }
-                if let Some((item, scene)) = self.make(&nodes[number].scene, step) {
-                    let order = u64::from(self.random.once_in(4));
-                    let cost = match step {
-                        Step::Start(action) | Step::Compressed(action) => {
-                            self.costs[action as usize]
-                        }
-                        _ => 1,
-                    };
-                    let key = rank(self.random, needs.saturating_sub(cost), order);
-                    queue.insert(
-                        key,
-                        Waiting {
-                            scene,
-                            place,
-                            parent: number,
-                            item: Some(item),
-                        },
-                    );
-                }
-            }
-            let Some(&next) = self.rest.get(place) else {
+            if is_left {
                 continue;
-            };
-            let after = nodes[number].scene.after(self.stepper, next);
-            let is_possible = after.is_some();
-            if let Some(scene) = after {
-                let key = rank(self.random, needs, 1);
-                queue.insert(
-                    key,
-                    Waiting {
-                        scene,
-                        place: place + 1,
-                        parent: number,
-                        item: Some(next),
-                    },
-                );
             }
-            let is_due = next.kind == Kind::Timed
-                || next.kind == Kind::End && nodes[number].scene.open.contains(&next.block);
-            if !is_due {
-                let cost = if next.kind == Kind::End {
-                    0
-                } else {
-                    self.costs[next.action as usize] / if is_possible { 1 } else { 2 }
+            if let Some((item, scene)) = self.make(&node.scene, step) {
+                let order = u64::from(self.random.once_in(4));
+                let next = Node {
+                    scene,
+                    place: node.place,
+                    parent: tree.nodes.len(),
+                    item: Some(item),
                 };
-                let key = rank(self.random, needs + cost, 2);
-                queue.insert(
-                    key,
-                    Waiting {
-                        scene: nodes[number].scene.clone(),
-                        place: place + 1,
-                        parent: number,
-                        item: None,
-                    },
-                );
+                let key = self.key(estimate.steps.saturating_sub(cost), order);
+                tree.queue.insert(key, next);
             }
         }
-        self.relaxed.set_costs(
-            left.keys()
-                .map(|&action| (action, self.costs[action as usize])),
-        );
-        let (mut number, tail) = found?;
-        let mut items = Vec::new();
-        while number != usize::MAX {
-            items.extend(nodes[number].item);
-            number = nodes[number].parent;
+    }
+
+    /// Lets the next of what is left wait for its turn, and what comes of passing it over.
+    fn go_on(&mut self, node: &Node, needs: u32, tree: &mut Tree) {
+        let Some(&next) = self.rest.get(node.place) else {
+            return;
+        };
+        let after = node.scene.after(self.stepper, next);
+        let is_possible = after.is_some();
+        if let Some(scene) = after {
+            let key = self.key(needs, 1);
+            let next = Node {
+                scene,
+                place: node.place + 1,
+                parent: tree.nodes.len(),
+                item: Some(next),
+            };
+            tree.queue.insert(key, next);
         }
-        items.reverse();
-        items.extend(tail);
-        Some(items)
+        let is_due = match next.kind {
+            Kind::Timed => true,
+            Kind::End => node.scene.open.contains(&next.block),
+            Kind::Start | Kind::Whole => false,
+        };
+        if is_due {
+            return;
+        }
+        let cost = match next.kind {
+            Kind::End => 0,
+            _ if is_possible => self.costs[next.action as usize],
+            _ => self.costs[next.action as usize] / 2,
+        };
+        let key = self.key(needs + cost, 2);
+        let next = Node {
+            scene: node.scene.clone(),
+            place: node.place + 1,
+            parent: tree.nodes.len(),
+            item: None,
+        };
+        tree.queue.insert(key, next);
+    }
+
+    /// A place in the queue: by estimate, then by order, then by chance.
+    fn key(&mut self, estimate: u32, order: u64) -> (u32, u64) {
+        (estimate, order << 32 | self.random.next() >> 32)
     }
 
     /// Lets the estimates stand at a place of the rest: what is behind it costs what it costs.

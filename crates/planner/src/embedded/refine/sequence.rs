@@ -114,11 +114,10 @@ impl Scene {
 pub(super) fn items_of(compiled: &Compiled, steps: &[Step]) -> Option<Vec<Item>> {
     let mut scene = Scene::beginning(compiled);
     let mut stepper = Stepper::new(compiled);
-    let mut next = u32::try_from(scene.open.len()).ok()?;
+    let first = u32::try_from(scene.open.len()).ok()?;
     let mut items = Vec::with_capacity(steps.len());
-    for &step in steps {
-        let item = scene.item(compiled, step, next)?;
-        next += 1;
+    for (block, &step) in (first..).zip(steps) {
+        let item = scene.item(compiled, step, block)?;
         scene = scene.after(&mut stepper, item)?;
         items.push(item);
     }

@@ -21,7 +21,7 @@ impl<'a> Planner<'a> {
         self.best.is_some()
             && !self.settings.first_plan_only
             && !self.compiled.is_symbolic
-            && tuning.uses(Technique::Refinement)
+            && (tuning.uses(Technique::Rescheduling) || tuning.uses(Technique::Repair))
     }
 
     /// Looks for better plans near the best one for as long as a search of so many states takes.
