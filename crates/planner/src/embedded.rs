@@ -16,6 +16,7 @@
 //! 4. `extract` turns the choices into a plan with times, and shows it to the judge.
 //! 5. `course` turns constraints on the course of a plan into conditions and goals first.
 //! 6. `run` shares the time out among searches: first for any plan, then for better ones.
+//! 7. `refine` makes better plans of the best one.
 
 mod answer;
 mod apply;
