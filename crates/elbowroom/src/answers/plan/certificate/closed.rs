@@ -16,6 +16,9 @@ const MOST_STATES: usize = 5_000;
 /// The most states that are made.
 const MOST_MADE: usize = 200_000;
 
+/// The most actions under way at one time: where an action may overlap with itself, there is no end of them.
+const MOST_UNDER_WAY: usize = 6;
+
 /// Why there is no closed set.
 pub(super) enum Failure {
     Unknown(String),
@@ -86,6 +89,9 @@ fn states(
     let mut made = 0;
     let mut add = |node: Node, nodes: &mut Vec<Option<Node>>, open: &mut VecDeque<usize>| {
         made += 1;
+        if node.under_way.len() > MOST_UNDER_WAY {
+            return Err(Failure::TooMany);
+        }
         let mut node = node;
         node.zone = if with_times {
             widened(&node, closure.times().len(), last.as_ref())
