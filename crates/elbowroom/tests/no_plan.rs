@@ -129,7 +129,7 @@ fn no_plan_is_denied_by_the_certificate_of_a_problem_with_less() {
     let mut random = Random(11);
     let mut made: BTreeMap<Kind, usize> = BTreeMap::new();
     let (mut attacks, mut denied, mut uncertified) = (0, 0, 0);
-    for _ in 0..150 {
+    for _ in 0..1_200 {
         let draft = Draft::random(&mut random);
         let (domain, problem) = draft.text();
         let whole = task(&domain, &problem);
@@ -169,10 +169,13 @@ fn no_plan_is_denied_by_the_certificate_of_a_problem_with_less() {
             }
         }
     }
-    let of = |kind| made.get(&kind).copied().unwrap_or_default();
     println!("{made:?}, {attacks} attacks, {uncertified} of {denied} without a certificate");
-    assert!(of(Kind::Apart) > 5 && of(Kind::Closed) > 5, "{made:?}");
-    assert!(attacks > 300 && denied > 200, "{attacks} {denied}");
+    // Most of these are out of reach by themselves; the problems below are not.
+    assert!(
+        made.values().sum::<usize>() > 1_000 && made.len() > 1,
+        "{made:?}"
+    );
+    assert!(attacks > 200 && denied > 1_000, "{attacks} {denied}");
     assert!(uncertified * 4 < denied, "{uncertified} of {denied}");
 }
 

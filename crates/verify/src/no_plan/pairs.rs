@@ -19,7 +19,7 @@
 //! Facts that only timed initials make true are no atoms: the windows of happenings see to them. Derived
 //! facts, numbers that change, and disjunctions are taken to be as they are needed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_model::ground::{Change, Condition};
 use elbowroom_num::Rational;
@@ -206,13 +206,22 @@ impl<'a> Structure<'a> {
         }
         wanted.sort_unstable();
         wanted.dedup();
-        let is_timed_only = |(fact, is_true): &Literal| *is_true && instances.is_timed_only(*fact);
+        // What actions make false is an atom, even if none makes it true.
+        let snaps = self.processes.iter();
+        let snaps = snaps.flat_map(|process| process.start.iter().chain(&process.end));
+        let makes: BTreeSet<Literal> = snaps.flat_map(|snap| snap.makes.iter().copied()).collect();
+        let is_timed_only = |(fact, is_true): &Literal| {
+            *is_true && !makes.contains(&(*fact, false)) && instances.is_timed_only(*fact)
+        };
         wanted.retain(|own| !instances.task.is_derived(own.0) && !is_timed_only(own));
         let facts = &instances.task.initial().facts;
         for literal in wanted {
             let is_initial = facts.contains(&literal.0) == literal.1;
             let fact = instances.task.atom(literal.0);
-            let floor = match (literal.1, self.moments.reached.get(&fact)) {
+            let spans = instances.lasting.spans(&fact);
+            let first = spans.map(|spans| spans.first().map(|span| &span.0));
+            let from = first.unwrap_or_else(|| self.moments.reached.get(&fact));
+            let floor = match (literal.1, from) {
                 _ if is_initial => self.before.clone(),
                 (true, None) => Earliest::Never,
                 (true, Some(from)) => Earliest::From(from.clone()),
