@@ -16,23 +16,32 @@
 //! starts, and to what nobody but timed initials makes true: its later conditions may come true by others
 //! that start at the same time. Its end is held to all.
 //!
+//! Where that is not enough, a certificate has pairs that are never true together ([`pairs`]) or a closed
+//! set of states ([`closed`]) beside the list, which then only says which instances of actions count.
+//!
 //! Instances are found by trying objects for parameters one after the other; there is no search for a
 //! list, nor any for plans. Whoever makes a certificate can use the same [`Instances`].
 
+mod beginning;
+pub mod closed;
 mod instances;
 mod lasting;
 mod moments;
+pub mod pairs;
+mod processes;
 
 use std::collections::BTreeMap;
 
-use elbowroom_model::Task;
 use elbowroom_model::problem::{ObjectId, PredicateId};
+use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
 
 use crate::Exact;
+pub use closed::{Closed, ClosedState};
 pub use instances::{Breach, Instances};
 use moments::Moments;
+use pairs::Structure;
 
 /// A predicate and its objects.
 pub type Fact = (PredicateId, Vec<ObjectId>);
@@ -51,6 +60,31 @@ pub struct NoPlan {
     /// The facts that can become true, by time. Facts that only timed initials change are not among
     /// them: the problem says when these hold.
     pub reached: Vec<Group>,
+    /// What is not true together before some time, if that is needed: see [`pairs`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub apart: Vec<Apart>,
+    /// States into one of which whatever happens leads, if that is needed: see [`closed`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closed: Option<Closed>,
+}
+
+/// Pairs that are not true together before some time. Each names literals, `(at rover depot)` or
+/// `(not (at rover depot))`, and actions: `doing (drive rover depot)` says that it is under way,
+/// `begun (drive rover depot)` that one is that was so at the beginning, and `ended …` that it no longer is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Apart {
+    /// The time; never, if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<Exact>,
+    /// Two that have not become true together before.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub together: Vec<[String; 2]>,
+    /// An action that has not started before, if the other has been true since its start.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub started: Vec<[String; 2]>,
+    /// An action, and what has not become true before while it was under way.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub meanwhile: Vec<[String; 2]>,
 }
 
 /// Facts that are not true before some time.
@@ -65,6 +99,13 @@ pub struct Group {
 /// What every certificate of this kind proves.
 pub const PROVES: &str = "no plan exists: even if nothing that has become true were ever lost, the \
                           goal would not be reached";
+
+/// What a certificate with [`NoPlan::apart`] proves.
+pub const PROVES_APART: &str = "no plan exists: what the goal needs is never true together";
+
+/// What a certificate with [`NoPlan::closed`] proves.
+pub const PROVES_CLOSED: &str = "no plan exists: whatever happens leads into one of the listed states, and the \
+                                 goal holds in none";
 
 /// The most instances of actions and tried objects that are looked at.
 pub const MOST_STEPS: u64 = 20_000_000;
@@ -97,6 +138,20 @@ pub enum NoPlanFlaw {
         /// What is listed.
         said: String,
     },
+    /// Two things can be true together though the certificate says that they are not.
+    #[error("{pair} can be so earlier than the certificate says, by {by}")]
+    Together {
+        /// What is true together.
+        pair: String,
+        /// What brings it about.
+        by: String,
+    },
+    /// Something leads out of the states.
+    #[error("something that can happen in {0} leads to a state that is not listed")]
+    Leads(String),
+    /// The objects cannot change places.
+    #[error("`{0}` and `{1}` are not alike")]
+    NotAlike(String, String),
     /// The goal is not out of reach.
     #[error("by what is listed, the goal could be reached")]
     GoalInReach,
@@ -157,10 +212,22 @@ pub fn certificate_of(answer: &str) -> Result<NoPlan, NoPlanAnswerError> {
 /// # Errors
 /// The first thing that is not so.
 pub fn verify_no_plan(task: &Task, certificate: &NoPlan) -> Result<(), NoPlanFlaw> {
-    if certificate.proves != PROVES {
+    verify_no_plan_from(task, &Situation::initial(task), certificate)
+}
+
+/// Checks that the certificate proves that no plan goes on from the situation.
+///
+/// # Errors
+/// The first thing that is not so.
+pub fn verify_no_plan_from(
+    task: &Task,
+    situation: &Situation,
+    certificate: &NoPlan,
+) -> Result<(), NoPlanFlaw> {
+    if certificate.proves != certificate.kind().proves() {
         return Err(NoPlanFlaw::Claim);
     }
-    let mut instances = Instances::of(task)?;
+    let mut instances = Instances::from(task, situation)?;
     let reached = listed(task, certificate)?;
     instances.extend(&reached, MOST_STEPS)?;
     if let Some(breach) = instances.breaches(&reached).into_iter().next() {
@@ -174,10 +241,60 @@ pub fn verify_no_plan(task: &Task, certificate: &NoPlan) -> Result<(), NoPlanFla
             said: said.map_or_else(|| "never".to_owned(), |from| format!("not before {from}")),
         });
     }
-    if instances.is_goal_in_reach(&reached) {
-        return Err(NoPlanFlaw::GoalInReach);
+    if !instances.is_goal_in_reach(&reached) {
+        return Ok(());
     }
-    Ok(())
+    if let Some(closed) = &certificate.closed {
+        return closed.verify(&instances, &reached);
+    }
+    let structure = Structure::of(&instances, &reached);
+    let claims = structure.read(&certificate.apart)?;
+    if let Some((pair, by)) = structure.first_broken(&claims) {
+        return Err(NoPlanFlaw::Together {
+            pair: structure.in_words(pair),
+            by: by.map_or_else(|| "the beginning".to_owned(), |by| structure.happening(by)),
+        });
+    }
+    if structure.is_goal_excluded(&claims) {
+        Ok(())
+    } else {
+        Err(NoPlanFlaw::GoalInReach)
+    }
+}
+
+/// How a certificate proves that there is no plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// By the delete relaxation.
+    Reached,
+    /// By pairs.
+    Apart,
+    /// By a closed set of states.
+    Closed,
+}
+
+impl Kind {
+    /// What certificates of this kind prove, in words.
+    pub fn proves(self) -> &'static str {
+        match self {
+            Self::Reached => PROVES,
+            Self::Apart => PROVES_APART,
+            Self::Closed => PROVES_CLOSED,
+        }
+    }
+}
+
+impl NoPlan {
+    /// How it proves that there is no plan.
+    pub fn kind(&self) -> Kind {
+        if self.closed.is_some() {
+            Kind::Closed
+        } else if self.apart.is_empty() {
+            Kind::Reached
+        } else {
+            Kind::Apart
+        }
+    }
 }
 
 /// The certificate of a list of facts; whether it proves anything is another question.
@@ -195,6 +312,8 @@ pub fn no_plan_certificate(task: &Task, reached: &Reached) -> NoPlan {
         proves: PROVES.to_owned(),
         files: Vec::new(),
         reached: reached.collect(),
+        apart: Vec::new(),
+        closed: None,
     }
 }
 

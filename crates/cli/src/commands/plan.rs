@@ -68,10 +68,13 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
             plan_with(planner, &mut request, sources, limit, &mut watch).map_err(text::failure)?
         }
     };
-    if arguments.json {
-        let files = [domain.name(), problem.name()];
-        certify(&mut outcome.answer, &task, files, &mut watch);
-    }
+    // Of an answer that no plan exists, it is told whether others can check it.
+    certify(
+        &mut outcome.answer,
+        &task,
+        [domain.name(), problem.name()],
+        &mut watch,
+    );
     // The line on the terminal goes before the answer comes.
     drop(watch);
     print(arguments, &outcome, output)
@@ -163,6 +166,9 @@ fn print(arguments: &PlanArgs, outcome: &PlanOutcome, output: &mut Output) -> An
         output::print(&format!("{reason}\n"))?;
     } else if let (Some(plan), None) = (&plan, &arguments.output) {
         output::print(plan)?;
+    }
+    if let Some(line) = text::certified(&answer.finding).filter(|_| !arguments.json) {
+        output::tell(&line);
     }
     if let Some(summary) = text::summary(answer).filter(|_| !arguments.json) {
         output::tell(&summary);

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::{Event, Exact, Halt, PlanProgress, RequestError, Version, Watcher, exact};
 
 #[cfg(not(target_family = "wasm"))]
-pub use certificate::certify;
+pub use certificate::{certify, no_plan_certificate_from};
 pub use external::{PlannerFailure, plan_with};
 pub use objective::{
     BestPlanRequest, PlanAim, PlanChoice, PlanObjective, PlanWorth, UnknownPlanObjective, best_plan,

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, Effect};
 use elbowroom_model::problem::{self, Condition, ObjectId, SchemaId, Term};
+use elbowroom_model::{RunningAction, Situation, Task};
 use elbowroom_num::Rational;
 
+use super::beginning::{Beginning, lasting};
 use super::lasting::Lasting;
 use super::moments::HeldTo;
 use super::{Fact, Moments, NoPlanFlaw, Reached};
@@ -25,9 +26,10 @@ pub struct Breach {
 /// The instances of a task's actions whose conditions can be true by some list of facts.
 #[derive(Debug)]
 pub struct Instances {
-    task: Task,
-    lasting: Lasting,
-    actions: Vec<Action>,
+    pub(super) task: Task,
+    pub(super) beginning: Beginning,
+    pub(super) lasting: Lasting,
+    pub(super) actions: Vec<Action>,
     known: BTreeSet<(SchemaId, Vec<ObjectId>)>,
     /// By schema.
     needs: Vec<Needs>,
@@ -48,15 +50,24 @@ impl Instances {
     /// # Errors
     /// When the task has what this checker does not know.
     pub fn of(task: &Task) -> Result<Self, NoPlanFlaw> {
+        Self::from(task, &Situation::initial(task))
+    }
+
+    /// None so far, in the middle of an execution.
+    ///
+    /// # Errors
+    /// When the task has what this checker does not know.
+    pub fn from(task: &Task, situation: &Situation) -> Result<Self, NoPlanFlaw> {
         if let Some(feature) = task.left_to_the_judge() {
             return Err(NoPlanFlaw::Unknown(feature));
         }
         // Numbers of facts that only the checker mentions are its own.
-        let task = task.with_own_table();
-        let lasting = Lasting::of(&task);
+        let (beginning, task) = Beginning::of(task, situation);
+        let lasting = Lasting::of(&task, &beginning);
         let schemas = task.problem().schemas.iter();
         let needs = schemas.map(|schema| needs(schema, &lasting)).collect();
         Ok(Self {
+            beginning,
             lasting,
             actions: Vec::new(),
             known: BTreeSet::new(),
@@ -154,9 +165,9 @@ impl Instances {
         };
         for &fact in &self.task.initial().facts {
             let by = || "the initial state".to_owned();
-            note(self.task.atom(fact), &Rational::ZERO, &by);
+            note(self.task.atom(fact), &self.beginning.now, &by);
         }
-        for happening in self.task.timed() {
+        for happening in &self.beginning.timed {
             for change in &happening.changes {
                 if let Change::Add(fact) = change {
                     let by = || "a timed initial".to_owned();
@@ -170,8 +181,15 @@ impl Instances {
                 note(fact, &time, &|| format!("`{}`", action.name));
             }
         }
+        for running in &self.beginning.running {
+            for (fact, time) in brought_about_by_end(&moments, running) {
+                note(fact, &time, &|| {
+                    format!("`{}`, under way", running.action.name)
+                });
+            }
+        }
         for rule in self.task.rules().iter() {
-            if let Some(time) = moments.next(&rule.body, &Rational::ZERO, HeldTo::All) {
+            if let Some(time) = moments.next(&rule.body, &self.beginning.now, HeldTo::All) {
                 note(self.task.atom(rule.head), &time, &|| "a rule".to_owned());
             }
         }
@@ -183,11 +201,12 @@ impl Instances {
         self.moments(reached).can_hold_in_the_end(self.task.goal())
     }
 
-    fn moments<'a>(&'a self, reached: &'a Reached) -> Moments<'a> {
+    pub(super) fn moments<'a>(&'a self, reached: &'a Reached) -> Moments<'a> {
         Moments {
             task: &self.task,
             lasting: &self.lasting,
             reached,
+            now: &self.beginning.now,
         }
     }
 }
@@ -224,6 +243,30 @@ fn brought_about(moments: &Moments<'_>, action: &Action) -> Vec<(Fact, Rational)
         }
     }
     facts
+}
+
+/// What the end of an action under way makes true, and when at the earliest.
+fn brought_about_by_end(moments: &Moments<'_>, running: &RunningAction) -> Vec<(Fact, Rational)> {
+    let Some(body) = running.action.durative() else {
+        return Vec::new();
+    };
+    let (least, most) = lasting(running, moments.now);
+    let earliest = &running.start + &least;
+    // What it needs throughout is not looked at: it may be made good at once.
+    let Some(end) = moments.next(&body.end.condition, &earliest, HeldTo::All) else {
+        return Vec::new();
+    };
+    if most.is_some_and(|most| end > &running.start + &most) {
+        return Vec::new();
+    }
+    let adds = body.end.effects.iter().filter_map(|effect| {
+        let Change::Add(fact) = effect.change else {
+            return None;
+        };
+        let time = moments.next(&effect.guard.now, &end, HeldTo::All)?;
+        Some((moments.task.atom(fact), time))
+    });
+    adds.collect()
 }
 
 /// See [`Needs`].

@@ -9,6 +9,7 @@ use elbowroom_model::problem::{self, Body, FunctionId, PredicateId};
 use elbowroom_num::Rational;
 
 use super::Fact;
+use super::beginning::Beginning;
 
 /// From when until when a fact may be true; `None`: for ever.
 pub(super) type Span = (Rational, Option<Rational>);
@@ -27,7 +28,9 @@ pub(super) struct Lasting {
 }
 
 impl Lasting {
-    pub(super) fn of(task: &Task) -> Self {
+    /// Of a task that begins at a time: timed initials until then are among what it begins with, unless
+    /// it is the task's own beginning.
+    pub(super) fn of(task: &Task, beginning: &Beginning) -> Self {
         let mut lasting = Self {
             made: BTreeSet::new(),
             lost: BTreeSet::new(),
@@ -55,7 +58,7 @@ impl Lasting {
             lasting.made.insert(rule.predicate);
             lasting.lost.insert(rule.predicate);
         }
-        lasting.follow_timed(task);
+        lasting.follow_timed(task, beginning);
         lasting
     }
 
@@ -69,11 +72,11 @@ impl Lasting {
         }
     }
 
-    fn follow_timed(&mut self, task: &Task) {
+    fn follow_timed(&mut self, task: &Task, beginning: &Beginning) {
         for &fact in &task.initial().facts {
-            self.begin(task.atom(fact), &Rational::ZERO);
+            self.begin(task.atom(fact), &beginning.now);
         }
-        for happening in task.timed() {
+        for happening in &beginning.timed {
             // What is deleted and added at one time is true.
             for change in &happening.changes {
                 if let Change::Delete(fact) = change {

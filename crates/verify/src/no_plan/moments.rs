@@ -23,6 +23,8 @@ pub(super) struct Moments<'a> {
     pub(super) task: &'a Task,
     pub(super) lasting: &'a Lasting,
     pub(super) reached: &'a Reached,
+    /// Nothing happens earlier.
+    pub(super) now: &'a Rational,
 }
 
 impl Moments<'_> {
@@ -108,6 +110,19 @@ impl Moments<'_> {
         }
     }
 
+    /// Whether a condition mentions what is true at some times only, by timed initials alone.
+    pub(super) fn is_timed(&self, condition: &Condition) -> bool {
+        let mut is_timed = false;
+        condition.visit_facts(&mut |fact| {
+            let spans = self.lasting.spans(&self.task.atom(fact));
+            is_timed |= spans.is_some_and(|spans| {
+                let lasts = |span: &Span| span.0 <= *self.now && span.1.is_none();
+                !spans.is_empty() && !spans.iter().any(lasts)
+            });
+        });
+        is_timed
+    }
+
     /// Whether the problem itself says that a condition holds at all times.
     fn is_always_true(&self, condition: &Condition) -> bool {
         match condition {
@@ -126,8 +141,7 @@ impl Moments<'_> {
 
     /// Whether the problem itself says that a condition holds at no time.
     fn never_holds(&self, condition: &Condition) -> bool {
-        self.next(condition, &Rational::ZERO, HeldTo::Lasting)
-            .is_none()
+        self.next(condition, self.now, HeldTo::Lasting).is_none()
     }
 
     /// Whether a condition can hold when all timed initials have happened.
@@ -142,23 +156,34 @@ impl Moments<'_> {
             Condition::And(parts) => parts.iter().all(|part| self.can_hold_in_the_end(part)),
             Condition::Or(parts) => parts.iter().any(|part| self.can_hold_in_the_end(part)),
             Condition::Compare(..) | Condition::Not(_) => {
-                self.next(condition, &Rational::ZERO, HeldTo::All).is_some()
+                self.next(condition, self.now, HeldTo::All).is_some()
             }
         }
     }
 
     /// The earliest time of an instant.
     pub(super) fn instant(&self, snap: &SnapAction) -> Option<Rational> {
-        self.next(&snap.condition, &Rational::ZERO, HeldTo::All)
+        self.next(&snap.condition, self.now, HeldTo::All)
     }
 
     /// The earliest start and end of a durative action, its later conditions being held to that.
     pub(super) fn ends(&self, body: &DurativeBody, later: HeldTo) -> Option<(Rational, Rational)> {
+        self.starts(body, self.now, HeldTo::All, later)
+    }
+
+    /// The same of a start not before `time`.
+    pub(super) fn starts(
+        &self,
+        body: &DurativeBody,
+        time: &Rational,
+        first: HeldTo,
+        later: HeldTo,
+    ) -> Option<(Rational, Rational)> {
         let (least, most) = self.duration(body)?;
-        let mut start = Rational::ZERO;
+        let mut start = time.clone();
         loop {
             let before = start.clone();
-            start = self.next(&body.start.condition, &start, HeldTo::All)?;
+            start = self.next(&body.start.condition, &start, first)?;
             // An action that may take no time has no moment in between.
             if least > Rational::ZERO {
                 start = self.next_while(&body.over_all, &start, &least, later)?;
@@ -173,8 +198,32 @@ impl Moments<'_> {
         }
     }
 
+    /// The earliest end, not before `time`, of an action that takes so long at least: what it needs
+    /// throughout holds in the last part, which is as long as that.
+    pub(super) fn end_from(
+        &self,
+        body: &DurativeBody,
+        least: &Rational,
+        time: &Rational,
+        held_to: HeldTo,
+    ) -> Option<Rational> {
+        let mut end = time.clone();
+        loop {
+            let before = end.clone();
+            end = self.next(&body.end.condition, &end, held_to)?;
+            if least.is_positive() {
+                let start = Rational::max(&end - least, self.now.clone());
+                let rest = &end - &start;
+                end = self.next_while(&body.over_all, &start, &rest, held_to)? + rest;
+            }
+            if end == before {
+                return Some(end);
+            }
+        }
+    }
+
     /// The least and the greatest duration, as far as they do not change; `None` if there is none.
-    fn duration(&self, body: &DurativeBody) -> Option<(Rational, Option<Rational>)> {
+    pub(super) fn duration(&self, body: &DurativeBody) -> Option<(Rational, Option<Rational>)> {
         let (mut least, mut most) = (Rational::ZERO, None::<Rational>);
         for constraint in &body.duration {
             let bound = match self.lasting.value(self.task, &constraint.bound) {

@@ -89,6 +89,31 @@ impl Draft {
         }
     }
 
+    /// The same with less: an action, an initial fact or an addition less, or timed initials one sooner.
+    pub(crate) fn with_less(&self) -> Vec<Self> {
+        let mut all = Vec::new();
+        for number in 0..self.actions.len() {
+            let mut other = self.clone();
+            other.actions.remove(number);
+            all.push(other);
+            let mut other = self.clone();
+            other.actions[number].end.retain(|own| !own.1);
+            all.push(other);
+        }
+        for number in 0..self.initial.len() {
+            let mut other = self.clone();
+            other.initial.remove(number);
+            all.push(other);
+        }
+        if self.timed.iter().all(|own| own.0 > 1) && !self.timed.is_empty() {
+            let mut other = self.clone();
+            other.timed.iter_mut().for_each(|own| own.0 -= 1);
+            all.push(other);
+        }
+        all.retain(|own| !own.actions.is_empty());
+        all
+    }
+
     pub(crate) fn has_fixed_durations(&self) -> bool {
         self.actions
             .iter()

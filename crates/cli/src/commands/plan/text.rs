@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use elbowroom::answers::plan::{PlanAnswer, PlanFinding, PlanStop, PlannerFailure};
 use elbowroom::answers::plan::{PlanChoice, PlanObjective, PlanWorth};
 use elbowroom::external::Outcome;
+use elbowroom::verify::no_plan::Kind;
 
 use crate::args::EMBEDDED;
 use crate::exit::Failure;
@@ -57,6 +58,31 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     };
     let _ = write!(text, "; {plans} found, {better}");
     Some(styled(FAINT, &text))
+}
+
+/// Whether there is a certificate that no plan exists, and of which kind, or why there is none.
+pub(super) fn certified(finding: &PlanFinding) -> Option<String> {
+    let PlanFinding::NoPlan {
+        certificate,
+        uncertified,
+        ..
+    } = finding
+    else {
+        return None;
+    };
+    let line = match (certificate, uncertified) {
+        (Some(certificate), _) => {
+            let by = match certificate.kind() {
+                Kind::Apart => "pairs that are never true together",
+                Kind::Closed => "a closed set of states",
+                _ => "what can become true, and when",
+            };
+            format!("certified by {by}; --json prints the certificate")
+        }
+        (None, Some(why)) => format!("not certified: {why}"),
+        (None, None) => return None,
+    };
+    Some(styled(FAINT, &line))
 }
 
 /// What a plan is worth by its objective, beside the shortest one.

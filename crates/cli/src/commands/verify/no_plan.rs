@@ -4,9 +4,7 @@ use std::path::PathBuf;
 
 use elbowroom::model::Task;
 use elbowroom::text::Source;
-use elbowroom::verify::no_plan::{
-    NoPlan, NoPlanAnswerError, PROVES, certificate_of, verify_no_plan,
-};
+use elbowroom::verify::no_plan::{Kind, NoPlan, NoPlanAnswerError, certificate_of, verify_no_plan};
 use serde_json::{Value, json};
 
 use crate::args::{ProblemArgs, VerifyArgs};
@@ -15,6 +13,7 @@ use crate::input;
 use crate::limits::push_wrapped;
 use crate::look::{BAD, GOOD, Look, styled};
 use crate::output::{self, Output};
+use crate::words::counted;
 
 /// Whether the text is an answer of `elbowroom plan`.
 pub(super) fn is_meant(text: &str) -> bool {
@@ -49,7 +48,7 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
             "problem": problem,
         });
         match &verdict {
-            Ok(()) => document["proves"] = json!(PROVES),
+            Ok(()) => document["proves"] = json!(certificate.proves),
             Err(flaw) => document["reason"] = json!(flaw.to_string()),
         }
         output.json(&document)?;
@@ -60,19 +59,44 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
         };
         let mut text = format!("{}: {}\n", styled(style, word), source.name());
         let sentence = match &verdict {
-            Ok(()) => {
-                let facts: usize = certificate.reached.iter().map(|own| own.facts.len()).sum();
-                format!(
-                    "{problem} has no plan: even if nothing that has become true were ever lost, only \
-                     {facts} facts could become true, and the goal is not among what they allow."
-                )
-            }
+            Ok(()) => format!("{problem} has no plan: {}", why(&certificate)),
             Err(flaw) => format!("{flaw}."),
         };
         push_wrapped(&mut text, &sentence, 2, Look::of_stdout().width);
         output::print(&text)?;
     }
     Ok(if verdict.is_ok() { Exit::Yes } else { Exit::No })
+}
+
+/// Why there is no plan, by a certificate that is accepted.
+fn why(certificate: &NoPlan) -> String {
+    match certificate.kind() {
+        Kind::Apart => {
+            let groups = certificate.apart.iter();
+            let pairs = groups
+                .map(|own| own.together.len() + own.started.len() + own.meanwhile.len())
+                .sum::<usize>();
+            format!(
+                "what its goal needs is never true together, as follows from {}.",
+                counted(pairs, "bound")
+            )
+        }
+        Kind::Closed => {
+            let closed = certificate.closed.as_ref();
+            let states = closed.map_or(0, |closed| closed.states.len());
+            format!(
+                "whatever happens leads into one of {}, and its goal holds in none.",
+                counted(states, "state")
+            )
+        }
+        _ => {
+            let facts: usize = certificate.reached.iter().map(|own| own.facts.len()).sum();
+            format!(
+                "even if nothing that has become true were ever lost, only {facts} facts could become \
+                 true, and the goal is not among what they allow."
+            )
+        }
+    }
 }
 
 /// The files of the problem: those that were given, or those that the answer names.

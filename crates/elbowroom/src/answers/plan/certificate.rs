@@ -1,7 +1,11 @@
 //! The proof that there is no plan, in the form that `elbowroom-verify` checks.
 
-use elbowroom_model::Task;
+mod closed;
+mod pairs;
+
+use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
+use elbowroom_verify::no_plan::pairs::Structure;
 use elbowroom_verify::no_plan::{Instances, NoPlan, Reached, no_plan_certificate};
 
 use super::{PlanAnswer, PlanFinding, Watcher};
@@ -15,7 +19,8 @@ const MOST_LOOKS: usize = 3_000_000;
 /// Puts a certificate into an answer that says that there is no plan, or the reason why it has none.
 ///
 /// The certificate is the set of facts that are reached in the delete relaxation, each with its earliest
-/// time. Where plans fail for another reason, such as two facts that exclude each other, there is none.
+/// time; where plans fail for another reason, also pairs that are never true together, or a closed set of
+/// states.
 /// `files` are the names of domain and problem, for who checks it. The work ends early when the watcher
 /// wants no more.
 pub fn certify(answer: &mut PlanAnswer, task: &Task, files: [&str; 2], watcher: &mut dyn Watcher) {
@@ -28,7 +33,7 @@ pub fn certify(answer: &mut PlanAnswer, task: &Task, files: [&str; 2], watcher: 
         return;
     };
     let mut goes_on = || watcher.flow().is_continue();
-    match certificate_of(task, &mut goes_on) {
+    match no_plan_certificate_from(task, &Situation::initial(task), &mut goes_on) {
         Ok(found) => {
             let files = files.iter().map(|file| (*file).to_owned()).collect();
             *certificate = Some(Box::new(NoPlan { files, ..found }));
@@ -37,14 +42,23 @@ pub fn certify(answer: &mut PlanAnswer, task: &Task, files: [&str; 2], watcher: 
     }
 }
 
-/// The certificate, or why there is none.
-fn certificate_of(task: &Task, goes_on: &mut dyn FnMut() -> bool) -> Result<NoPlan, String> {
-    let mut instances = Instances::of(task).map_err(|flaw| flaw.to_string())?;
+/// The certificate that no plan goes on from a situation, or the reason why there is none; that no plan
+/// does must be known. [`verify_no_plan_from`](elbowroom_verify::no_plan::verify_no_plan_from) checks it.
+///
+/// # Errors
+/// In words, why there is none.
+pub fn no_plan_certificate_from(
+    task: &Task,
+    situation: &Situation,
+    goes_on: &mut dyn FnMut() -> bool,
+) -> Result<NoPlan, String> {
+    let instances = Instances::from(task, situation);
+    let mut instances = instances.map_err(|flaw| flaw.to_string())?;
     let mut reached = Reached::new();
     let mut looks = 0;
     loop {
         if !goes_on() {
-            return Err("the time was up before it was made".to_owned());
+            return Err(TIME_IS_UP.to_owned());
         }
         let too_many = "there are too many instances of actions to list what they reach";
         let extended = instances.extend(&reached, MOST_STEPS);
@@ -64,12 +78,35 @@ fn certificate_of(task: &Task, goes_on: &mut dyn FnMut() -> bool) -> Result<NoPl
             *from = Rational::min(from.clone(), breach.time);
         }
     }
-    if instances.is_goal_in_reach(&reached) {
-        return Err(
-            "if nothing that has become true were ever lost, the goal would be reached in time; that \
-             there is no plan was proved by pairs of facts, or by search"
-                .to_owned(),
-        );
+    let mut certificate = no_plan_certificate(task, &reached);
+    if !instances.is_goal_in_reach(&reached) {
+        return Ok(certificate);
     }
-    Ok(no_plan_certificate(task, &reached))
+    let structure = Structure::of(&instances, &reached);
+    match pairs::claims(&structure, goes_on) {
+        Ok(claims) => {
+            certificate.apart = structure.written(&claims);
+            certificate.proves = certificate.kind().proves().to_owned();
+            return Ok(certificate);
+        }
+        Err(pairs::Failure::Stopped) => return Err(TIME_IS_UP.to_owned()),
+        Err(pairs::Failure::TooMany | pairs::Failure::InReach) => {}
+    }
+    match closed::closed(task, &instances, &reached, goes_on) {
+        Ok(closed) => {
+            certificate.closed = Some(closed);
+            certificate.proves = certificate.kind().proves().to_owned();
+            Ok(certificate)
+        }
+        Err(closed::Failure::Stopped) => Err(TIME_IS_UP.to_owned()),
+        Err(closed::Failure::TooMany) => Err("there are too many states to list".to_owned()),
+        Err(closed::Failure::Unknown(why)) => Err(why),
+        Err(closed::Failure::InReach) => Err(
+            "the proof needs more than the checker heeds: the least separation of happenings, or what \
+             numbers and alternatives have to be throughout actions"
+                .to_owned(),
+        ),
+    }
 }
+
+const TIME_IS_UP: &str = "the time was up before it was made";

@@ -1,0 +1,45 @@
+//! Problems with less time, or with less to begin with.
+
+use std::time::Duration;
+
+use elbowroom::model::{Situation, Task};
+use elbowroom::num::Rational;
+use elbowroom::planner::Answer;
+
+use crate::first_plan;
+use crate::sums::Sums;
+
+const LIMIT: Duration = Duration::from_secs(1);
+
+/// The most initial facts that are left out, one in each variant.
+const MOST_FACTS: usize = 8;
+
+/// Asks for each variant of a problem that has a plan.
+pub(crate) fn each(name: &str, task: &Task, sums: &mut Sums) {
+    let whole = first_plan(task, &Situation::initial(task), LIMIT);
+    if !matches!(whole, Answer::Plan { .. }) {
+        return;
+    }
+    let mut ask = |what: &str, task: &Task| {
+        let situation = Situation::initial(task);
+        let answer = first_plan(task, &situation, LIMIT);
+        sums.note(&format!("{name} {what}"), task, &situation, &answer);
+    };
+    if !task.timed().is_empty() {
+        for eighths in [1, 2, 3, 4, 5, 6, 7] {
+            let part = Rational::new(eighths, 8);
+            let times = task.timed().iter().map(|own| &own.time * &part);
+            let times: Vec<Rational> = times.collect();
+            ask(&format!("{eighths}/8"), &task.with_numbers(&times, []));
+        }
+    }
+    let facts = task.problem().initial_facts.len();
+    for number in 0..facts.min(MOST_FACTS) {
+        // Spread over all of them.
+        let left_out = number * facts / facts.min(MOST_FACTS);
+        let mut problem = task.problem().clone();
+        let (predicate, objects) = problem.initial_facts.remove(left_out);
+        let fact = task.problem().apply_predicate(predicate, &objects);
+        ask(&format!("without {fact}"), &Task::new(problem));
+    }
+}

@@ -1,0 +1,180 @@
+//! Closed sets of states: all that can be reached, by the checker's own rules, without times first, and
+//! with bounds on times where that is not enough.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use elbowroom_model::Task;
+use elbowroom_model::problem::ObjectId;
+use elbowroom_num::Rational;
+use elbowroom_verify::no_plan::closed::zone::Zone;
+use elbowroom_verify::no_plan::closed::{Closed, Closure, FIRST_START, NOW, Node, UnderWay, ZERO};
+use elbowroom_verify::no_plan::{Instances, Reached};
+
+/// The most states.
+const MOST_STATES: usize = 5_000;
+
+/// The most states that are made.
+const MOST_MADE: usize = 200_000;
+
+/// The most actions under way at one time: where an action may overlap with itself, there is no end of them.
+const MOST_UNDER_WAY: usize = 6;
+
+/// Why there is no closed set.
+pub(super) enum Failure {
+    Unknown(String),
+    TooMany,
+    /// The goal can be reached by the checker's rules.
+    InReach,
+    Stopped,
+}
+
+/// A closed set of states in none of which the goal holds.
+pub(super) fn closed(
+    task: &Task,
+    instances: &Instances,
+    reached: &Reached,
+    goes_on: &mut dyn FnMut() -> bool,
+) -> Result<Closed, Failure> {
+    let alike = alike(task, instances, reached)?;
+    let closure = Closure::of(instances, reached, &alike);
+    let closure = closure.map_err(|flaw| Failure::Unknown(flaw.to_string()))?;
+    let states = match states(&closure, false, goes_on) {
+        Err(Failure::InReach | Failure::TooMany) => states(&closure, true, goes_on)?,
+        other => other?,
+    };
+    let name = |object: &ObjectId| task.problem().objects[object.index()].name.clone();
+    let alike = alike.iter().map(|class| class.iter().map(name).collect());
+    Ok(Closed {
+        alike: alike.collect(),
+        states: states.iter().map(|node| closure.written(node)).collect(),
+    })
+}
+
+/// Classes of objects that can change places: each object joins the first whose last one it is like.
+fn alike(
+    task: &Task,
+    instances: &Instances,
+    reached: &Reached,
+) -> Result<Vec<Vec<ObjectId>>, Failure> {
+    let none = Closure::of(instances, reached, &[]);
+    let none = none.map_err(|flaw| Failure::Unknown(flaw.to_string()))?;
+    let mut classes: Vec<Vec<ObjectId>> = Vec::new();
+    for number in task.problem().constants..task.problem().objects.len() {
+        let object = ObjectId::from(number);
+        let is_like = |class: &&mut Vec<ObjectId>| {
+            class
+                .last()
+                .is_some_and(|&last| none.are_alike(last, object))
+        };
+        match classes.iter_mut().find(is_like) {
+            Some(class) => class.push(object),
+            None => classes.push(vec![object]),
+        }
+    }
+    classes.retain(|class| class.len() > 1);
+    Ok(classes)
+}
+
+/// The states that are reached, of which none stands for another.
+fn states(
+    closure: &Closure<'_>,
+    with_times: bool,
+    goes_on: &mut dyn FnMut() -> bool,
+) -> Result<Vec<Node>, Failure> {
+    let last = closure.times().last().cloned();
+    let mut known: BTreeMap<(Vec<UnderWay>, usize), Vec<usize>> = BTreeMap::new();
+    let mut nodes: Vec<Option<Node>> = Vec::new();
+    let mut open = VecDeque::new();
+    let mut count = 0;
+    let mut made = 0;
+    let mut add = |node: Node, nodes: &mut Vec<Option<Node>>, open: &mut VecDeque<usize>| {
+        made += 1;
+        if node.under_way.len() > MOST_UNDER_WAY {
+            return Err(Failure::TooMany);
+        }
+        let mut node = node;
+        node.zone = if with_times {
+            widened(&node, closure.times().len(), last.as_ref())
+        } else {
+            Zone::any(node.zone.size())
+        };
+        let node = closure.settled(node);
+        if closure.is_goal(&node) {
+            return Err(Failure::InReach);
+        }
+        let alike = known
+            .entry((node.under_way.clone(), node.timed))
+            .or_default();
+        let covers = |own: &usize| {
+            nodes[*own]
+                .as_ref()
+                .is_some_and(|own| closure.covers(own, &node))
+        };
+        if alike.iter().any(covers) {
+            return Ok(());
+        }
+        alike.retain(|&own| {
+            let is_covered = nodes[own]
+                .as_ref()
+                .is_some_and(|own| closure.covers(&node, own));
+            if is_covered {
+                nodes[own] = None;
+                count -= 1;
+            }
+            !is_covered
+        });
+        alike.push(nodes.len());
+        open.push_back(nodes.len());
+        nodes.push(Some(node));
+        count += 1;
+        if count > MOST_STATES || made > MOST_MADE {
+            return Err(Failure::TooMany);
+        }
+        Ok(())
+    };
+    add(closure.initial(), &mut nodes, &mut open)?;
+    while let Some(next) = open.pop_front() {
+        if !goes_on() {
+            return Err(Failure::Stopped);
+        }
+        let Some(node) = nodes[next].clone() else {
+            continue;
+        };
+        let after = closure.successors(&node);
+        for node in after.map_err(|flaw| Failure::Unknown(flaw.to_string()))? {
+            add(node, &mut nodes, &mut open)?;
+        }
+    }
+    Ok(nodes.into_iter().flatten().collect())
+}
+
+/// The bounds on times that matter for what may follow: those on time 0 until the last timed initial, and
+/// for how long something is under way up to what it has to be.
+fn widened(node: &Node, timed: usize, last: Option<&Rational>) -> Zone {
+    let mut zone = node.zone.clone();
+    let size = zone.size();
+    if node.timed >= timed || last.is_none() {
+        for time in NOW..size {
+            zone.forget(time, ZERO);
+            zone.forget(ZERO, time);
+        }
+    }
+    for (place, own) in node.under_way.iter().enumerate() {
+        if own.most.is_some() {
+            continue;
+        }
+        // Without a greatest duration, it only counts whether the least one has passed.
+        let start = FIRST_START + place;
+        let has_passed = zone.get(start, NOW).is_some_and(|most| -most >= own.least);
+        for time in ZERO..size {
+            zone.forget(time, start);
+            zone.forget(start, time);
+        }
+        if has_passed {
+            zone.limit(start, NOW, &-&own.least);
+        } else {
+            zone.limit(start, NOW, &Rational::ZERO);
+        }
+    }
+    zone
+}

@@ -1,0 +1,497 @@
+//! A closed set of states: whatever happens in one of them leads into one of them, and the goal holds in
+//! none.
+//!
+//! A state ([`Node`]) is what holds after something has happened: the facts and numbers that something
+//! reads, the actions under way, how many timed initials have happened, and bounds on the differences
+//! of times: of now, of the starts of what is under way, and of time 0. The rules for what can happen next
+//! ([`Closure::successors`]) leave out nothing that a valid plan does in the order of time
+//! ([`processes`](super::processes)); they do not ask for ε between happenings, and not for disjunctions and
+//! numbers to hold throughout actions. Numbers that depend on durations or on continuous change may be any.
+//!
+//! A listed state stands for more than itself. Its bounds are of all times within them; a number that it
+//! does not list may be any; it has at least as many of the facts that nothing minds, and more are no
+//! hindrance; and objects that can change places without changing the problem ([`alike`]) do so.
+
+pub(super) mod alike;
+mod reading;
+mod view;
+mod written;
+pub mod zone;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_model::TimedHappening;
+use elbowroom_model::ground::{Change, Effect, FactId, FluentId, SnapAction};
+use elbowroom_model::problem::{Comparison, ObjectId};
+use elbowroom_num::Rational;
+
+use super::instances::Instances;
+use super::processes::Process;
+use super::{NoPlanFlaw, Reached};
+use alike::Exchange;
+use view::{View, updated};
+pub use written::{Closed, ClosedState};
+use zone::Zone;
+
+/// Time 0, and now, among the times of a state; the starts of what is under way follow.
+pub const ZERO: usize = 0;
+/// See [`ZERO`].
+pub const NOW: usize = 1;
+/// See [`ZERO`].
+pub const FIRST_START: usize = 2;
+
+/// An action under way, with the durations that it may have.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct UnderWay {
+    pub(super) process: usize,
+    /// At least.
+    pub least: Rational,
+    /// At most, if there is a bound.
+    pub most: Option<Rational>,
+}
+
+/// A state.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Node {
+    /// What is under way, in order.
+    pub under_way: Vec<UnderWay>,
+    /// How many of the timed initials to come have happened.
+    pub timed: usize,
+    pub(super) facts: BTreeSet<FactId>,
+    pub(super) values: BTreeMap<FluentId, Rational>,
+    /// The bounds on times.
+    pub zone: Zone,
+}
+
+/// What can happen in a problem, from one state to the next.
+#[derive(Debug)]
+pub struct Closure<'a> {
+    instances: &'a Instances,
+    processes: Vec<Process>,
+    timed: &'a [TimedHappening],
+    /// The facts and fluents that something reads.
+    read: BTreeSet<FactId>,
+    read_fluents: BTreeSet<FluentId>,
+    /// Those of the fluents that change in the course of time, and may have any value.
+    flowing: BTreeSet<FluentId>,
+    /// The facts that something reads and something changes.
+    pub(super) facts: BTreeSet<FactId>,
+    /// Those that nothing minds.
+    welcome: BTreeSet<FactId>,
+    pub(super) fluents: BTreeSet<FluentId>,
+    /// By name, each of an action that may start and of one under way at the beginning.
+    names: BTreeMap<String, usize>,
+    exchanges: Vec<Exchange>,
+}
+
+/// The most effects of one happening of which it is open whether they come about.
+const MOST_OPEN: usize = 4;
+
+impl<'a> Closure<'a> {
+    /// Of the instances that the list of facts allows, with classes of objects that can change places.
+    ///
+    /// # Errors
+    /// When the problem has what this does not know, or objects are not alike.
+    pub fn of(
+        instances: &'a Instances,
+        reached: &Reached,
+        alike: &[Vec<ObjectId>],
+    ) -> Result<Self, NoPlanFlaw> {
+        if !instances.task.problem().rules.is_empty() {
+            return Err(NoPlanFlaw::Unknown("derived predicates among states"));
+        }
+        let processes = instances.processes(reached);
+        let reading = reading::Reading::of(instances, &processes);
+        let mut names = BTreeMap::new();
+        for (number, process) in processes.iter().enumerate() {
+            if names.insert(process.title(), number).is_some() {
+                return Err(NoPlanFlaw::Unknown("an action that is under way twice"));
+            }
+        }
+        let mut closure = Self {
+            instances,
+            timed: &instances.beginning.timed,
+            read: reading.read,
+            read_fluents: reading.read_fluents,
+            flowing: reading.flowing,
+            facts: reading.facts,
+            welcome: reading.welcome,
+            fluents: reading.fluents,
+            names,
+            exchanges: Vec::new(),
+            processes,
+        };
+        closure.exchanges = alike::exchanges(&closure, alike)?;
+        Ok(closure)
+    }
+
+    /// The state at the beginning.
+    pub fn initial(&self) -> Node {
+        let state = self.instances.task.initial();
+        let now = &self.instances.beginning.now;
+        let mut under_way = Vec::new();
+        let mut starts = Vec::new();
+        for (process, own) in self.processes.iter().enumerate() {
+            if let Some(begun) = &own.begun {
+                let (least, most) = (own.least.clone(), own.most.clone());
+                under_way.push(UnderWay {
+                    process,
+                    least,
+                    most,
+                });
+                starts.push(begun);
+            }
+        }
+        let mut zone = Zone::any(FIRST_START + starts.len());
+        for (place, time) in [now].into_iter().chain(starts).enumerate() {
+            zone.limit(NOW + place, ZERO, time);
+            zone.limit(ZERO, NOW + place, &-time);
+        }
+        let _ = zone.close();
+        let values = state
+            .values
+            .iter()
+            .filter(|(own, _)| self.fluents.contains(own));
+        Node {
+            under_way,
+            timed: 0,
+            facts: state.facts.intersection(&self.facts).copied().collect(),
+            values: values.map(|(own, value)| (*own, value.clone())).collect(),
+            zone,
+        }
+    }
+
+    /// Whether the goal may hold in a state in which nothing is to come.
+    pub fn is_goal(&self, node: &Node) -> bool {
+        let view = View {
+            closure: self,
+            node,
+            duration: None,
+        };
+        node.under_way.is_empty()
+            && node.timed == self.timed.len()
+            && view.may_hold(self.instances.task.goal())
+    }
+
+    /// All that one happening can lead to.
+    ///
+    /// # Errors
+    /// When too much is open.
+    pub fn successors(&self, node: &Node) -> Result<Vec<Node>, NoPlanFlaw> {
+        let mut found = Vec::new();
+        for (number, process) in self.processes.iter().enumerate() {
+            if process.start.is_some() {
+                self.start(node, number, &mut found)?;
+            }
+        }
+        for place in 0..node.under_way.len() {
+            self.end(node, place, &mut found)?;
+        }
+        if let Some(happening) = self.timed.get(node.timed)
+            && let Some(zone) = self.next(node, None, Some(&happening.time))
+        {
+            let sure: Vec<Effect> = happening.changes.iter().map(always).collect();
+            for mut after in self.changed(node, &sure, None)? {
+                after.timed += 1;
+                after.zone = zone.select(&times(node.under_way.len(), &zone));
+                self.keep(after, &mut found);
+            }
+        }
+        Ok(found)
+    }
+
+    fn start(&self, node: &Node, number: usize, found: &mut Vec<Node>) -> Result<(), NoPlanFlaw> {
+        let process = &self.processes[number];
+        let view = View {
+            closure: self,
+            node,
+            duration: None,
+        };
+        let snap = process.first();
+        if !view.may_hold(&snap.condition) {
+            return Ok(());
+        }
+        let mut own = None;
+        if let Some(body) = process.durative() {
+            let (mut least, mut most) = (process.least.clone(), process.most.clone());
+            for bound in body.duration.iter().filter(|bound| !bound.at_end) {
+                let Some(value) = view.value(&bound.bound) else {
+                    continue;
+                };
+                if !matches!(bound.comparison, Comparison::AtMost | Comparison::Less) {
+                    least = Rational::max(least, value.clone());
+                }
+                if !matches!(bound.comparison, Comparison::AtLeast | Comparison::Greater) {
+                    most = Some(most.map_or(value.clone(), |most| Rational::min(most, value)));
+                }
+            }
+            if most.as_ref().is_some_and(|most| *most < least) {
+                return Ok(());
+            }
+            own = Some(UnderWay {
+                process: number,
+                least,
+                most,
+            });
+        }
+        let Some(zone) = self.next(node, None, None) else {
+            return Ok(());
+        };
+        let duration = own
+            .as_ref()
+            .and_then(|own| (own.most.as_ref() == Some(&own.least)).then(|| own.least.clone()));
+        for mut after in self.changed(node, &snap.effects, duration)? {
+            let mut order = times(node.under_way.len(), &zone);
+            if let Some(own) = &own {
+                let place = after.under_way.partition_point(|other| other <= own);
+                after.under_way.insert(place, own.clone());
+                order.insert(FIRST_START + place, zone.size() - 1);
+            }
+            after.zone = zone.select(&order);
+            self.keep(after, found);
+        }
+        Ok(())
+    }
+
+    fn end(&self, node: &Node, place: usize, found: &mut Vec<Node>) -> Result<(), NoPlanFlaw> {
+        let own = &node.under_way[place];
+        let Some(body) = self.processes[own.process].durative() else {
+            return Ok(());
+        };
+        let duration = (own.most.as_ref() == Some(&own.least)).then(|| own.least.clone());
+        let view = View {
+            closure: self,
+            node,
+            duration: duration.clone(),
+        };
+        if !view.may_hold(&body.end.condition) {
+            return Ok(());
+        }
+        let Some(zone) = self.next(node, Some(place), None) else {
+            return Ok(());
+        };
+        for mut after in self.changed(node, &body.end.effects, duration)? {
+            after.under_way.remove(place);
+            let mut order = times(node.under_way.len(), &zone);
+            order.remove(FIRST_START + place);
+            after.zone = zone.select(&order);
+            self.keep(after, found);
+        }
+        Ok(())
+    }
+
+    /// The times at which something can happen next, as the last of the times: the end of what is under
+    /// way, or timed initials, or anything.
+    fn next(&self, node: &Node, ends: Option<usize>, at: Option<&Rational>) -> Option<Zone> {
+        let mut zone = node.zone.with_another();
+        let then = zone.size() - 1;
+        zone.limit(NOW, then, &Rational::ZERO);
+        for (place, own) in node.under_way.iter().enumerate() {
+            if let Some(most) = &own.most {
+                zone.limit(then, FIRST_START + place, most);
+            }
+            if ends == Some(place) {
+                zone.limit(FIRST_START + place, then, &-&own.least);
+            }
+        }
+        if let Some(timed) = self.timed.get(node.timed) {
+            zone.limit(then, ZERO, &timed.time);
+        }
+        if let Some(at) = at {
+            zone.limit(ZERO, then, &-at);
+        }
+        zone.close().then_some(zone)
+    }
+
+    /// The states after some effects, with times as they were.
+    fn changed(
+        &self,
+        node: &Node,
+        effects: &[Effect],
+        duration: Option<Rational>,
+    ) -> Result<Vec<Node>, NoPlanFlaw> {
+        let view = View {
+            closure: self,
+            node,
+            duration,
+        };
+        let mut after = node.clone();
+        // Additions win over deletions, and all read the state before.
+        let (mut sure, mut open): (Vec<&Change>, Vec<&Change>) = (Vec::new(), Vec::new());
+        for effect in effects {
+            let guard = &effect.guard;
+            let is_plain = guard.at_start.is_trivial() && guard.over_all.is_trivial();
+            match view.holds(&guard.now) {
+                Ok(false) => {}
+                Ok(true) if is_plain => sure.push(&effect.change),
+                _ => open.push(&effect.change),
+            }
+        }
+        for change in &sure {
+            if let Change::Update {
+                operator,
+                fluent,
+                value,
+            } = change
+                && self.fluents.contains(fluent)
+            {
+                let old = after.values.remove(fluent);
+                if let Some(value) = updated(*operator, old, view.value(value)) {
+                    after.values.insert(*fluent, value);
+                }
+            }
+        }
+        open.retain(|change| match change {
+            Change::Update { fluent, .. } => {
+                after.values.remove(fluent);
+                false
+            }
+            Change::Add(fact) | Change::Delete(fact) => self.facts.contains(fact),
+        });
+        if open.len() > MOST_OPEN {
+            return Err(NoPlanFlaw::Unknown(
+                "so many effects of which it is open whether they come about",
+            ));
+        }
+        let subsets = (0..1_usize << open.len()).map(|subset| {
+            let mut own = after.clone();
+            let chosen = open
+                .iter()
+                .enumerate()
+                .filter(|(place, _)| subset >> place & 1 == 1);
+            let changes: Vec<&&Change> = sure.iter().chain(chosen.map(|own| own.1)).collect();
+            for change in &changes {
+                if let Change::Delete(fact) = change {
+                    own.facts.remove(fact);
+                }
+            }
+            for change in &changes {
+                if let Change::Add(fact) = change
+                    && self.facts.contains(fact)
+                {
+                    own.facts.insert(*fact);
+                }
+            }
+            own
+        });
+        Ok(subsets.collect())
+    }
+
+    /// Lists a state, unless it breaks what is needed throughout.
+    fn keep(&self, node: Node, found: &mut Vec<Node>) {
+        let view = View {
+            closure: self,
+            node: &node,
+            duration: None,
+        };
+        let is_kept = |own: &UnderWay| {
+            let mut literals = self.processes[own.process].over_all.iter();
+            literals.all(|(fact, is_true)| view.is_true(*fact) == *is_true)
+        };
+        if node.under_way.iter().all(is_kept) {
+            found.push(node);
+        }
+    }
+
+    /// Whether the first state stands for the second one, too.
+    pub fn covers(&self, node: &Node, other: &Node) -> bool {
+        let has = |fact: &FactId| node.facts.contains(fact);
+        node.under_way == other.under_way
+            && node.timed == other.timed
+            && other.facts.iter().all(has)
+            && node
+                .facts
+                .iter()
+                .all(|fact| other.facts.contains(fact) || self.welcome.contains(fact))
+            && node
+                .values
+                .iter()
+                .all(|(own, value)| other.values.get(own) == Some(value))
+            && other.zone.is_within(&node.zone)
+    }
+
+    /// The state that stands for it where objects change places.
+    pub fn settled(&self, mut node: Node) -> Node {
+        loop {
+            let images = self.exchanges.iter().map(|own| own.image(&node));
+            let Some(least) = images.min().filter(|least| *least < node) else {
+                return node;
+            };
+            node = least;
+        }
+    }
+
+    /// Checks that the states are closed, and that the goal holds in none.
+    ///
+    /// # Errors
+    /// The first thing that is not so.
+    pub fn check(&self, nodes: &[Node]) -> Result<(), NoPlanFlaw> {
+        let mut by_kind: BTreeMap<(&[UnderWay], usize), Vec<&Node>> = BTreeMap::new();
+        for node in nodes {
+            by_kind
+                .entry((&node.under_way, node.timed))
+                .or_default()
+                .push(node);
+        }
+        let is_covered = |node: Node| {
+            let node = self.settled(node);
+            let known = by_kind.get(&(&node.under_way[..], node.timed));
+            known.is_some_and(|known| known.iter().any(|own| self.covers(own, &node)))
+        };
+        if !is_covered(self.initial()) {
+            return Err(NoPlanFlaw::Leads("the beginning".to_owned()));
+        }
+        for (number, node) in nodes.iter().enumerate() {
+            if self.is_goal(node) {
+                return Err(NoPlanFlaw::GoalInReach);
+            }
+            for after in self.successors(node)? {
+                if !is_covered(after) {
+                    return Err(NoPlanFlaw::Leads(format!("state {}", number + 1)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn process(&self, number: usize) -> &Process {
+        &self.processes[number]
+    }
+
+    pub(super) fn number_of(&self, title: &str) -> Option<usize> {
+        self.names.get(title).copied()
+    }
+
+    pub(super) fn instances(&self) -> &Instances {
+        self.instances
+    }
+
+    /// When the timed initials to come happen.
+    pub fn times(&self) -> impl ExactSizeIterator<Item = &Rational> {
+        self.timed.iter().map(|own| &own.time)
+    }
+}
+
+/// Time 0, the last of the times as now, and the starts.
+fn times(starts: usize, zone: &Zone) -> Vec<usize> {
+    let mut order = vec![ZERO, zone.size() - 1];
+    order.extend(FIRST_START..FIRST_START + starts);
+    order
+}
+
+fn always(change: &Change) -> Effect {
+    Effect {
+        guard: elbowroom_model::ground::Guard::ALWAYS,
+        change: change.clone(),
+    }
+}
+
+impl Process {
+    /// The start, or the instant.
+    fn first(&self) -> &SnapAction {
+        match &self.body {
+            elbowroom_model::ground::Body::Instantaneous(snap) => snap,
+            elbowroom_model::ground::Body::Durative(body) => &body.start,
+        }
+    }
+}
