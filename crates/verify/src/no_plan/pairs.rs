@@ -283,19 +283,16 @@ impl<'a> Structure<'a> {
                 let is_others = |atom: &usize| !operator.adds.contains(atom);
                 operator.holds = over_all.iter().copied().filter(is_others).collect();
                 operator.adds.extend(running);
-                let first = match process.durative() {
-                    Some(body) => {
-                        let first = moments.starts(body, now, HeldTo::Lasting, HeldTo::Lasting);
-                        operator.has_windows = moments.is_timed(&body.start.condition)
-                            || moments.is_timed(&body.over_all)
-                            || moments.is_timed(&body.end.condition);
-                        first.map(|own| own.0)
-                    }
-                    None => {
-                        let condition = process.instant();
-                        operator.has_windows = moments.is_timed(condition);
-                        moments.next(condition, now, HeldTo::Lasting)
-                    }
+                let first = if let Some(body) = process.durative() {
+                    let first = moments.starts(body, now, HeldTo::Lasting, HeldTo::Lasting);
+                    operator.has_windows = moments.is_timed(&body.start.condition)
+                        || moments.is_timed(&body.over_all)
+                        || moments.is_timed(&body.end.condition);
+                    first.map(|own| own.0)
+                } else {
+                    let condition = process.instant();
+                    operator.has_windows = moments.is_timed(condition);
+                    moments.next(condition, now, HeldTo::Lasting)
                 };
                 operator.is_possible = first.is_some();
                 self.start_of[number] = Some(self.operators.len());

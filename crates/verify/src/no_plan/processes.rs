@@ -303,10 +303,10 @@ fn without_circles(
     gives: &[Vec<Literal>],
     never_for_itself: &dyn Fn(usize) -> bool,
 ) -> Vec<bool> {
-    let mut givers: BTreeMap<Literal, BTreeSet<usize>> = BTreeMap::new();
+    let mut sources: BTreeMap<Literal, BTreeSet<usize>> = BTreeMap::new();
     for (number, literals) in gives.iter().enumerate() {
         for literal in literals {
-            givers.entry(*literal).or_default().insert(number);
+            sources.entry(*literal).or_default().insert(number);
         }
     }
     let mut is_safe = vec![false; waits.len()];
@@ -317,8 +317,8 @@ fn without_circles(
                 continue;
             }
             let is_free = waits[number].iter().all(|literal| {
-                givers.get(literal).is_none_or(|givers| {
-                    let mut left = givers.iter();
+                sources.get(literal).is_none_or(|sources| {
+                    let mut left = sources.iter();
                     left.all(|&other| other == number && never_for_itself(number))
                 })
             });
@@ -326,8 +326,8 @@ fn without_circles(
                 is_safe[number] = true;
                 changed = true;
                 for literal in &gives[number] {
-                    if let Some(givers) = givers.get_mut(literal) {
-                        givers.remove(&number);
+                    if let Some(sources) = sources.get_mut(literal) {
+                        sources.remove(&number);
                     }
                 }
             }

@@ -86,7 +86,8 @@ pub fn no_plan_certificate_from(
     match pairs::claims(&structure, goes_on) {
         Ok(claims) => {
             certificate.apart = structure.written(&claims);
-            certificate.proves = certificate.kind().proves().to_owned();
+            let proves = certificate.kind().proves();
+            proves.clone_into(&mut certificate.proves);
             return Ok(certificate);
         }
         Err(pairs::Failure::Stopped) => return Err(TIME_IS_UP.to_owned()),
@@ -95,7 +96,8 @@ pub fn no_plan_certificate_from(
     match closed::closed(task, &instances, &reached, goes_on) {
         Ok(closed) => {
             certificate.closed = Some(closed);
-            certificate.proves = certificate.kind().proves().to_owned();
+            let proves = certificate.kind().proves();
+            proves.clone_into(&mut certificate.proves);
             Ok(certificate)
         }
         Err(closed::Failure::Stopped) => Err(TIME_IS_UP.to_owned()),

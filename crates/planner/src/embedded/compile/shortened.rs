@@ -95,7 +95,7 @@ impl Perhaps {
             Condition::Compare(_, left, right) => [left, right].iter().any(|side| {
                 let mut is_in = false;
                 side.visit_fluents(&mut |fluent| {
-                    is_in |= self.functions.contains(&fluent.function)
+                    is_in |= self.functions.contains(&fluent.function);
                 });
                 is_in
             }),

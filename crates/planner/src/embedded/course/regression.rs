@@ -14,7 +14,7 @@ use super::clauses::{Literal, Matter, Number, Numbers};
 const MOST_WAYS: usize = 64;
 
 /// What effects do that cannot be regressed.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) enum Difficulty {
     /// An effect under a condition at another moment.
     Guarded,
@@ -183,9 +183,10 @@ impl Moment<'_> {
 
     /// What must hold before for a comparison to hold after.
     fn compared_after(&self, number: &Number) -> Result<Condition, Difficulty> {
+        /// What a way asks for, and which updates it consists of.
+        type Way = (Vec<Condition>, Vec<(usize, Ground)>);
         let fluents = fluents(number);
-        // Each way: what it asks for, and which updates it consists of.
-        let mut ways: Vec<(Vec<Condition>, Vec<(usize, Ground)>)> = vec![Default::default()];
+        let mut ways: Vec<Way> = vec![Way::default()];
         for (position, effect) in self.effects.iter().enumerate() {
             for fluent in &fluents {
                 let Some(fires) = self.updates(effect, fluent)? else {
@@ -198,10 +199,10 @@ impl Moment<'_> {
                 for (conditions, done) in ways {
                     // One effect changes one fluent.
                     if done.iter().all(|(other, _)| *other != position) {
-                        let mut fired = (conditions.clone(), done.clone());
-                        fired.0.push(fires.clone());
-                        fired.1.push((position, fluent.clone()));
-                        more.push(fired);
+                        let mut with = (conditions.clone(), done.clone());
+                        with.0.push(fires.clone());
+                        with.1.push((position, fluent.clone()));
+                        more.push(with);
                     }
                     let mut left = conditions;
                     left.push(not(fires.clone()));

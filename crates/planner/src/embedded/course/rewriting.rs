@@ -390,7 +390,7 @@ impl<'a> Rewriting<'a> {
                 let mut moves = false;
                 for side in [left, right] {
                     side.visit_fluents(&mut |fluent| {
-                        moves |= changing.moving.contains(&fluent.function)
+                        moves |= changing.moving.contains(&fluent.function);
                     });
                 }
                 if moves {

@@ -36,7 +36,7 @@ impl Structure<'_> {
             };
             match *key {
                 Key::Pair(one, other) => {
-                    group.together.push([one, other].map(|own| self.name(own)))
+                    group.together.push([one, other].map(|own| self.name(own)));
                 }
                 Key::Started(process, atom) => {
                     group

@@ -173,16 +173,15 @@ impl Structure<'_> {
                 (time <= *own).then(|| own.clone())
             }
             Kind::Start(_) if !operator.has_windows => Some(time),
-            Kind::Start(number) => match self.processes[number].durative() {
-                Some(body) => {
+            Kind::Start(number) => {
+                if let Some(body) = self.processes[number].durative() {
                     let first = moments.starts(body, &time, HeldTo::Lasting, HeldTo::Lasting);
                     first.map(|own| own.0)
-                }
-                None => {
+                } else {
                     let condition = self.processes[number].instant();
                     moments.next(condition, &time, HeldTo::Lasting)
                 }
-            },
+            }
             Kind::End(number) => {
                 let process = &self.processes[number];
                 let end = match process.durative().filter(|_| operator.has_windows) {

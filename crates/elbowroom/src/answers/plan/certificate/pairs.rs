@@ -258,7 +258,7 @@ impl<'a> Table<'a> {
         }
         let mut is_free = false;
         let mut reasons: Vec<Key> = Vec::new();
-        let delays = [structure.epsilon().clone(), Default::default()];
+        let delays = [structure.epsilon().clone(), Rational::default()];
         let mut look = |one: usize, other: usize, is_read: bool| {
             let delay = &delays[usize::from(!is_read)];
             if is_enough(structure.floor(one, other).plus(delay)) {
