@@ -6,6 +6,7 @@
 
 mod args;
 mod attendance;
+mod bell;
 mod board;
 mod bug;
 mod clock;

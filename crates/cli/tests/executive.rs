@@ -7,6 +7,8 @@ mod client;
 mod command;
 #[path = "executive/killed.rs"]
 mod killed;
+#[path = "executive/meanwhile.rs"]
+mod meanwhile;
 #[path = "../../../testing/skipped.rs"]
 mod skipped;
 

@@ -91,6 +91,8 @@ pub enum Event {
     },
     /// People, or other programs, ask something of the run ([`Request`]).
     Asked(Request),
+    /// The plan that was begun beside the run is there, or it is certain that there will be none.
+    PlanMade,
     /// The world has said something that cannot be understood.
     Unintelligible {
         /// The message, or its beginning.

@@ -13,6 +13,21 @@ pub trait Planner: Send {
     /// A plan from there will be asked for soon, unless things go otherwise. Whoever can work aside
     /// begins with it, and has it ready when it is asked for. Answers do not depend on it.
     fn expect(&mut self, _task: &Task, _situation: &Situation) {}
+
+    /// Begins to make a plan from there, beside whoever asks, in place of what was begun before;
+    /// whether it can do that. When there is an answer, whoever drives the run tells it so
+    /// ([`Event::PlanMade`](crate::Event::PlanMade)), and it is [collected](Planner::collect).
+    fn begin(&mut self, _task: &Task, _situation: &Situation) -> bool {
+        false
+    }
+
+    /// The answer to what was begun, which it is waited for if it is not there.
+    fn collect(&mut self, task: &Task, situation: &Situation) -> Planned {
+        self.plan(task, situation)
+    }
+
+    /// What was begun is not needed any more.
+    fn give_up(&mut self) {}
 }
 
 impl<P: Planner + ?Sized> Planner for &mut P {
@@ -23,6 +38,18 @@ impl<P: Planner + ?Sized> Planner for &mut P {
     fn expect(&mut self, task: &Task, situation: &Situation) {
         (**self).expect(task, situation);
     }
+
+    fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
+        (**self).begin(task, situation)
+    }
+
+    fn collect(&mut self, task: &Task, situation: &Situation) -> Planned {
+        (**self).collect(task, situation)
+    }
+
+    fn give_up(&mut self) {
+        (**self).give_up();
+    }
 }
 
 impl<P: Planner + ?Sized> Planner for Box<P> {
@@ -32,6 +59,18 @@ impl<P: Planner + ?Sized> Planner for Box<P> {
 
     fn expect(&mut self, task: &Task, situation: &Situation) {
         (**self).expect(task, situation);
+    }
+
+    fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
+        (**self).begin(task, situation)
+    }
+
+    fn collect(&mut self, task: &Task, situation: &Situation) -> Planned {
+        (**self).collect(task, situation)
+    }
+
+    fn give_up(&mut self) {
+        (**self).give_up();
     }
 }
 

@@ -26,6 +26,21 @@
 //! A run may also outlast its goal ([`Run::lasting`]): goals are given and abandoned while it goes
 //! on, and it can be paused.
 //!
+//! Where plans are made beside the run ([`RunSettings::plans_aside`]), it goes on meanwhile:
+//!
+//! | a plan is needed because | until it is there |
+//! | --- | --- |
+//! | goals were given or abandoned | the present plan goes on. The new one is made for where this will have led when planning is expected to be over; what is begun until then is committed |
+//! | the present plan works no more, or there is none | nothing is started; what is under way goes on, and is followed |
+//!
+//! A new plan takes over when what was committed has begun, at the latest when planning was expected
+//! to be over: with what has been done meanwhile left out, as much later as it is late, if the judge
+//! finds that this works from there. If not, it is *outdated*, and another one is made: during the
+//! second search in a row the present plan goes on only until that is expected to be over, and during
+//! further ones nothing is started. Each outdated plan counts as a new plan
+//! ([`RunSettings::most_replans`]). Goals that are given during a search wait for its end; one that is
+//! abandoned ends it, at most [three times](search) in a row.
+//!
 //! However a run ends, nothing is left running: what has not ended is cancelled, and has
 //! [`FAREWELL`] to stop. Only a world that has failed is told nothing more.
 //!
@@ -47,6 +62,7 @@ mod oblivion;
 mod progress;
 mod rested;
 mod room;
+mod search;
 mod settings;
 
 use std::sync::Arc;
@@ -77,6 +93,7 @@ use dead_end::Happened;
 use farewell::Closing;
 use lasting::Lasting;
 use progress::Progress;
+use search::{Lost, Search};
 
 /// The components of a run, except for the world.
 pub struct Ports<'a> {
@@ -124,6 +141,12 @@ pub struct Run<'a> {
     agenda: Vec<Todo>,
     /// The question that the world has not answered.
     asked: Option<Next>,
+    /// The plan that is made beside the run.
+    search: Option<Search>,
+    /// The task with the goals that the present plan is for, while plans are made beside the run.
+    plan_task: Option<Arc<Task>>,
+    /// What became of earlier searches, while plans are made beside the run.
+    lost: Lost,
     /// How the run ends, while what is running is told to stop.
     closing: Option<Closing>,
     /// The report, once the run is over.
@@ -187,6 +210,9 @@ impl<'a> Run<'a> {
             is_explaining: false,
             agenda: vec![Todo::Begin(first)],
             asked: None,
+            search: None,
+            plan_task: None,
+            lost: Lost::default(),
             closing: None,
             report: None,
             reopenings: 0,
@@ -222,10 +248,11 @@ impl<'a> Run<'a> {
 
     fn decide(&mut self) -> Decided {
         let news = std::mem::take(&mut self.news);
+        let as_planned = self.belief_of_the_plan();
         let decided = self.ports.executor.decide(&Moment {
             now: &self.now,
             news: &news,
-            belief: &self.belief,
+            belief: as_planned.as_ref().unwrap_or(&self.belief),
         });
         self.ports.recorder.record(&Entry::Decided {
             now: &self.now,
@@ -237,7 +264,7 @@ impl<'a> Run<'a> {
     /// One decision; what follows from it goes onto the agenda.
     fn decide_and_follow(&mut self) -> Result<(), Stop> {
         self.heed()?;
-        if self.attend()? {
+        if self.tend_search()? || self.attend()? {
             return Ok(());
         }
         let decided = self.decide();
@@ -255,7 +282,12 @@ impl<'a> Run<'a> {
                 self.agenda.extend(tickets.map(Todo::Cancel));
             }
             Decision::Wait { until } => self.wait(until)?,
-            Decision::Replan => self.replan(&decided.reason)?,
+            Decision::Replan => {
+                self.give_up_search();
+                self.replan(&decided.reason)?;
+            }
+            // The plan has done what it was made for, and another one is in the making.
+            Decision::GoalReached if self.search.is_some() => self.let_go_of_plan(),
             Decision::GoalReached => match self.belief.outlook() {
                 Outlook::Awaited(time) => self.wait(Some(time))?,
                 Outlook::Reached | Outlook::Unmet => self.goal_reached(),
@@ -298,7 +330,8 @@ impl<'a> Run<'a> {
             (!self.belief.breaking().is_empty()).then(|| &self.now + self.task.epsilon());
         let warning = self.warn();
         let until = until.into_iter().chain(silence).chain(breaking);
-        let until = until.chain(warning).min();
+        let taking_over = self.next_of_search();
+        let until = until.chain(warning).chain(taking_over).min();
         let Some(until) = until.map(|until| until.max(self.now.clone())) else {
             // Nothing is running, nothing is due, and the plan is not done.
             return self.replan(&Reason::new(Cause::Late).about(About::Nothing));
@@ -357,6 +390,7 @@ impl<'a> Run<'a> {
                 return Err(Stop::Over(Verdict::ReplanLimit));
             }
         }
+        self.lost.plan = true;
         self.agenda.push(Todo::Plan(reason.clone()));
         self.settle();
         Ok(())
@@ -370,7 +404,8 @@ impl<'a> Run<'a> {
         situation: &Situation,
         running: &[Ticket],
     ) -> Result<(), Stop> {
-        match self.prepare(plan, situation, running) {
+        let task = Arc::clone(&self.task);
+        match self.prepare(&task, plan, situation, running) {
             Ok(mission) => {
                 self.note_plan(plan);
                 self.begin_mission(&mission)
@@ -384,7 +419,11 @@ impl<'a> Run<'a> {
 
     /// Begins with a plan that is ready.
     fn begin_mission(&mut self, mission: &Mission) -> Result<(), Stop> {
+        self.lost = Lost::default();
         self.account.begin_plan(&mission.running);
+        if self.settings.plans_aside {
+            self.account.note_steps(mission);
+        }
         self.steps = mission.time_triggered.steps.len();
         self.progress.begin_plan();
         self.news.clear();
@@ -412,12 +451,16 @@ impl<'a> Run<'a> {
 
     fn prepare(
         &mut self,
+        task: &Task,
         plan: &TimeTriggeredPlan,
         situation: &Situation,
         running: &[Ticket],
     ) -> Result<Mission, PrepareError> {
+        if self.settings.plans_aside {
+            self.plan_task = Some(Arc::new(task.clone()));
+        }
         let (preparer, need) = (&mut self.ports.preparer, self.ports.executor.need());
-        let here = (&*self.task, situation, running);
+        let here = (task, situation, running);
         here::mission(here, plan, &self.now, &mut **preparer, need)
     }
 }

@@ -148,6 +148,7 @@ impl<'t> Belief<'t> {
             | ObservationLine::Abandon { .. }
             | ObservationLine::Pause { .. }
             | ObservationLine::Resume { .. }
+            | ObservationLine::PlanMade { .. }
             | ObservationLine::Unintelligible { .. } => {}
         }
         self.note(texts);

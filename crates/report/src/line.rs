@@ -370,6 +370,11 @@ pub enum ObservationLine {
         /// The time.
         time: Exact,
     },
+    /// The plan that was made beside the run is there.
+    PlanMade {
+        /// The time.
+        time: Exact,
+    },
     /// Something that cannot be understood.
     Unintelligible {
         /// The message.

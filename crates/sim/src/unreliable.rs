@@ -173,7 +173,10 @@ fn opposite(event: &Event) -> Event {
             ending: Ending::Succeeded,
             measured: Vec::new(),
         },
-        Event::Feedback { .. } | Event::Asked(_) | Event::Unintelligible { .. } => event.clone(),
+        Event::Feedback { .. }
+        | Event::Asked(_)
+        | Event::PlanMade
+        | Event::Unintelligible { .. } => event.clone(),
         Event::Fact { fact, truth } => Event::Fact {
             fact: *fact,
             truth: !truth,

@@ -108,9 +108,13 @@ pub(crate) struct RunArgs {
     #[arg(long, value_enum, default_value_t = RunningChoice::Keep)]
     pub(crate) running: RunningChoice,
     /// Time that planning takes in the world: `measured`, or a number of seconds; by default 0,
-    /// with --realtime `measured`
+    /// with --realtime and --world-process `measured`. Where it is measured, plans are made beside the
+    /// run, which goes on meanwhile (docs/serve.md)
     #[arg(long, value_name = "measured|S", allow_negative_numbers = true)]
     pub(crate) planning_time: Option<String>,
+    /// Memory in MB that a plan in the making may take while the run goes on
+    #[arg(long, value_name = "MB", default_value = "1000", value_parser = clap::value_parser!(u64).range(1..1_000_000))]
+    pub(crate) planner_memory: Option<u64>,
     /// Number of new plans that may be made
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count)]
     #[arg(allow_negative_numbers = true)]

@@ -10,22 +10,30 @@ use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 
 use super::Attendance;
+use crate::bell::Bell;
 use crate::clock::Clock;
 use crate::desk::Desk;
 use crate::interrupt::Interrupt;
+
+/// How often it is looked whether a plan is there, in a second on the wall clock.
+const PER_SECOND: i64 = 50;
 
 /// The time on the wall clock after which a wait looks for requests.
 const GLANCE: Duration = Duration::from_millis(50);
 
 /// Waits in pieces, so that whatever waits at the desk is reported with the time that it is then.
 ///
-/// While nothing is under way, the world's time passes no faster than the wall clock's: there is
-/// nothing to wait for but people.
+/// While nothing is under way, or a plan is made beside the run, the world's time passes no faster
+/// than the wall clock's: there is nothing to wait for but people, and planners take time.
 pub(crate) struct Attended<'a, W> {
     inner: W,
     desk: Option<Desk>,
     task: Arc<Task>,
     interrupt: Interrupt,
+    /// Rings when a plan is there.
+    bell: Bell,
+    /// How many of the world's seconds pass in one of the wall clock's.
+    factor: Rational,
     /// Whether the world is there, and not only what a journal has of it.
     is_live: Box<dyn Fn() -> bool + Send + 'a>,
     /// How much of the world's time passes in a piece.
@@ -50,11 +58,19 @@ impl<'a, W: World> Attended<'a, W> {
             desk: attendance.desk().cloned(),
             task: Arc::clone(task),
             interrupt: interrupt.clone(),
+            bell: Bell::default(),
+            factor: factor.clone(),
             is_live: Box::new(|| true),
             piece: Rational::new(millis, 1000) * factor,
             now: Rational::ZERO,
             open: BTreeSet::new(),
         }
+    }
+
+    /// The same, which reports when a plan is there.
+    pub(crate) fn ringing(self, bell: &Bell) -> Self {
+        let bell = bell.clone();
+        Self { bell, ..self }
     }
 
     /// The same, which takes no requests before that.
@@ -92,9 +108,11 @@ impl<W: World> World for Attended<'_, W> {
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        let Some(desk) = self.desk.clone() else {
-            return self.inner.wait(until);
-        };
+        if self.desk.is_none() && !self.bell.is_awaited() {
+            let passage = self.inner.wait(until)?;
+            self.note(&passage);
+            return Ok(passage);
+        }
         if !(self.is_live)() {
             let passage = self.inner.wait(until)?;
             self.note(&passage);
@@ -102,20 +120,36 @@ impl<W: World> World for Attended<'_, W> {
         }
         loop {
             let clock = Clock::start();
-            let piece = &self.now + &self.piece;
+            let is_planning = self.bell.is_awaited();
+            let piece = if is_planning {
+                &self.factor * &Rational::new(1, PER_SECOND)
+            } else {
+                self.piece.clone()
+            };
+            let piece = &self.now + piece;
+            let before = self.now.clone();
             let mut passage = self.inner.wait(until.min(&piece))?;
             let has_passed = passage.now > self.now;
             self.note(&passage);
-            if !desk.is_empty() {
+            if is_planning {
+                let passed = (&self.now - &before).to_f64() / self.factor.to_f64();
+                let passed = Duration::try_from_secs_f64(passed).unwrap_or_default();
+                self.bell.wait(passed.saturating_sub(clock.elapsed()));
+            }
+            if let Some(desk) = self.desk.as_ref().filter(|desk| !desk.is_empty()) {
                 let mut asked = desk.fetch(&self.now, &self.task);
                 passage.observations.append(&mut asked);
+            }
+            if self.bell.is_heard() {
+                let (time, event) = (self.now.clone(), Event::PlanMade);
+                passage.observations.push(Observation { time, event });
             }
             // Whether a clock that stands still is broken, the run decides.
             let is_over = !passage.observations.is_empty() || passage.now >= *until || !has_passed;
             if is_over || self.interrupt.is_requested() {
                 return Ok(passage);
             }
-            if self.open.is_empty() {
+            if self.open.is_empty() && !is_planning {
                 std::thread::sleep(GLANCE.saturating_sub(clock.elapsed()));
             }
         }

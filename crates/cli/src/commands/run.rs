@@ -31,6 +31,7 @@ use elbowroom::text::Source;
 
 use crate::args::RunArgs;
 use crate::attendance::{Attendance, Attended};
+use crate::bell::Bell;
 use crate::clock::Clock;
 use crate::desk::Desk;
 use crate::exit::{Answer, Exit, Failure};
@@ -40,7 +41,7 @@ use crate::journal::{JournalFile, Segments};
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 use crate::words::tame;
-use ahead::Ahead;
+use ahead::{Ahead, Aside};
 use believed::Believed;
 use journaled::{Careful, JournalWriter, Kept};
 use realtime::{Pace, PacedPlanner, Realtime};
@@ -69,6 +70,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let attendance = attendance(arguments);
     let interrupt = Interrupt::listen();
     let job = Job {
+        aside: aside(arguments, &interrupt),
         spec: &spec,
         task: &task,
         first,
@@ -77,6 +79,15 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         segments: None,
     };
     job.execute(arguments, output)
+}
+
+/// How plans are made in threads of their own.
+pub(super) fn aside(arguments: &RunArgs, interrupt: &Interrupt) -> Aside {
+    Aside {
+        interrupt: interrupt.clone(),
+        bell: Bell::default(),
+        most_memory: arguments.planner_memory.map(|megabytes| megabytes << 20),
+    }
 }
 
 /// Those who may ask something of a run on its page, if anybody may.
@@ -168,6 +179,7 @@ pub(super) struct Job<'a> {
     pub(super) first: Option<TimeTriggeredPlan>,
     pub(super) interrupt: &'a Interrupt,
     pub(super) attendance: &'a Attendance,
+    pub(super) aside: Aside,
     /// When the journal is begun anew, if it is to be.
     pub(super) segments: Option<Segments>,
 }
@@ -222,6 +234,7 @@ impl Job<'_> {
     /// A world that takes requests, if the run is attended.
     fn attended<'w, W: World>(&self, world: W, factor: &Rational) -> Attended<'w, W> {
         Attended::new(world, self.attendance, self.task, self.interrupt, factor)
+            .ringing(&self.aside.bell)
     }
 
     fn run(
@@ -240,7 +253,7 @@ impl Job<'_> {
             .planner_for(self.task, model.as_ref(), &clock, &goes_on)?;
         let request = RunRequest::new(self.spec, self.task)
             .beginning_with(self.first)
-            .planned_by(Ahead::new(planner, self.spec, self.interrupt))
+            .planned_by(Ahead::new(planner, self.spec, &self.aside))
             .told_to(both(self.attendance.listener(), &mut believes))
             .recorded_by(recorder);
         execute(request, world, &mut Stopwatch::start(self.interrupt))
@@ -298,7 +311,7 @@ impl Job<'_> {
             let planner = planner.map_err(contradiction)?;
             let request = RunRequest::new(self.spec, self.task)
                 .beginning_with(self.first)
-                .planned_by(Ahead::new(planner, self.spec, interrupt))
+                .planned_by(Ahead::new(planner, self.spec, &self.aside))
                 .told_to(both(self.attendance.listener(), believed.listener()))
                 .recorded_by(live::Live::new(&mut writer));
             let mut watch = Attentive {
@@ -327,7 +340,7 @@ impl Job<'_> {
         let clock = || begun.seconds();
         let goes_on = || !self.interrupt.is_requested();
         let planner = spec.planner_for(task, Some(&model), &clock, &goes_on)?;
-        let planner: Box<dyn Planner> = Box::new(Ahead::new(planner, spec, self.interrupt));
+        let planner: Box<dyn Planner> = Box::new(Ahead::new(planner, spec, &self.aside));
         let world = Realtime {
             inner: world.as_mut(),
             pace: &pace,

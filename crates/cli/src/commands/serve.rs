@@ -10,15 +10,16 @@ use std::net::TcpListener;
 use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::execute::{NamedText, RunSpec};
+use elbowroom::execute::{NamedText, RunSpec, SpecError};
 use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
+use elbowroom::pddl::{self, Source};
 use elbowroom::report::trace::TraceWriter;
 
 use super::run::resume::{self, Host};
 use super::run::spec;
-use super::run::{Job, checked};
+use super::run::{Job, aside, checked};
 use crate::args::ServeArgs;
 use crate::attendance::Attendance;
 use crate::exit::{Answer, Exit, Failure};
@@ -63,6 +64,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         if let Some(problem) = &arguments.run.problem {
             return Ok((&input::source(problem, "problem")?).into());
         }
+        heeded(&domain_text)?;
         let opened = open(arguments, &interrupt, &domain_text)?;
         let text = opened.await_problem(&interrupt).unwrap_or_default();
         front = Some(opened);
@@ -95,6 +97,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
             "choose another executor, such as guarded or live",
         ));
     }
+    spec.plans_aside = spec.can_plan_aside();
     let (task, first) = checked(&arguments.run, &spec, world.as_ref(), output)?;
     let front = match front {
         Some(front) => front,
@@ -102,6 +105,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     };
     let attendance = begin(&front, &spec, &task)?;
     let job = Job {
+        aside: aside(&arguments.run, &interrupt),
         spec: &spec,
         task: &task,
         first,
@@ -112,6 +116,24 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     let answer = job.execute(&arguments.run, output);
     front.close();
     in_order(answer)
+}
+
+/// A domain that no problem could be executed of is refused before anybody is asked for one. Whatever
+/// else is wrong with it is told with the problem.
+fn heeded(domain: &NamedText) -> Result<(), Failure> {
+    let mut words = domain.text.split(['(', ')', ' ', '\t', '\r', '\n']);
+    let words = &mut words.by_ref().filter(|word| !word.is_empty());
+    let name = words.skip_while(|word| !word.eq_ignore_ascii_case("domain"));
+    let name = name.take(2).last().unwrap_or_default();
+    let nothing = format!("(define (problem nothing) (:domain {name}) (:init) (:goal (and)))");
+    let nothing = Source::new("nothing", nothing);
+    let Ok((problem, _)) = pddl::read_problem(&domain.source(), &nothing) else {
+        return Ok(());
+    };
+    match Task::new(problem).left_to_the_judge() {
+        Some(feature) => Err(spec::contradiction(SpecError::Unheeded(feature))),
+        None => Ok(()),
+    }
 }
 
 /// Who runs until told to end has done what was asked when it ends in order.

@@ -94,6 +94,7 @@ impl<'a> Tryout<'a> {
             rollouts.settings.planning_time = PlanningTime::Seconds(Rational::ZERO);
         }
         rollouts.settings.watches_room = false;
+        rollouts.settings.plans_aside = false;
         let planner: Box<dyn Planner + 'a> = match &rollouts.replanning {
             None => Box::new(NoPlanner),
             Some(replanning) => {

@@ -111,6 +111,10 @@ pub struct RunSpec {
     /// The planning time, as it passes in the world.
     #[serde(with = "as_text")]
     pub planning_time: PlanningTime,
+    /// Whether plans are made beside the run, while it goes on
+    /// ([`RunSettings::plans_aside`]); left out where they are not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub plans_aside: bool,
     /// How many seconds of the world pass in one second on the wall clock; without one, there is no
     /// wall clock.
     #[serde(with = "positive::nullable")]
@@ -189,6 +193,7 @@ impl RunSpec {
             objective: None,
             running: settings.running,
             planning_time: PlanningTime::Seconds(Rational::ZERO),
+            plans_aside: false,
             realtime: None,
             max_replans: settings.most_replans,
             time_limit: settings.time_limit,
@@ -204,9 +209,21 @@ impl RunSpec {
             most_replans: self.max_replans,
             time_limit: self.time_limit.clone(),
             // In a simulation without a clock nobody can be warned.
+            plans_aside: self.plans_aside,
             watches_room: self.world_process.is_some() || self.realtime.is_some(),
             ..RunSettings::default()
         }
+    }
+
+    /// Whether plans can be made beside the run: there is a clock, by which planning takes as long as
+    /// it takes, and a planner that keeps nothing from one plan to the next.
+    pub fn can_plan_aside(&self) -> bool {
+        let has_clock = self.world_process.is_some() || self.realtime.is_some();
+        let keeps = self.executor.asks_odds() || self.executor.asks_outlook();
+        has_clock
+            && self.planning_time == PlanningTime::Measured
+            && self.planner != NOBODY
+            && !keeps
     }
 
     /// The quantities to vary, and the parameters of the search for envelopes.

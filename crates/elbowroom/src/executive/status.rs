@@ -397,6 +397,7 @@ impl Known {
             Event::Asked(_)
             | Event::Fact { .. }
             | Event::Value { .. }
+            | Event::PlanMade
             | Event::Unintelligible { .. } => {}
         }
     }

@@ -2,6 +2,7 @@
 
 mod adaptable;
 mod amounts;
+mod aside;
 mod bad_worlds;
 mod esterel;
 mod guarantee;

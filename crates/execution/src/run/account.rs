@@ -11,7 +11,7 @@ use elbowroom_num::Rational;
 
 use super::Patience;
 use crate::event::{Ending, Measured, Ticket};
-use crate::executor::{Order, StepId};
+use crate::executor::{Mission, Order, StepId};
 use crate::progression::Progression;
 
 /// So many of the starts before a rest are in the report of a lasting run.
@@ -29,6 +29,8 @@ pub struct Account {
     closed: VecDeque<ExecutedStep>,
     /// The steps of the present plan.
     steps: BTreeMap<StepId, Ticket>,
+    /// What the present plan has, on the world's clock, if that was noted.
+    planned: Vec<(StepId, Step)>,
     /// Those that have not ended.
     open: BTreeSet<Ticket>,
 }
@@ -175,6 +177,7 @@ impl Account {
 
     /// The steps of earlier plans no longer mean anything, but for those that go on.
     pub(super) fn begin_plan(&mut self, running: &BTreeMap<StepId, Ticket>) {
+        self.planned.clear();
         for ticket in std::mem::take(&mut self.steps).into_values() {
             if let Some(entry) = self.entries.get_mut(&ticket) {
                 entry.step = None;
@@ -186,6 +189,27 @@ impl Account {
             }
             self.steps.insert(*step, *ticket);
         }
+    }
+
+    /// Takes note of the steps of the plan that has begun.
+    pub(super) fn note_steps(&mut self, mission: &Mission) {
+        let steps = mission.instances.iter().zip(&mission.time_triggered.steps);
+        let on_the_worlds_clock = steps.map(|(instance, step)| {
+            let start = &mission.origin + &step.start;
+            (
+                StepId::from(*instance),
+                Step {
+                    start,
+                    ..step.clone()
+                },
+            )
+        });
+        self.planned = on_the_worlds_clock.collect();
+    }
+
+    /// The steps that were noted.
+    pub(super) fn plan_steps(&self) -> &[(StepId, Step)] {
+        &self.planned
     }
 
     /// The actions of the present plan that were started, or went on when it began.

@@ -35,6 +35,7 @@ impl Run<'_> {
     /// failed is told nothing more; one that fails meanwhile changes nothing any more.
     pub(super) fn stop(&mut self, stop: Stop) {
         self.agenda.clear();
+        self.give_up_search();
         if self.closing.is_some() {
             self.conclude();
             return;

@@ -81,6 +81,9 @@ impl Run<'_> {
             self.stay();
             return Ok(());
         }
+        if self.plans_aside() {
+            return self.search_from_here(reason);
+        }
         self.news.clear();
         if self.go_without_plan(reason) {
             return Ok(());
@@ -130,6 +133,8 @@ impl Run<'_> {
         let planned = self.ports.planner.plan(&self.task, &situation);
         let took = match &self.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
+            // The world's time begins when there is a first plan.
+            PlanningTime::Measured if self.settings.plans_aside => Rational::ZERO,
             PlanningTime::Measured => planned.seconds.unwrap_or_default(),
         };
         self.expect(&took);
@@ -159,7 +164,7 @@ impl Run<'_> {
     /// Learns from what a plan took what the next one will take: as much, if that is more than was
     /// expected; else less, but only by half at a time. If one long search delayed all plans after it,
     /// a run whose goals come faster than that would not start anything any more.
-    fn expect(&mut self, took: &Rational) {
+    pub(super) fn expect(&mut self, took: &Rational) {
         let half = &self.allowance / &Rational::from(2);
         self.allowance = half.max(took.clone());
     }

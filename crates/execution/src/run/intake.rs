@@ -47,6 +47,7 @@ impl Run<'_> {
             | Event::Fact { .. }
             | Event::Value { .. }
             | Event::Asked(_)
+            | Event::PlanMade
             | Event::Unintelligible { .. } => return Planned::default(),
         };
         let step = self.account.get(ticket).and_then(|entry| entry.step);
@@ -72,6 +73,7 @@ impl Run<'_> {
                 }
                 if self.belief.see_fact(*fact, *truth) {
                     self.note(&time, What::Fact(*fact, *truth));
+                    self.note_surprise();
                     self.news.push(News::Fact(*fact));
                 }
                 None
@@ -80,11 +82,13 @@ impl Run<'_> {
                 self.believe_until(&time);
                 if self.belief.see_value(*fluent, value) {
                     self.note(&time, What::Value(*fluent, value.clone()));
+                    self.note_surprise();
                     self.news.push(News::Value(*fluent));
                 }
                 None
             }
             Event::Asked(request) => return self.asked_for(request),
+            Event::PlanMade => return self.note_plan_made(),
             Event::Unintelligible { said, why } => {
                 self.progress.note_unintelligible(said, why);
                 return Some("cannot be understood; nothing was made of it");
@@ -200,6 +204,7 @@ impl Run<'_> {
         } else {
             self.belief.stop(ticket);
             self.note(&time, What::Stopped(ticket));
+            self.note_surprise();
         }
         // An instantaneous action is over when it has started; what follows says nothing new.
         let is_over = self

@@ -248,7 +248,9 @@ impl<'a> Run<'a> {
             self.stay();
             return Ok(true);
         }
-        if let Some(turn) = lasting.change.take() {
+        if self.search.is_none()
+            && let Some(turn) = lasting.change.take()
+        {
             lasting.rests_since = None;
             self.replans = 0;
             self.turn_to(&turn)?;
@@ -311,7 +313,7 @@ impl<'a> Run<'a> {
         }
         if turn.may_keep
             && let Some((plan, situation, running)) = self.kept()
-            && let Ok(mission) = self.prepare(&plan, &situation, &running)
+            && let Ok(mission) = self.prepare(&Arc::clone(&self.task), &plan, &situation, &running)
         {
             self.ports.recorder.record(&Entry::Kept {
                 now: &self.now,
@@ -319,6 +321,9 @@ impl<'a> Run<'a> {
             });
             self.note_plan(&plan);
             return self.begin_mission(&mission);
+        }
+        if self.search_while_the_plan_goes_on(&turn.reason)? {
+            return Ok(());
         }
         self.replan(&turn.reason)
     }
@@ -332,11 +337,28 @@ impl<'a> Run<'a> {
     }
 
     /// What goes on is no longer part of a plan.
-    fn drop_plan(&mut self) {
+    pub(super) fn drop_plan(&mut self) {
         self.account.begin_plan(&std::collections::BTreeMap::new());
         if let Some(lasting) = &mut self.lasting {
             lasting.plan = None;
         }
+    }
+
+    /// Whether the goals have changed otherwise than by new ones; `None` if they have not changed.
+    pub(super) fn has_given_up_goals(&self) -> Option<bool> {
+        let turn = self.lasting.as_ref()?.change.as_ref()?;
+        Some(!turn.may_keep)
+    }
+
+    /// Whether nothing more is to be done.
+    pub(super) fn is_given_up(&self) -> bool {
+        let lasting = self.lasting.as_ref();
+        lasting.is_some_and(|lasting| lasting.at_rest == AtRest::GivenUp)
+    }
+
+    /// The plan that is executed, on the world's clock, if there is one.
+    pub(super) fn present_plan(&self) -> Option<&TimeTriggeredPlan> {
+        self.lasting.as_ref()?.plan.as_ref()
     }
 
     /// The rest of the plan, begun as soon as it can be from here, if it reaches the goal: what is

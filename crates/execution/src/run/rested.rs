@@ -59,6 +59,7 @@ impl Run<'_> {
     fn idle_since(&self) -> Option<Rational> {
         let is_idle = self.goes_on_after(&Verdict::GoalReached)
             && self.has_no_goals()
+            && self.search.is_none()
             && !self.is_to_turn()
             && self.account.open_tickets().next().is_none()
             && self.belief.running().is_empty()

@@ -24,6 +24,10 @@ pub struct RunSettings {
     /// that no plan can bear any longer has failed: it is cancelled, and the next plan does without.
     /// Otherwise, that no plan can bear it is the end of the run.
     pub watches_room: bool,
+    /// Whether plans are made beside the run ([`Planner::begin`](crate::Planner::begin)), while it
+    /// goes on: [`Run`](super::Run) has the rules. The first plan of a run that ends with its goal is
+    /// waited for.
+    pub plans_aside: bool,
     /// The time limit of the run, by the world's clock.
     pub time_limit: Rational,
 }
@@ -38,6 +42,7 @@ impl Default for RunSettings {
             most_replans: 10,
             patience: Patience::default(),
             watches_room: false,
+            plans_aside: false,
             time_limit: Rational::from(1_000_000),
         }
     }

@@ -166,6 +166,7 @@ impl Experiment {
             patience: Patience { factor, at_least },
             // Worlds of experiments have no clock.
             watches_room: _,
+            plans_aside: _,
             time_limit,
         } = settings;
         let texts = |texts: &mut dyn Iterator<Item = String>| texts.collect::<Vec<_>>();

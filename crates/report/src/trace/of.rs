@@ -226,6 +226,7 @@ impl ObservationLine {
                 time,
             },
             Event::Asked(request) => Self::asked(request, time),
+            Event::PlanMade => Self::PlanMade { time },
             Event::Unintelligible { said, why } => Self::Unintelligible {
                 said: said.clone(),
                 why: why.clone(),
@@ -252,8 +253,12 @@ impl ObservationLine {
         }
     }
 
-    /// What was asked of the run, and when, if it is that.
-    pub fn request(&self) -> Option<(Request, &Rational)> {
+    /// What no world could report, and when, if it is that: what was asked of the run, or that a
+    /// plan is there.
+    pub fn of_the_run(&self) -> Option<(Event, &Rational)> {
+        if let Self::PlanMade { time } = self {
+            return Some((Event::PlanMade, &time.0));
+        }
         let (request, time) = match self {
             Self::Goal { name, goal, time } => {
                 let (name, goal) = (name.clone(), goal.clone());
@@ -267,7 +272,7 @@ impl ObservationLine {
             Self::Resume { time } => (Request::Resume, time),
             _ => return None,
         };
-        Some((request, &time.0))
+        Some((Event::Asked(request), &time.0))
     }
 }
 

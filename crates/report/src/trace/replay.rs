@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom_execution::run::Rested;
 use elbowroom_execution::{
-    Command, Entry, Event, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder,
-    World, WorldError,
+    Command, Entry, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder, World,
+    WorldError,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
@@ -204,9 +204,8 @@ impl ReplayWorld {
             .ok_or_else(|| WorldError::new(END))?;
         let mut observations = Vec::with_capacity(reported.len());
         for observation in &reported {
-            // What people ask is nothing that a world could report.
-            if let Some((request, time)) = observation.request() {
-                let (event, time) = (Event::Asked(request), time.clone());
+            if let Some((event, time)) = observation.of_the_run() {
+                let time = time.clone();
                 observations.push(Observation { time, event });
                 continue;
             }
@@ -258,6 +257,10 @@ impl ReplayPlanner {
 }
 
 impl Planner for ReplayPlanner {
+    fn begin(&mut self, _task: &Task, _situation: &Situation) -> bool {
+        true
+    }
+
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let Some((line, planned)) = self.plans.pop_front() else {
             return PlannerAnswer::from(PlanAnswer::NotFound {

@@ -1,7 +1,8 @@
-//! Plans that are made ahead, in a thread of their own, while a plan is still executed.
+//! Plans that are made in a thread of their own, while the run goes on: when they are needed, or ahead
+//! of that.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use elbowroom::execute::{FirstPlan, RunSpec};
@@ -9,18 +10,34 @@ use elbowroom::execution::{PlanAnswer, Planner, PlannerAnswer};
 use elbowroom::model::problem::Condition;
 use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan};
 
+use crate::bell::Bell;
 use crate::clock::Clock;
 use crate::interrupt::Interrupt;
+use crate::memory::MemoryLimit;
 
-/// A planner that begins with a plan as soon as it is told that it will be needed.
+/// A planner that works aside: it begins with a plan as soon as it is told that it will be needed, and,
+/// where the run goes on while plans are made, it rings when there is one.
 ///
-/// What is made ahead is made by the planner of the specification with a table of its own, so that
-/// the answer is the same as if it was asked later.
+/// What is made aside is made by the planner of the specification with a table of its own, so that
+/// the answer is the same as if it was waited for.
 pub(super) struct Ahead<'a> {
     inner: Box<dyn Planner + 'a>,
     spec: Arc<RunSpec>,
-    interrupt: Interrupt,
+    aside: Aside,
+    /// What was begun ahead.
     job: Option<Work>,
+    /// What the run waits for.
+    search: Option<Work>,
+}
+
+/// How plans are made aside.
+#[derive(Clone)]
+pub(in crate::commands) struct Aside {
+    pub(in crate::commands) interrupt: Interrupt,
+    /// Rings when a plan is there.
+    pub(in crate::commands) bell: Bell,
+    /// How many bytes planning may take, beyond what the process took before.
+    pub(in crate::commands) most_memory: Option<u64>,
 }
 
 /// A plan in the making.
@@ -28,11 +45,27 @@ struct Work {
     situation: Situation,
     goal: Condition,
     is_needless: Arc<AtomicBool>,
-    answer: JoinHandle<Option<PlanAnswer>>,
+    is_done: Arc<AtomicBool>,
+    answer: JoinHandle<Option<PlannerAnswer>>,
+}
+
+impl Work {
+    fn is_for(&self, task: &Task, situation: &Situation) -> bool {
+        self.situation == *situation && self.goal == task.problem().goal
+    }
+
+    /// The answer, with the facts of this task, once it is there.
+    fn answer(self, task: &Task, situation: &Situation) -> Option<PlannerAnswer> {
+        let mut made = self.answer.join().ok()??;
+        if let PlanAnswer::Plan(plan) = &made.answer {
+            made.answer = PlanAnswer::Plan(renumbered(plan, task, situation)?);
+        }
+        Some(made)
+    }
 }
 
 impl<'a> Ahead<'a> {
-    pub(super) fn new(inner: Box<dyn Planner + 'a>, spec: &RunSpec, interrupt: &Interrupt) -> Self {
+    pub(super) fn new(inner: Box<dyn Planner + 'a>, spec: &RunSpec, aside: &Aside) -> Self {
         // What is made ahead is no first plan.
         let spec = RunSpec {
             first_plan: FirstPlan::Shortest,
@@ -41,28 +74,71 @@ impl<'a> Ahead<'a> {
         Self {
             inner,
             spec: Arc::new(spec),
-            interrupt: interrupt.clone(),
+            aside: aside.clone(),
             job: None,
+            search: None,
         }
     }
 
-    /// What was made for this, if it was.
-    fn made(&mut self, task: &Task, situation: &Situation) -> Option<PlanAnswer> {
+    /// Has a thread make a plan.
+    fn set_out(&self, task: &Task, situation: &Situation) -> Option<Work> {
+        let is_needless = Arc::new(AtomicBool::new(false));
+        let (clapper, is_done) = self.aside.bell.clapper();
+        let (spec, interrupt, stop) = (
+            Arc::clone(&self.spec),
+            self.aside.interrupt.clone(),
+            Arc::clone(&is_needless),
+        );
+        let most_memory = self.aside.most_memory;
+        let (own, from) = (task.with_own_table(), situation.clone());
+        let made = thread::Builder::new()
+            .name("planner".to_owned())
+            .spawn(move || {
+                let _rings = clapper;
+                let begun = Clock::start();
+                let clock = || begun.seconds();
+                let limit = most_memory.map(|most| Mutex::new(MemoryLimit::of(most)));
+                let is_too_much = || {
+                    limit.as_ref().is_some_and(|limit| {
+                        let mut limit = limit.lock().unwrap_or_else(PoisonError::into_inner);
+                        limit.is_exceeded()
+                    })
+                };
+                let is_needed = || !stop.load(Ordering::SeqCst) && !interrupt.is_requested();
+                let goes_on = || is_needed() && !is_too_much();
+                let mut planner = spec.planner_for(&own, None, &clock, &goes_on).ok()?;
+                let mut made = planner.plan(&own, &from);
+                if is_too_much() && !matches!(made.answer, PlanAnswer::Plan(_)) {
+                    let most = most_memory.unwrap_or_default() >> 20;
+                    made.answer = PlanAnswer::NotFound {
+                        why: format!("no plan was found with {most} MB (--planner-memory)"),
+                    };
+                }
+                is_needed().then_some(made)
+            });
+        Some(Work {
+            situation: situation.clone(),
+            goal: task.problem().goal.clone(),
+            is_needless,
+            is_done,
+            answer: made.ok()?,
+        })
+    }
+
+    /// What was begun ahead, if it is for this.
+    fn foreseen(&mut self, task: &Task, situation: &Situation) -> Option<Work> {
         let work = self.job.take()?;
-        if work.situation != *situation || work.goal != task.problem().goal {
-            work.is_needless.store(true, Ordering::SeqCst);
-            return None;
+        if work.is_for(task, situation) {
+            return Some(work);
         }
-        match work.answer.join().ok()?? {
-            PlanAnswer::Plan(plan) => renumbered(&plan, task, situation).map(PlanAnswer::Plan),
-            other => Some(other),
-        }
+        work.is_needless.store(true, Ordering::SeqCst);
+        None
     }
 }
 
 impl Drop for Ahead<'_> {
     fn drop(&mut self) {
-        if let Some(work) = &self.job {
+        for work in self.job.iter().chain(&self.search) {
             work.is_needless.store(true, Ordering::SeqCst);
         }
     }
@@ -71,10 +147,11 @@ impl Drop for Ahead<'_> {
 impl Planner for Ahead<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let clock = Clock::start();
-        if let Some(answer) = self.made(task, situation) {
+        let foreseen = self.foreseen(task, situation);
+        if let Some(made) = foreseen.and_then(|work| work.answer(task, situation)) {
             return PlannerAnswer {
                 seconds: Some(clock.seconds()),
-                ..PlannerAnswer::from(answer)
+                ..made
             };
         }
         self.inner.plan(task, situation)
@@ -85,30 +162,37 @@ impl Planner for Ahead<'_> {
             work.is_needless.store(true, Ordering::SeqCst);
         }
         // Who looks for likelier plans in a known world keeps what it has found out.
-        if self.spec.executor.asks_odds() {
-            return;
+        if !self.spec.executor.asks_odds() {
+            self.job = self.set_out(task, situation);
         }
-        let is_needless = Arc::new(AtomicBool::new(false));
-        let (spec, interrupt, stop) = (
-            Arc::clone(&self.spec),
-            self.interrupt.clone(),
-            Arc::clone(&is_needless),
-        );
-        let (own, from) = (task.with_own_table(), situation.clone());
-        let made = thread::Builder::new().spawn(move || {
-            let begun = Clock::start();
-            let clock = || begun.seconds();
-            let goes_on = || !stop.load(Ordering::SeqCst) && !interrupt.is_requested();
-            let mut planner = spec.planner_for(&own, None, &clock, &goes_on).ok()?;
-            let answer = planner.plan(&own, &from).answer;
-            goes_on().then_some(answer)
-        });
-        self.job = made.ok().map(|answer| Work {
-            situation: situation.clone(),
-            goal: task.problem().goal.clone(),
-            is_needless,
-            answer,
-        });
+    }
+
+    fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
+        self.give_up();
+        let foreseen = self.foreseen(task, situation);
+        self.search = foreseen.or_else(|| self.set_out(task, situation));
+        if let Some(work) = &self.search {
+            self.aside.bell.follow(Arc::clone(&work.is_done));
+        }
+        self.search.is_some()
+    }
+
+    fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        self.aside.bell.silence();
+        let Some(work) = self.search.take() else {
+            return self.inner.plan(task, situation);
+        };
+        work.answer(task, situation).unwrap_or_else(|| {
+            let why = "planning was interrupted".to_owned();
+            PlannerAnswer::from(PlanAnswer::NotFound { why })
+        })
+    }
+
+    fn give_up(&mut self) {
+        self.aside.bell.silence();
+        if let Some(work) = self.search.take() {
+            work.is_needless.store(true, Ordering::SeqCst);
+        }
     }
 }
 

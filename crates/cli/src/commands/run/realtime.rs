@@ -144,6 +144,19 @@ impl Planner for PacedPlanner<'_> {
         self.inner.expect(task, situation);
     }
 
+    // The clock goes on while a plan is made aside.
+    fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
+        self.inner.begin(task, situation)
+    }
+
+    fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        self.inner.collect(task, situation)
+    }
+
+    fn give_up(&mut self) {
+        self.inner.give_up();
+    }
+
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let clock = Clock::start();
         let mut answer = self.inner.plan(task, situation);

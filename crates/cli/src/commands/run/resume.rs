@@ -20,7 +20,7 @@ use elbowroom::execution::{
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
-use elbowroom::report::trace::{Line, ReplayPlanner, ReplayWorld, Stored};
+use elbowroom::report::trace::{Line, ReplayWorld, Stored};
 
 use super::ahead::Ahead;
 use super::believed::Believed;
@@ -179,6 +179,7 @@ pub(in crate::commands) fn run(
     let mut file = JournalFile::go_on(path, &journal, length)?.in_segments(host.segments());
     let interrupt = Interrupt::listen();
     let attendance = host.attend(&spec, &task, &interrupt)?;
+    let aside = super::aside(arguments, &interrupt);
     if let Some(snapshot) = &stored.snapshot {
         attendance.begin_at_rest(snapshot);
     }
@@ -207,15 +208,10 @@ pub(in crate::commands) fn run(
             .beginning_with(first)
             .resting(rested)
             .reopened(stored.reopened() + usize::from(stored.is_complete()))
-            .planned_by(PastPlanner {
-                left: stored
-                    .lines
-                    .iter()
-                    .filter(|line| matches!(line, Line::Planned(_)))
-                    .count(),
-                past: ReplayPlanner::new(&stored),
-                present: Box::new(Ahead::new(planner, &spec, &interrupt)),
-            })
+            .planned_by(PastPlanner::new(
+                &stored,
+                Box::new(Ahead::new(planner, &spec, &aside)),
+            ))
             .told_to(super::both(attendance.listener(), believed.listener()))
             .recorded_by(views.shown(attendance.witnessed(recorder, &task, true), &task));
         let world = Careful {
@@ -241,6 +237,7 @@ pub(in crate::commands) fn run(
             refused: Vec::new(),
         };
         let mut world = Attended::new(world, &attendance, &task, &interrupt, &Rational::ONE)
+            .ringing(&aside.bell)
             .once(|| past.is_over());
         let mut watch = Watch {
             inner: Stopwatch::start(&interrupt),

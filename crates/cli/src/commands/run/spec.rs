@@ -82,20 +82,23 @@ pub(in crate::commands) fn of(
         Some(FirstPlanChoice::Likeliest) => FirstPlan::Likeliest,
         None => spec.usual_first_plan(),
     };
+    spec.plans_aside = spec.can_plan_aside();
     Ok((spec, world))
 }
 
-/// On a wall clock, planning takes time unless the arguments say otherwise.
+/// On a wall clock, and in a world that is a program, planning takes time unless the arguments say
+/// otherwise.
 fn planning_time(arguments: &RunArgs) -> Result<PlanningTime, Failure> {
-    match (&arguments.planning_time, &arguments.realtime) {
+    let has_clock = arguments.realtime.is_some() || arguments.world_process.is_some();
+    match (&arguments.planning_time, has_clock) {
         (Some(text), _) => text.parse().map_err(|_| {
             Failure::new(
                 format!("`--planning-time {text}` is neither `measured` nor a number of seconds"),
                 "write, for example, --planning-time 2.5",
             )
         }),
-        (None, Some(_)) => Ok(PlanningTime::Measured),
-        (None, None) => Ok(PlanningTime::Seconds(Rational::ZERO)),
+        (None, true) => Ok(PlanningTime::Measured),
+        (None, false) => Ok(PlanningTime::Seconds(Rational::ZERO)),
     }
 }
 

@@ -25,7 +25,7 @@ pub(super) const DOMAIN: &str =
 
 pub(super) const OBJECTS: &str = "(:objects r s - robot book cup key - item)";
 
-pub(super) fn task(init: &str, goal: &str) -> Arc<Task> {
+pub(crate) fn task(init: &str, goal: &str) -> Arc<Task> {
     let problem = format!(
         "(define (problem day) (:domain errands) {OBJECTS}
            (:init (free r) (here book) (here cup) (here key) (power) (= (charge) 9) {init})
@@ -250,17 +250,17 @@ pub(super) fn scripted(
     }
 }
 
-pub(super) fn pursue(name: &str, goal: &str) -> Event {
+pub(crate) fn pursue(name: &str, goal: &str) -> Event {
     let (name, goal) = (name.to_owned(), goal.to_owned());
     Event::Asked(Request::Pursue { name, goal })
 }
 
-pub(super) fn abandon(name: &str) -> Event {
+pub(crate) fn abandon(name: &str) -> Event {
     let name = name.to_owned();
     Event::Asked(Request::Abandon { name })
 }
 
-pub(super) fn fact(task: &Task, name: &str, truth: bool) -> Event {
+pub(crate) fn fact(task: &Task, name: &str, truth: bool) -> Event {
     let fact = task.fact_named(name).expect("a correct test");
     Event::Fact { fact, truth }
 }

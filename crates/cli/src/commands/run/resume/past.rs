@@ -1,5 +1,6 @@
 //! What stands in the journal of a run, played again.
 
+use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -92,26 +93,86 @@ impl Recorder for PastRecorder<'_> {
     }
 }
 
-/// Makes the plans that were made, and then new ones.
+/// Makes the plans that were made, and then new ones. One that was in the making when the journal ends
+/// is made anew.
 pub(super) struct PastPlanner<'a> {
-    pub(super) left: usize,
-    pub(super) past: ReplayPlanner,
-    pub(super) present: Box<dyn Planner + 'a>,
+    /// For each plan that the journal says is made, in order: whether it has the answer.
+    asked: VecDeque<bool>,
+    past: ReplayPlanner,
+    present: Box<dyn Planner + 'a>,
+    /// Whose plan is made beside the run.
+    begun: Begun,
+}
+
+/// Whose plan is made beside the run.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Begun {
+    /// One of the journal.
+    Past,
+    /// A new one.
+    Present,
+}
+
+impl<'a> PastPlanner<'a> {
+    pub(super) fn new(stored: &Stored, present: Box<dyn Planner + 'a>) -> Self {
+        let mut asked = VecDeque::new();
+        for line in &stored.lines {
+            match line {
+                Line::Planning(_) => asked.push_back(false),
+                Line::Planned(_) => {
+                    if let Some(last) = asked.back_mut() {
+                        *last = true;
+                    }
+                }
+                _ => {}
+            }
+        }
+        Self {
+            asked,
+            past: ReplayPlanner::new(stored),
+            present,
+            begun: Begun::Past,
+        }
+    }
+
+    /// Who makes the next plan; `None` for one that the journal says is begun, and was given up.
+    fn next(&mut self) -> Option<Begun> {
+        match self.asked.pop_front() {
+            Some(true) => Some(Begun::Past),
+            Some(false) if !self.asked.is_empty() => None,
+            _ => Some(Begun::Present),
+        }
+    }
 }
 
 impl Planner for PastPlanner<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        match self.left.checked_sub(1) {
-            Some(left) => {
-                self.left = left;
-                self.past.plan(task, situation)
-            }
-            None => self.present.plan(task, situation),
+        match self.next() {
+            Some(Begun::Past) => self.past.plan(task, situation),
+            _ => self.present.plan(task, situation),
+        }
+    }
+
+    fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
+        self.begun = self.next().unwrap_or(Begun::Past);
+        self.begun == Begun::Past || self.present.begin(task, situation)
+    }
+
+    fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        match self.begun {
+            Begun::Past => self.past.plan(task, situation),
+            Begun::Present => self.present.collect(task, situation),
+        }
+    }
+
+    fn give_up(&mut self) {
+        if self.begun == Begun::Present {
+            self.present.give_up();
         }
     }
 
     fn expect(&mut self, task: &Task, situation: &Situation) {
-        if self.left == 0 {
+        if self.asked.is_empty() {
             self.present.expect(task, situation);
         }
     }

@@ -1,6 +1,7 @@
 //! Times before which pairs of atoms are not true together: the least fixpoint of the checker's rules, and
 //! those of its bounds that a proof needs.
 
+use elbowroom_num::Rational;
 use elbowroom_verify::no_plan::pairs::{Bounds, Claims, Earliest, Key, Structure};
 
 /// The most atoms, and the most actions.

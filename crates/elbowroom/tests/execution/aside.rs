@@ -1,0 +1,588 @@
+//! Plans that are made while the run goes on. No threads and no clock: a planner that takes as long as it
+//! is told to, by the world's time, and a world that says when its plan is there.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use elbowroom::execute::{Embedded, Execution};
+use elbowroom::execution::run::{Report, RunSettings, Verdict};
+use elbowroom::execution::{
+    Command, Entry, Event, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder,
+    Request, World, WorldError,
+};
+use elbowroom::model::validate::{Settings, validate};
+use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan, problem};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::{Line, Replay, ReplayPlanner, ReplayWorld, Stored};
+
+use crate::lasting::scripted::{Notes, Scripted, abandon, fact, pursue, task};
+
+/// A planner that works beside the run.
+#[derive(Clone, Default)]
+struct Beside(Arc<Mutex<Desk>>);
+
+#[derive(Default)]
+struct Desk {
+    now: Rational,
+    /// How long each search takes, one after the other; the last one again and again.
+    seconds: Vec<Rational>,
+    /// When the plan is there, until that was said.
+    due: Option<Rational>,
+    begun: usize,
+    given_up: usize,
+    waited_for: usize,
+    /// Whether there is never a plan.
+    has_none: bool,
+}
+
+impl Beside {
+    fn taking(seconds: &[Rational]) -> Self {
+        let desk = Desk {
+            seconds: seconds.to_vec(),
+            ..Desk::default()
+        };
+        Self(Arc::new(Mutex::new(desk)))
+    }
+
+    fn desk(&self) -> MutexGuard<'_, Desk> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Planner for Beside {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        self.desk().waited_for += 1;
+        self.collect(task, situation)
+    }
+
+    fn begin(&mut self, _task: &Task, _situation: &Situation) -> bool {
+        let mut desk = self.desk();
+        let index = desk.begun.min(desk.seconds.len() - 1);
+        let due = &desk.now + &desk.seconds[index];
+        desk.due = Some(due);
+        desk.begun += 1;
+        true
+    }
+
+    fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        if self.desk().has_none {
+            return PlannerAnswer::from(PlanAnswer::Unsolvable);
+        }
+        Embedded::default().plan(task, situation)
+    }
+
+    fn give_up(&mut self) {
+        let mut desk = self.desk();
+        desk.due = None;
+        desk.given_up += 1;
+    }
+}
+
+/// That world, which says when a plan is there, and in which actions take longer or less long than planned.
+struct Telling {
+    inner: Scripted,
+    planner: Beside,
+    /// By how many quarters of itself the nth start's duration differs.
+    quarters: Vec<i64>,
+    started: usize,
+}
+
+impl World for Telling {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        let mut command = command.clone();
+        if let Command::Start {
+            duration: Some(duration),
+            ..
+        } = &mut command
+        {
+            let quarters = self.quarters.get(self.started % self.quarters.len().max(1));
+            let part = Rational::new(4 + quarters.copied().unwrap_or(0), 4);
+            *duration = &*duration * &part;
+            self.started += 1;
+        }
+        self.inner.command(now, &command)
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let due = self.planner.desk().due.clone();
+        let soonest = due.iter().chain([until]).min().cloned().unwrap_or_default();
+        let mut passage = self.inner.wait(&soonest)?;
+        let mut desk = self.planner.desk();
+        desk.now.clone_from(&passage.now);
+        if due.is_some_and(|due| due <= passage.now) {
+            desk.due = None;
+            passage.observations.push(Observation {
+                time: passage.now.clone(),
+                event: Event::PlanMade,
+            });
+        }
+        Ok(passage)
+    }
+}
+
+/// Notes, and the lines of the trace.
+struct Tape {
+    notes: Notes,
+    task: Arc<Task>,
+    lines: Arc<Mutex<Vec<String>>>,
+}
+
+impl Recorder for Tape {
+    fn record(&mut self, entry: &Entry<'_>) {
+        self.notes.record(entry);
+        let line = Line::of(&self.task, entry).text();
+        if let Entry::Planned { now, .. } = entry {
+            let note = format!("{}: the plan is there", now.to_decimal(1));
+            let notes = self.notes.0.lock();
+            notes.unwrap_or_else(PoisonError::into_inner).push(note);
+        }
+        let lines = self.lines.lock();
+        lines.unwrap_or_else(PoisonError::into_inner).push(line);
+    }
+}
+
+struct Told {
+    notes: Vec<String>,
+    lines: Vec<String>,
+    report: Report,
+}
+
+fn settings() -> RunSettings {
+    RunSettings {
+        plans_aside: true,
+        watches_room: true,
+        ..RunSettings::default()
+    }
+}
+
+fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
+    Execution::of(task)
+        .by(executor.parse().expect("a registered one"))
+        .with_settings(settings())
+}
+
+fn told(
+    execution: Execution<'_>,
+    task: &Arc<Task>,
+    (end, script): (i64, Vec<(Rational, Event)>),
+    planner: &Beside,
+    quarters: &[i64],
+) -> Told {
+    let is_to_end = Arc::new(AtomicBool::new(false));
+    let script = script.into_iter();
+    let script = script.map(|(time, event)| Observation { time, event });
+    let mut world = Telling {
+        inner: Scripted {
+            now: Rational::ZERO,
+            coming: script.collect(),
+            end: Rational::from(end),
+            is_to_end: Arc::clone(&is_to_end),
+            slow: None,
+            on_cancel: None,
+        },
+        planner: planner.clone(),
+        quarters: quarters.to_vec(),
+        started: 0,
+    };
+    let (notes, lines) = (Notes::default(), Arc::default());
+    let report = execution
+        .planned_by(planner.clone())
+        .recorded_by(Tape {
+            notes: notes.clone(),
+            task: Arc::clone(task),
+            lines: Arc::clone(&lines),
+        })
+        .ending_when(move || is_to_end.load(Ordering::SeqCst))
+        .run_in(&mut world);
+    let notes = notes.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
+    Told {
+        notes: notes.clone(),
+        lines: lines.clone(),
+        report,
+    }
+}
+
+fn seconds(seconds: i64) -> Rational {
+    Rational::from(seconds)
+}
+
+/// A lasting run by `guarded`.
+fn lasting(task: &Arc<Task>, end: i64, script: Vec<(i64, Event)>, planner: &Beside) -> Told {
+    let script = script
+        .into_iter()
+        .map(|(time, event)| (seconds(time), event));
+    let script = (end, script.collect());
+    let execution = execution(task, "guarded").lasting(true);
+    told(execution, task, script, planner, &[])
+}
+
+#[track_caller]
+fn assert_has(told: &Told, notes: &[&str]) {
+    let mut left = told.notes.iter();
+    for note in notes {
+        let found = left.any(|it| it.contains(note));
+        assert!(found, "no `{note}` in its place in {:#?}", told.notes);
+    }
+}
+
+#[test]
+fn the_running_plan_goes_on_while_one_is_made_for_a_goal_that_was_given() {
+    let task = task("", "(and (have book) (have cup))");
+    let planner = Beside::taking(&[seconds(1), seconds(12)]);
+    let told = lasting(&task, 100, vec![(5, pursue("key", "(have key)"))], &planner);
+    // The first plan was made in the first second; the second job begins while the second search
+    // is under way, and the third when it is over.
+    assert_has(
+        &told,
+        &[
+            "1: the plan is there",
+            "1: start",
+            "5: plan",
+            "11: start",
+            "17: the plan is there",
+            "21: start (fetch r key)",
+            "rest: goal-reached",
+        ],
+    );
+    assert_eq!(told.report.starts, 3, "{:#?}", told.notes);
+    let desk = planner.desk();
+    assert_eq!((desk.begun, desk.waited_for), (2, 0), "{:#?}", told.notes);
+}
+
+/// What the new plan was to do and the running one has done meanwhile is not done again.
+#[test]
+fn what_was_done_meanwhile_is_not_done_again() {
+    let task = task("(free s)", "(and (have book) (have cup))");
+    for search in [0, 1, 4, 9, 14, 30] {
+        let planner = Beside::taking(&[seconds(0), seconds(search)]);
+        let script = vec![(2, pursue("key", "(have key)"))];
+        let told = lasting(&task, 200, script, &planner);
+        assert_has(&told, &["rest: goal-reached"]);
+        assert_eq!(told.report.starts, 3, "{search}: {:#?}", told.notes);
+    }
+}
+
+#[test]
+fn goals_and_facts_that_come_in_during_a_search_are_taken_in_at_once() {
+    let task = task("", "(have book)");
+    let planner = Beside::taking(&[seconds(30), seconds(1)]);
+    let script = vec![
+        (3, pursue("odd", "(have spoon)")),
+        (4, pursue("key", "(have key)")),
+        (5, fact(&task, "(here cup)", false)),
+        (6, Event::Asked(Request::Pause)),
+        (7, Event::Asked(Request::Resume)),
+    ];
+    let told = lasting(&task, 100, script, &planner);
+    assert_has(
+        &told,
+        &[
+            "3: it is no goal of this problem",
+            "30: the plan is there",
+            "30: the plan is kept",
+            "30: start (fetch r book)",
+            "rest: goal-reached",
+        ],
+    );
+    // All was taken in before there was a plan.
+    let place = |what: &str| told.lines.iter().position(|it| it.contains(what));
+    let there = place("\"event\":\"planned\"");
+    for what in ["goal", "fact", "pause", "resume"] {
+        let taken = place(&format!("\"observation\":{{\"type\":\"{what}\""));
+        assert!(
+            taken.is_some() && taken < there,
+            "{what}: {taken:?}, {there:?}"
+        );
+    }
+    assert_eq!(told.report.starts, 2, "{:#?}", told.notes);
+}
+
+#[test]
+fn where_the_plan_is_lost_nothing_is_started_until_there_is_another_one() {
+    let task = task("(free s)", "(and (have book) (have cup) (have key))");
+    let planner = Beside::taking(&[seconds(0), seconds(20)]);
+    // Somebody has taken the key, and brings it back.
+    let script = vec![
+        (2, fact(&task, "(here key)", false)),
+        (3, fact(&task, "(here key)", true)),
+    ];
+    let told = lasting(&task, 100, script, &planner);
+    assert_has(
+        &told,
+        &[
+            "0: start",
+            "2: plan",
+            // There was no plan without the key, which is there again.
+            "22: the plan is there",
+            "22: plan",
+            "42: the plan is there",
+            "rest: goal-reached",
+        ],
+    );
+    let early = told.notes.iter().filter(|it| it.contains("start"));
+    let before = |it: &&String| it.split(':').next().and_then(|it| it.parse().ok()) < Some(42.0);
+    assert_eq!(early.filter(before).count(), 2, "{:#?}", told.notes);
+    assert_eq!(told.report.starts, 3, "{:#?}", told.notes);
+}
+
+#[test]
+fn a_pause_during_a_search_holds_its_plan_back() {
+    let task = task("", "(have book)");
+    let planner = Beside::taking(&[seconds(10)]);
+    let script = vec![
+        (5, Event::Asked(Request::Pause)),
+        (30, Event::Asked(Request::Resume)),
+    ];
+    let told = lasting(&task, 100, script, &planner);
+    assert_has(
+        &told,
+        &["30: the plan is there", "30: start", "rest: goal-reached"],
+    );
+    assert_eq!(planner.desk().begun, 1);
+}
+
+#[test]
+fn a_search_for_a_goal_that_is_abandoned_ends_and_one_without_goals_is_needless() {
+    let task = task("", "(have book)");
+    let planner = Beside::taking(&[seconds(0), seconds(1000), seconds(1)]);
+    let script = vec![
+        (2, pursue("key", "(have key)")),
+        (4, abandon("key")),
+        (30, pursue("cup", "(have cup)")),
+        (31, abandon("cup")),
+    ];
+    let told = lasting(&task, 100, script, &planner);
+    assert_has(
+        &told,
+        &[
+            "2: plan",
+            "4: plan",
+            "rest: goal-reached problem",
+            "31: rest: no goals",
+        ],
+    );
+    let desk = planner.desk();
+    assert_eq!((desk.begun, desk.given_up), (4, 2), "{:#?}", told.notes);
+}
+
+/// Goals that come, or go, faster than plans can be made do not keep the run from acting.
+#[test]
+fn goals_that_change_faster_than_plans_are_made_do_not_starve_the_run() {
+    let task = task("", "(have book)");
+    for comes_and_goes in [false, true] {
+        let planner = Beside::taking(&[seconds(7)]);
+        let mut script = Vec::new();
+        for second in 1..60 {
+            script.push((
+                second,
+                match second % 2 {
+                    1 => pursue("cup", "(have cup)"),
+                    _ if comes_and_goes => abandon("cup"),
+                    _ => pursue("key", "(have key)"),
+                },
+            ));
+        }
+        let told = lasting(&task, 200, script, &planner);
+        let first = told.notes.iter().position(|it| it.contains("start (fetch"));
+        let last_goal = told.notes.iter().position(|it| it.starts_with("60"));
+        assert!(first.is_some(), "{:#?}", told.notes);
+        assert!(
+            last_goal.is_none_or(|last| first < Some(last)),
+            "{:#?}",
+            told.notes
+        );
+        assert_has(&told, &["rest: goal-reached"]);
+        assert!(planner.desk().begun < 30, "{}", planner.desk().begun);
+    }
+}
+
+#[test]
+fn a_run_that_finds_no_plan_rests_and_one_that_is_over_ends() {
+    let task = task("", "(and (have book) (have cup))");
+    let planner = Beside::taking(&[seconds(5)]);
+    planner.desk().has_none = true;
+    let told = lasting(&task, 100, Vec::new(), &planner);
+    assert_has(
+        &told,
+        &["5: the plan is there", "rest: unsolvable-from-here problem"],
+    );
+    // A run with one goal waits for its first plan, and makes others beside itself.
+    let script = vec![
+        (seconds(3), fact(&task, "(here cup)", false)),
+        (seconds(4), fact(&task, "(here cup)", true)),
+    ];
+    let planner = Beside::taking(&[seconds(4)]);
+    let script = (100, script);
+    let told = told_once(&task, script, &planner);
+    assert_eq!(
+        told.report.verdict,
+        Verdict::GoalReached,
+        "{:#?}",
+        told.notes
+    );
+    assert_eq!(planner.desk().waited_for, 1);
+    assert_has(
+        &told,
+        &[
+            "0: start",
+            "3: plan",
+            "7: plan",
+            "11: the plan is there",
+            "11: start (fetch r cup)",
+        ],
+    );
+}
+
+fn told_once(task: &Arc<Task>, script: (i64, Vec<(Rational, Event)>), planner: &Beside) -> Told {
+    told(execution(task, "guarded"), task, script, planner, &[])
+}
+
+/// What the new plan was to do cannot be done any more when it comes, while the running plan goes on: it
+/// is outdated, and another one is made, twice more at most before nothing else is started.
+#[test]
+fn a_plan_that_is_outdated_when_it_comes_is_made_again() {
+    let task = task("", "(and (have book) (have cup))");
+    let planner = Beside::taking(&[seconds(0), seconds(6), seconds(6)]);
+    let script = vec![
+        (2, pursue("key", "(have key)")),
+        (5, fact(&task, "(here key)", false)),
+        (9, fact(&task, "(here key)", true)),
+    ];
+    let told = lasting(&task, 200, script, &planner);
+    assert_has(
+        &told,
+        &[
+            "0: start (fetch r book)",
+            "2: plan",
+            "8: the plan is there",
+            "8: plan, because what has happened while the plan was made",
+            "10: start (fetch r cup)",
+            "14: the plan is there",
+            "rest: goal-reached problem key",
+        ],
+    );
+    assert_eq!(told.report.starts, 3, "{:#?}", told.notes);
+}
+
+/// Numbers that look random.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, limit: u64) -> u64 {
+        let factor = 6_364_136_223_846_793_005;
+        self.0 = self.0.wrapping_mul(factor).wrapping_add(1_442_695);
+        (self.0 >> 33) % limit
+    }
+
+    fn small(&mut self, limit: u64) -> i64 {
+        i64::try_from(self.below(limit)).expect("small")
+    }
+}
+
+const ITEMS: [&str; 3] = ["book", "cup", "key"];
+
+/// Whatever is asked, however long plans take and actions deviate: what is executed is a plan by the
+/// judge's rules, nothing is started while the run is paused, and the record plays back to the same
+/// decisions.
+#[test]
+fn whatever_happens_meanwhile_what_is_done_is_valid_and_plays_back() {
+    let header = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
+    let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+    for seed in 0..240 {
+        let dice = &mut Dice(seed);
+        let executor =
+            ["guarded", "live", "stn", "adaptable"][usize::try_from(seed % 4).expect("small")];
+        let task = task("(free s)", "(have book)");
+        let mut script = Vec::new();
+        for _ in 0..20 {
+            let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
+            let event = match dice.below(10) {
+                0..=5 => pursue(item, &format!("(have {item})")),
+                6..=7 => abandon(item),
+                8 => Event::Asked(Request::Pause),
+                _ => Event::Asked(Request::Resume),
+            };
+            script.push((Rational::new(dice.small(600), 10), event));
+        }
+        // Somebody takes things away, and brings them back: in every other run, as what others do is
+        // nothing that a plan could be judged with.
+        for _ in 0..(seed % 2) * 6 {
+            let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
+            let here = fact(&task, &format!("(here {item})"), dice.below(2) == 0);
+            script.push((Rational::new(dice.small(600), 10), here));
+        }
+        for item in ITEMS {
+            script.push((seconds(61), fact(&task, &format!("(here {item})"), true)));
+        }
+        // However it went, it goes on in the end.
+        script.push((seconds(61), Event::Asked(Request::Resume)));
+        script.push((seconds(62), pursue("last", "(and (have book) (have key))")));
+        let lengths: Vec<Rational> = (0..12)
+            .map(|_| Rational::new(dice.small(150), 10))
+            .collect();
+        let planner = Beside::taking(&lengths);
+        let quarters: Vec<i64> = (0..7).map(|_| dice.small(3) - 1).collect();
+        let told = told(
+            execution(&task, executor).lasting(true),
+            &task,
+            (400, script),
+            &planner,
+            &quarters,
+        );
+        let is_last = |it: &String| it.contains("rest: goal-reached") && it.contains("last");
+        assert!(
+            told.notes.iter().any(is_last),
+            "{executor}, {seed}: {:#?}",
+            told.notes
+        );
+        let is_let_alone = seed % 2 == 0;
+        let steps: Vec<Step> = told
+            .report
+            .executed
+            .iter()
+            .map(|it| it.step.clone())
+            .collect();
+        let free = task.with_goal(problem::Condition::TRUE);
+        let verdict = validate(&free, &TimeTriggeredPlan { steps }, &Settings::default());
+        assert!(
+            verdict.is_valid() || !is_let_alone,
+            "{executor}, {seed}: {verdict:?} {:#?}",
+            told.notes
+        );
+        assert_eq!(planner.desk().waited_for, 0);
+        let mut is_paused = false;
+        for line in &told.lines {
+            if line.contains("\"event\":\"observed\"") {
+                is_paused |= line.contains("\"type\":\"pause\"");
+                is_paused &= !line.contains("\"type\":\"resume\"");
+            }
+            let starts =
+                line.contains("\"event\":\"command\"") && line.contains("\"type\":\"start\"");
+            assert!(!(starts && is_paused), "{executor}, {seed}: {line}");
+        }
+        for (what, note) in [("kept", "is kept"), ("start", "start")] {
+            let notes = told.notes.iter().filter(|it| it.contains(note));
+            *seen.entry(what).or_default() += notes.count();
+        }
+        *seen.entry("given up").or_default() += planner.desk().given_up;
+
+        let stored =
+            Stored::read(&format!("{header}\n{}\n", told.lines.join("\n"))).expect("whole");
+        let mut replay = Replay::new(&stored, Arc::clone(&task));
+        let interruption = replay.interruption();
+        execution(&task, executor)
+            .lasting(true)
+            .planned_by(ReplayPlanner::new(&stored))
+            .recorded_by(&mut replay)
+            .ending_when(move || interruption.load(Ordering::SeqCst))
+            .run_in(&mut ReplayWorld::new(&stored, &task));
+        let (agreed, difference) = replay.outcome();
+        assert_eq!(difference, None, "{executor}, {seed}");
+        assert_eq!(agreed, told.lines.len(), "{executor}, {seed}");
+    }
+    for (what, count) in &seen {
+        assert!(*count > 10, "{what}: {seen:?}");
+    }
+}

@@ -1,0 +1,433 @@
+//! Plans that are made beside the run: what goes on meanwhile, and how they take over.
+
+mod fit;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
+use super::agenda::Todo;
+use super::here::Guess;
+use super::intake::Remark;
+use super::{Outlook, Run, Stop, Verdict};
+use crate::event::Ticket;
+use crate::planning::{PlanAnswer, Planned};
+use crate::preparation::Need;
+use crate::progression::Progression;
+use crate::reason::{About, Cause, Reason};
+use crate::record::Entry;
+use fit::{Expected, Fit};
+
+/// So many searches in a row are ended because goals were abandoned. The next one is not: somebody who
+/// keeps changing goals does not keep the run from acting.
+const MOST_ENDED: usize = 3;
+
+/// For so many seconds of the world's time, at most, a plan that is there waits for the world to say
+/// what was told to start has started.
+const WORD: i64 = 1;
+
+/// A plan in the making, or one that waits to take over.
+pub(super) struct Search {
+    reason: Reason,
+    guess: Guess,
+    /// With the goals that it is made for.
+    task: Arc<Task>,
+    /// Where it begins.
+    situation: Situation,
+    /// What is under way there. Tickets that were not given out when it was begun are those of
+    /// what the present plan is expected to start.
+    running: Vec<Ticket>,
+    /// What the present plan is expected to start until then.
+    expected: Vec<Expected>,
+    begun: Rational,
+    course: Course,
+    is_made: bool,
+    /// Whether something has happened since that nobody expected.
+    is_overtaken: bool,
+    /// The plan, and since when it is there.
+    plan: Option<(TimeTriggeredPlan, Rational)>,
+}
+
+/// What goes on during a search.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Course {
+    /// The present plan, until then if there is an end.
+    Plan { until: Option<Rational> },
+    /// What is under way.
+    UnderWay,
+}
+
+/// What became of earlier searches and of the present plan, since one was taken up.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lost {
+    /// Whether the present plan works no more.
+    pub(super) plan: bool,
+    /// How many plans in a row were outdated when they came.
+    outdated: usize,
+    /// How many searches in a row were ended because goals were abandoned.
+    ended: usize,
+}
+
+impl Run<'_> {
+    /// Whether plans are made beside the run, from now on.
+    pub(super) fn plans_aside(&self) -> bool {
+        let has_begun = self.now.is_positive() || self.account.started() > 0;
+        let is_waited_for = !has_begun && !self.goes_on_after(&Verdict::GoalReached);
+        self.settings.plans_aside && !is_waited_for
+    }
+
+    /// The planner says that it is done.
+    pub(super) fn note_plan_made(&mut self) -> Remark {
+        match &mut self.search {
+            Some(search) if !search.is_made => {
+                search.is_made = true;
+                None
+            }
+            _ => Some("no plan was being made"),
+        }
+    }
+
+    /// What is believed, with the goals that the present plan is for: until another plan takes over, it
+    /// need not reach the goals that were given since. `None` where these are the same.
+    pub(super) fn belief_of_the_plan(&self) -> Option<Progression> {
+        let (_, task) = (self.search.as_ref()?, self.plan_task.as_ref()?);
+        let mut belief = self.belief.clone();
+        belief.pursue(task);
+        Some(belief)
+    }
+
+    /// Something has happened that nobody expected.
+    pub(super) fn note_surprise(&mut self) {
+        if let Some(search) = &mut self.search {
+            search.is_overtaken = true;
+        }
+    }
+
+    /// A plan is needed, and there is none that could go on.
+    pub(super) fn search_from_here(&mut self, reason: &Reason) -> Result<(), Stop> {
+        self.let_go_of_plan();
+        self.news.clear();
+        if self.go_without_plan(reason) {
+            return Ok(());
+        }
+        self.search(reason.clone(), Guess::AQuarterLonger, Course::UnderWay);
+        Ok(())
+    }
+
+    /// Another plan is needed, because the goals have changed, and the present one goes on until it
+    /// is there; whether that can be.
+    pub(super) fn search_while_the_plan_goes_on(&mut self, reason: &Reason) -> Result<bool, Stop> {
+        let goes_on = self.plans_aside()
+            && self.settings.running == super::RunningRule::Keep
+            && !self.lost.plan
+            && self.present_plan().is_some()
+            // Others number what they start as they like.
+            && self.ports.executor.need() != Need::PartialOrder
+            && self.needs_no_plan().is_none_or(|it| it == Outlook::Unmet);
+        if !goes_on {
+            return Ok(false);
+        }
+        self.count_replan(reason)?;
+        self.search(
+            reason.clone(),
+            Guess::AQuarterLonger,
+            Course::Plan { until: None },
+        );
+        Ok(true)
+    }
+
+    /// One more new plan is made.
+    fn count_replan(&mut self, reason: &Reason) -> Result<(), Stop> {
+        self.reasons.push(reason.clone());
+        self.replans += 1;
+        if self.replans > self.settings.most_replans {
+            self.replans -= 1;
+            return Err(Stop::Over(Verdict::ReplanLimit));
+        }
+        Ok(())
+    }
+
+    /// Begins to look for a plan.
+    fn search(&mut self, reason: Reason, guess: Guess, course: Course) {
+        let fit = match &course {
+            Course::Plan { until } => self.where_the_plan_leads(until.as_ref()),
+            Course::UnderWay => {
+                let foreseen = self.as_foreseen(guess);
+                let here = || self.situation(&self.allowance, guess);
+                let (situation, running) = foreseen.unwrap_or_else(here);
+                Fit {
+                    situation,
+                    running,
+                    expected: Vec::new(),
+                }
+            }
+        };
+        self.ports.recorder.record(&Entry::Planning {
+            now: &self.now,
+            reason: &reason,
+            situation: &fit.situation,
+        });
+        // Who cannot plan beside the run is waited for.
+        let is_made = !self.ports.planner.begin(&self.task, &fit.situation);
+        self.search = Some(Search {
+            reason,
+            guess,
+            task: Arc::clone(&self.task),
+            situation: fit.situation,
+            running: fit.running,
+            expected: fit.expected,
+            begun: self.now.clone(),
+            course,
+            is_made,
+            is_overtaken: false,
+            plan: None,
+        });
+    }
+
+    /// Ends a search whose plan is not needed any more.
+    pub(super) fn give_up_search(&mut self) {
+        if self.search.take().is_some() {
+            self.ports.planner.give_up();
+        }
+    }
+
+    /// What the present plan would start is not started any more.
+    pub(super) fn let_go_of_plan(&mut self) {
+        self.lost.plan = true;
+        self.account.begin_plan(&BTreeMap::new());
+        if let Some(search) = &mut self.search {
+            search.course = Course::UnderWay;
+        }
+    }
+
+    /// When something about a search is to be decided, whatever happens.
+    pub(super) fn next_of_search(&self) -> Option<Rational> {
+        let search = self.search.as_ref()?;
+        if let Some((_, since)) = &search.plan {
+            let at_least = &self.now + self.task.epsilon();
+            let begins = search
+                .situation
+                .time
+                .clone()
+                .max(since + Rational::from(WORD));
+            return Some(begins.max(at_least));
+        }
+        match &search.course {
+            Course::Plan { until: Some(until) } => Some(until.clone()),
+            // Whoever makes the plan says when it is there.
+            _ => Some(self.settings.time_limit.clone()),
+        }
+    }
+
+    /// Sees to a search, if there is one; whether the executor is not to be asked because of it.
+    pub(super) fn tend_search(&mut self) -> Result<bool, Stop> {
+        let Some(search) = &self.search else {
+            return Ok(false);
+        };
+        if self.is_given_up() {
+            self.give_up_search();
+            return Ok(false);
+        }
+        if self.is_paused() {
+            return Ok(false);
+        }
+        if self.needs_no_plan() == Some(Outlook::Reached) {
+            self.give_up_search();
+            self.news.clear();
+            self.goal_reached();
+            return Ok(true);
+        }
+        let given_up = self.has_given_up_goals();
+        let is_to_end = given_up == Some(true) && self.lost.ended < MOST_ENDED;
+        if given_up.is_some() && (is_to_end || self.has_no_goals()) {
+            self.lost.ended += 1;
+            self.give_up_search();
+            return Ok(false);
+        }
+        if search.plan.is_some() {
+            return self.take_over_if_due();
+        }
+        if search.is_made {
+            self.collect()?;
+            return Ok(true);
+        }
+        if let Course::Plan { until: Some(until) } = &search.course
+            && self.now >= *until
+        {
+            self.let_go_of_plan();
+        }
+        Ok(self.waits_for_plan())
+    }
+
+    /// Lets time pass, if nothing goes on but what is under way.
+    fn waits_for_plan(&mut self) -> bool {
+        let search = self.search.as_ref();
+        let waits = search.is_some_and(|search| search.course == Course::UnderWay);
+        if waits {
+            let silence = self.next_silence().into_iter();
+            let until = silence.chain(self.next_of_search()).min();
+            let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
+            self.agenda.push(Todo::GiveUpTheSilent);
+            self.agenda.push(Todo::Pass(until.max(self.now.clone())));
+        }
+        waits
+    }
+
+    /// Takes in the planner's answer.
+    fn collect(&mut self) -> Result<(), Stop> {
+        let Some(mut search) = self.search.take() else {
+            return Ok(());
+        };
+        let Planned { answer, remark, .. } =
+            self.ports.planner.collect(&self.task, &search.situation);
+        let took = &self.now - &search.begun;
+        self.expect(&took);
+        let (plan, why_not) = match &answer {
+            PlanAnswer::Plan(plan) => (Some(plan), None),
+            PlanAnswer::Unsolvable => (None, Some("no plan reaches the goal from here")),
+            PlanAnswer::NotFound { why } => (None, Some(why.as_str())),
+        };
+        self.ports.recorder.record(&Entry::Planned {
+            now: &self.now,
+            took: &took,
+            plan,
+            why_not,
+            is_unsolvable: answer == PlanAnswer::Unsolvable,
+            remark: remark.as_deref(),
+        });
+        self.heed()?;
+        match answer {
+            PlanAnswer::Plan(plan) if search.course == Course::UnderWay => {
+                self.take_over_from_nothing(&search, &plan)
+            }
+            PlanAnswer::Plan(plan) => {
+                search.plan = Some((plan, self.now.clone()));
+                self.search = Some(search);
+                Ok(())
+            }
+            // Another plan is needed anyway.
+            _ if self.is_to_turn() => Ok(()),
+            // There was none from there; from here, there may be.
+            _ if search.is_overtaken => self.search_again(&search.reason),
+            // What the present plan leads to was only expected.
+            _ if !search.expected.is_empty() || search.course != Course::UnderWay => {
+                self.search_from_here(&search.reason)
+            }
+            answer => self.without_plan(&search, answer),
+        }
+    }
+
+    /// There is no plan from where nothing more is started.
+    fn without_plan(&mut self, search: &Search, answer: PlanAnswer) -> Result<(), Stop> {
+        let overdue = self.overdue();
+        if self.settings.watches_room && !overdue.is_empty() {
+            let reason = search.reason.clone();
+            if search.guess == Guess::AQuarterLonger {
+                // What is overdue may still end in time.
+                self.search(reason, Guess::AnyMoment, Course::UnderWay);
+                return Ok(());
+            }
+            // No plan can bear that it goes on: it has failed, and the next one does without.
+            self.agenda.push(Todo::Plan(reason));
+            self.agenda.push(Todo::Settle(Some(overdue.clone())));
+            let overdue = overdue.into_iter().rev();
+            self.agenda.extend(overdue.map(Todo::Cancel));
+            return Ok(());
+        }
+        Err(Stop::Over(match answer {
+            PlanAnswer::NotFound { why } => Verdict::NoPlan { why },
+            _ => Verdict::Unsolvable,
+        }))
+    }
+
+    /// A plan takes over where nothing was started since it was asked for. Where things stand otherwise
+    /// than expected, it begins from here if it works from here; else what has happened is told to the
+    /// executor, which finds whether it can bear that.
+    fn take_over_from_nothing(
+        &mut self,
+        search: &Search,
+        plan: &TimeTriggeredPlan,
+    ) -> Result<(), Stop> {
+        let time = search.situation.time.clone();
+        let (situation, running) = self.situation_at(time, search.guess);
+        let is_as_expected = situation == search.situation && running == search.running;
+        if !is_as_expected
+            && let Some((plan, situation, running)) = self.fitted(search, plan)
+            && let Ok(mission) = self.prepare(&search.task, &plan, &situation, &running)
+        {
+            self.note_plan(&plan);
+            return self.begin_mission(&mission);
+        }
+        let surprises = std::mem::take(&mut self.news);
+        match self.prepare(&search.task, plan, &search.situation, &search.running) {
+            Ok(mission) => {
+                self.agenda.push(Todo::Tell(surprises));
+                self.note_plan(plan);
+                self.begin_mission(&mission)
+            }
+            Err(error) => {
+                let why = error.to_string();
+                Err(Stop::Over(Verdict::NoPlan { why }))
+            }
+        }
+    }
+
+    /// A plan that is there takes over from the present one when it is time for that; whether the
+    /// executor is not to be asked.
+    fn take_over_if_due(&mut self) -> Result<bool, Stop> {
+        let Some(search) = &self.search else {
+            return Ok(false);
+        };
+        let Some((plan, since)) = &search.plan else {
+            return Ok(false);
+        };
+        let is_begun = |it: &Expected| self.account.ticket(it.step).is_some();
+        let is_due = self.now >= search.situation.time || search.expected.iter().all(is_begun);
+        // What was told to start and has not said that it has, cannot be planned with.
+        let is_told = |ticket: Ticket| self.belief.running().contains_key(&ticket);
+        let waits_for_word =
+            !self.account.open_tickets().all(is_told) && self.now < since + Rational::from(WORD);
+        if search.course != Course::UnderWay && (!is_due || waits_for_word) {
+            return Ok(false);
+        }
+        let fit = self.fitted(search, plan);
+        let Some(search) = self.search.take() else {
+            return Ok(false);
+        };
+        if let Some((plan, situation, running)) = fit
+            && let Ok(mission) = self.prepare(&search.task, &plan, &situation, &running)
+        {
+            self.note_plan(&plan);
+            self.begin_mission(&mission)?;
+            return Ok(true);
+        }
+        self.search_again(&search.reason)?;
+        Ok(true)
+    }
+
+    /// The plan that was made is outdated.
+    fn search_again(&mut self, first: &Reason) -> Result<(), Stop> {
+        let about = "what has happened while the plan was made".to_owned();
+        let reason = Reason::new(Cause::Surprise).about(About::Said(about));
+        let reason = if self.is_to_turn() { first } else { &reason };
+        self.lost.outdated += 1;
+        self.count_replan(reason)?;
+        if self.lost.outdated > 1 || self.lost.plan {
+            self.agenda.push(Todo::Plan(reason.clone()));
+            self.settle();
+            self.lost.plan = true;
+            return Ok(());
+        }
+        // It will take about as long again.
+        let ahead = &self.allowance * &Rational::new(3, 2);
+        let until = Some(&self.now + ahead + self.task.epsilon());
+        self.search(
+            reason.clone(),
+            Guess::AQuarterLonger,
+            Course::Plan { until },
+        );
+        Ok(())
+    }
+}
