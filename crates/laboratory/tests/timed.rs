@@ -104,6 +104,85 @@ fn bounds_enclose_what_a_plain_recursion_finds() {
     );
 }
 
+/// Whoever keeps to some of the actions, and acts only when something has happened, is no better than the
+/// best: never so in random worlds, and nearly as good in some.
+#[test]
+fn who_keeps_to_some_actions_is_never_better_than_the_best() {
+    let mut near = 0;
+    for number in 0..60 {
+        let mut rng = ChaCha8Rng::seed_from_u64(4000 + number);
+        let world = SmallWorld::random(&mut rng, number % 2 == 0);
+        let (worst, best) = world.best();
+        let all = ["(a0)", "(a1)", "(a2)"].map(str::to_owned);
+        let settings = Settings {
+            first_cells: twin::ENDS as usize,
+            horizon: Some(i64::from(twin::ENDS).into()),
+            most_states: 1_000,
+            gap: 0.0,
+            plans: vec![all[..1].to_vec(), all[..2].to_vec(), all.to_vec()],
+            ..Settings::default()
+        };
+        let found = bounds(&world.domain(), &world.problem(), &world.world(), &settings);
+        let lower = found.within.map_or(0.0, |within| within.lower);
+        assert!(
+            lower <= best + 1e-9,
+            "{lower} is more than {best}\n{world:#?}"
+        );
+        near += usize::from(worst > 0.0 && worst < 1.0 && lower > worst - 0.1);
+    }
+    assert!(
+        near >= 5,
+        "only {near} worlds in which that is nearly as good: too few to mean something"
+    );
+}
+
+/// Six things at once, each of which takes as long as it likes, and one after them. Whoever may begin each
+/// at any time, and let it go, has too many states; whoever begins all when that can be done has few.
+#[test]
+fn many_things_at_once_are_bounded_from_below_within_a_plan() {
+    let names = ["a", "b", "c", "d", "e", "f"];
+    let predicates = names.map(|name| format!("(todo-{name}) (done-{name})"));
+    let actions = names.map(|name| {
+        format!(
+            "(:durative-action do-{name} :parameters () :duration (= ?duration 4)
+               :condition (at start (todo-{name}))
+               :effect (and (at start (not (todo-{name}))) (at end (done-{name}))))"
+        )
+    });
+    let needs = names.map(|name| format!("(at start (done-{name}))"));
+    let domain = format!(
+        "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
+           (:predicates (day) (finished) {}) {}
+           (:durative-action finish :parameters () :duration (= ?duration 2)
+             :condition (and (at end (day)) {}) :effect (at end (finished))))",
+        predicates.join(" "),
+        actions.join("\n"),
+        needs.join(" ")
+    );
+    let todo = names.map(|name| format!("(todo-{name})"));
+    let problem = format!(
+        "(define (problem p) (:domain d) (:init (day) (at 12 (not (day))) {})
+           (:goal (finished)))",
+        todo.join(" ")
+    );
+    let world = "format = \"elbowroom-world\"\nversion = 1
+        [[duration]]\naction = \"finish\"\nconstant = 2
+        [[duration]]\naction = \"*\"\nuniform = { from = 0.2, to = 10.2 }
+        [[duration]]\naction = \"finish\"\nconstant = 2";
+    let plan = names.map(|name| format!("(do-{name})")).into_iter();
+    let settings = Settings {
+        most_states: 30_000,
+        plans: vec![plan.chain(["(finish)".to_owned()]).collect()],
+        ..Settings::default()
+    };
+    let found = bounds(&domain, &problem, world, &settings);
+    // Each is done by 10 with 0.98, all six with its sixth power.
+    let by_hand = 0.98_f64.powi(6);
+    assert_encloses(&found, by_hand);
+    assert!(found.within.is_some(), "{found:?}");
+    assert!(found.lower > by_hand - 0.05, "{found:?}");
+}
+
 /// A vase is to be carried home before dark, and may be knocked over on the way, if it is not carried with
 /// care. Where there are too many states, the bound from above is that of a world in which nobody does so.
 #[test]

@@ -11,9 +11,17 @@ use super::world::TimedWorld;
 /// What more than so many happenings in one cell lead to is taken to be lost.
 const MOST_ORDERED: usize = 5;
 
+/// The agent may do something at every boundary.
+pub(super) const ALWAYS: usize = 1;
+
+/// Only when something has happened, and at time 0.
+pub(super) const WHEN_SOMETHING_HAPPENS: usize = usize::MAX;
+
 pub(super) struct Below<'a> {
     world: &'a TimedWorld,
     chances: &'a Chances,
+    /// After how many cells in which nothing happens the agent may do something all the same.
+    stride: usize,
 }
 
 /// Something that happens in a cell.
@@ -41,6 +49,9 @@ pub(super) enum Move {
 /// All that is worth looking at in a state in which the goal does not hold, and in which there is
 /// hope.
 pub(super) fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
+    if !state.may_act {
+        return vec![Move::Wait];
+    }
     let startable = state.startable(world);
     if state.must_start(world, &startable) {
         return vec![Move::Start(startable[0])];
@@ -55,6 +66,24 @@ pub(super) fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
     cancelled.chain(started).chain([Move::Wait]).collect()
 }
 
+/// Who acts only when something has happened does not wait, or let anything go, while there is something to
+/// start that breaks nothing off that is under way, and starts nothing that does.
+fn leave_nothing_undone(world: &TimedWorld, state: &State, moves: &mut Vec<Move>) {
+    let breaks_nothing = |choice: &Move| match choice {
+        Move::Start(act) => {
+            let under_way = usize::from(world.acts[*act].rest.is_some());
+            let after = state.started(world, *act, 0, Phase::Goes);
+            after.running.len() == state.running.len() + under_way
+        }
+        Move::Cancel(_) | Move::Wait => false,
+    };
+    if moves.iter().any(&breaks_nothing) {
+        moves.retain(breaks_nothing);
+    } else {
+        moves.retain(|choice| !matches!(choice, Move::Start(_)));
+    }
+}
+
 /// What is being put together of one cell.
 struct Cell<'c> {
     bound: &'c Below<'c>,
@@ -67,8 +96,13 @@ struct Cell<'c> {
 }
 
 impl<'a> Below<'a> {
-    pub(super) fn new(world: &'a TimedWorld, chances: &'a Chances) -> Self {
-        Self { world, chances }
+    /// Any `stride` is a way to act, and so bounds the best from below.
+    pub(super) fn new(world: &'a TimedWorld, chances: &'a Chances, stride: usize) -> Self {
+        Self {
+            world,
+            chances,
+            stride,
+        }
     }
 
     /// What may happen in a cell, with how likely all of it is.
@@ -269,7 +303,11 @@ impl Cell<'_> {
         if !state.is_hopeful(world, self.hopes) {
             return Vec::new();
         }
-        let moves = moves(world, state).into_iter();
+        let mut moves = moves(world, state);
+        if self.bound.stride == WHEN_SOMETHING_HAPPENS {
+            leave_nothing_undone(world, state, &mut moves);
+        }
+        let moves = moves.into_iter();
         moves.map(|choice| self.choice(state, choice)).collect()
     }
 
@@ -296,7 +334,9 @@ impl Cell<'_> {
         let mut choice = Choice::new();
         for (p, happenings) in self.bound.happenings(self.number, state) {
             let outcomes = self.bound.outcomes(state, &happenings).unwrap_or_default();
-            let targets = outcomes.into_iter().map(|outcome| {
+            let may_act = !happenings.is_empty() || (self.number + 1) % self.bound.stride == 0;
+            let targets = outcomes.into_iter().map(|mut outcome| {
+                outcome.may_act = may_act;
                 if outcome.is_won(world) {
                     Target::Won
                 } else if outcome.is_hopeful(world, self.hopes) {

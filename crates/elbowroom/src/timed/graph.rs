@@ -14,6 +14,8 @@ pub(super) struct State {
     pub(super) happened: u32,
     /// Sorted by action.
     pub(super) running: Vec<Running>,
+    /// Whether the agent may do something before anything more happens.
+    pub(super) may_act: bool,
 }
 
 /// An action under way.
@@ -89,6 +91,7 @@ impl State {
             facts: world.initial,
             happened: 0,
             running: Vec::new(),
+            may_act: true,
         }
     }
 

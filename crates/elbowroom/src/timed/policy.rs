@@ -6,7 +6,7 @@ use elbowroom_num::Rational;
 use elbowroom_sim::{Side as Part, WorldModel};
 use indexmap::{IndexMap, IndexSet};
 
-use super::below::{Below, Move, moves};
+use super::below::{ALWAYS, Below, Move, moves};
 use super::chances::Chances;
 use super::graph::{Expansion, Hopes, Phase, Running, State, Tolls, explored, settled, worth};
 use super::world::{Facts, TimedWorld};
@@ -75,7 +75,13 @@ impl Policy {
         goes_on: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
         let world = TimedWorld::new(task, model, settings)?;
-        let optimum = refined(&world, settings, &|_| true, goes_on)?;
+        let optimum = refined(
+            &world,
+            TimedOptimum::unknown(),
+            settings,
+            &|_| true,
+            goes_on,
+        )?;
         Self::on_finest(world, optimum, settings, goes_on)
     }
 
@@ -100,7 +106,13 @@ impl Policy {
             return Ok(None);
         }
         let is_promising = |grids: &[Grid]| may_get_close(grids, settings.most_states);
-        let optimum = refined(&world, settings, &is_promising, goes_on)?;
+        let optimum = refined(
+            &world,
+            TimedOptimum::unknown(),
+            settings,
+            &is_promising,
+            goes_on,
+        )?;
         if optimum.upper - optimum.lower > CLOSE {
             return Ok(None);
         }
@@ -154,7 +166,7 @@ impl Policy {
         left: &mut usize,
         goes_on: &dyn Fn() -> bool,
     ) -> Option<Vec<IndexMap<State, f64>>> {
-        let bound = Below::new(&self.world, &self.chances);
+        let bound = Below::new(&self.world, &self.chances, ALWAYS);
         let mut hopes = Hopes::new();
         let mut layers = explored(&bound, &mut hopes, left, goes_on).ok()?;
         let last = layers.pop().unwrap_or_default().into_iter();
@@ -186,7 +198,7 @@ impl Policy {
         if state.is_won(world) || !state.is_hopeful(world, &mut hopes) {
             return Vec::new();
         }
-        let bound = Below::new(world, &self.chances);
+        let bound = Below::new(world, &self.chances, ALWAYS);
         let mut next = IndexSet::new();
         let only = IndexSet::from([state.clone()]);
         let nodes = bound.expand(cell, &only, &mut next, &mut hopes, usize::MAX);
@@ -217,6 +229,7 @@ impl Policy {
             facts,
             happened,
             running,
+            may_act: true,
         };
         match standing.started.and_then(act_of) {
             Some(act) => state.started(&self.world, act, standing.period, Phase::Goes),

@@ -1,0 +1,208 @@
+//! Bounds from below by agents that allow themselves less than they may.
+//!
+//! Whoever does nothing but certain actions, and begins or cancels something only when something has
+//! just happened, is one of all executors, so the best of all is at least as good. It also leaves
+//! nothing undone that breaks nothing off which is under way. The process of
+//! such an agent has far fewer states: of what is under way at the same time, most has begun at the
+//! same time. So its grids are fine where those of the whole process have too many states. Where the
+//! best nearly always reaches the goal, that is all that has to be known: 1 is a bound from above.
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_sim::{Distribution, WorldModel};
+use serde::{Deserialize, Serialize};
+
+use super::below::{Below, WHEN_SOMETHING_HAPPENS};
+use super::chances::Chances;
+use super::world::Occurs;
+use super::{SLACK, Settings, Side, TimedWorld, graph};
+
+/// A bound from below, by whoever does nothing but certain actions, each when something has happened.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Within {
+    /// It succeeds at least with this probability.
+    pub lower: f64,
+    /// The length of a cell of the grid that says so, in seconds.
+    pub step: f64,
+    /// How many states there were at the beginnings of cells.
+    pub states: usize,
+    /// The actions, `(name object …)`.
+    pub actions: Vec<String>,
+}
+
+/// Looks for bounds within several sets of actions.
+pub(super) struct Search {
+    sets: Vec<Set>,
+    /// The best so far.
+    pub(super) best: Option<Within>,
+}
+
+struct Set {
+    world: TimedWorld,
+    actions: Vec<String>,
+    /// How many cells the next grid is to have, about.
+    cells: usize,
+}
+
+impl Search {
+    /// Within each of the [plans](Settings::plans), and within all of them together. Runs end at
+    /// `horizon`, in seconds, if nothing else is known to end them.
+    pub(super) fn new(
+        task: &Task,
+        model: &WorldModel,
+        settings: &Settings,
+        horizon: Option<f64>,
+    ) -> Self {
+        let horizon = settings
+            .horizon
+            .clone()
+            .or_else(|| Rational::from_f64_as_written(horizon?));
+        let mut all: Vec<Vec<String>> = Vec::new();
+        let mut add = |mut actions: Vec<String>| {
+            actions.sort_unstable();
+            actions.dedup();
+            if !all.contains(&actions) {
+                all.push(actions);
+            }
+        };
+        let allowed = |name: &String| {
+            let only = settings.only.as_ref();
+            only.is_none_or(|only| only.iter().any(|it| it.eq_ignore_ascii_case(name)))
+        };
+        for plan in &settings.plans {
+            add(plan.iter().filter(|name| allowed(name)).cloned().collect());
+        }
+        let together = settings.plans.iter().flatten();
+        add(together.filter(|name| allowed(name)).cloned().collect());
+        let sets = all.into_iter().filter(|actions| !actions.is_empty());
+        let sets = sets.filter_map(|actions| {
+            let within = Settings {
+                only: Some(actions.clone()),
+                horizon: horizon.clone(),
+                ..settings.clone()
+            };
+            let world = TimedWorld::new(task, model, &within).ok()?;
+            Some(Set {
+                world,
+                actions,
+                cells: settings.first_cells.max(1),
+            })
+        });
+        Self {
+            sets: sets.collect(),
+            best: None,
+        }
+    }
+
+    /// The best value found, 0 if there is none.
+    pub(super) fn lower(&self) -> f64 {
+        self.best.as_ref().map_or(0.0, |best| best.lower)
+    }
+
+    /// Finer and finer grids, one of each set after the other, until the bound is close to `upper`, or
+    /// they have more states than `most_states`.
+    pub(super) fn refine(
+        &mut self,
+        upper: f64,
+        most_states: usize,
+        settings: &Settings,
+        goes_on: &dyn Fn() -> bool,
+    ) {
+        let mut going: Vec<usize> = (0..self.sets.len()).collect();
+        while !going.is_empty() {
+            let mut left = Vec::new();
+            for place in going {
+                if upper - self.lower() <= settings.gap {
+                    return;
+                }
+                if let Some(found) = self.sets[place].next(most_states, goes_on) {
+                    left.push(place);
+                    if found.lower > self.lower() {
+                        self.best = Some(found);
+                    }
+                }
+            }
+            going = left;
+        }
+    }
+}
+
+impl Set {
+    /// The next grid; `None` if it has too many states, or nobody wants it.
+    fn next(&mut self, most_states: usize, goes_on: &dyn Fn() -> bool) -> Option<Within> {
+        let (step, cells) = fitting(&self.world, self.cells)?;
+        let chances = Chances::new(&self.world, step, cells, Side::Below).ok()?;
+        let bound = Below::new(&self.world, &chances, WHEN_SOMETHING_HAPPENS);
+        let mut left = most_states;
+        let value = graph::value(&bound, &mut left, goes_on).ok()?;
+        self.cells *= 2;
+        let lower = (value - SLACK).max(0.0);
+        Some(Within {
+            lower,
+            step,
+            states: most_states - left,
+            actions: self.actions.clone(),
+        })
+    }
+}
+
+/// The grid of so many cells up to twice as many on which the least time is lost: whoever acts at the
+/// boundaries of cells loses what is missing to a whole number of them for each time that is known,
+/// such as a duration or a deadline. It may end before the horizon: that is a loss, too.
+fn fitting(world: &TimedWorld, cells: usize) -> Option<(f64, usize)> {
+    let lasting: Vec<f64> = world
+        .acts
+        .iter()
+        .filter_map(|act| constant(world, act))
+        .collect();
+    let events = world.events.iter().filter_map(|event| match &event.occurs {
+        Occurs::Once { time, .. } => match time.distribution {
+            Distribution::Constant(time) => Some(time),
+            _ => None,
+        },
+        Occurs::Rate(_) => None,
+    });
+    let times: Vec<f64> = events.collect();
+    #[allow(clippy::cast_precision_loss, reason = "at most 65,535 cells")]
+    let coarsest = world.horizon / cells as f64;
+    let loss = |step: f64| {
+        let over = |time: &f64| ((time / step - 1e-9).ceil() * step - time).max(0.0);
+        let under = |time: &f64| (time - (time / step + 1e-9).floor() * step).max(0.0);
+        let lost: f64 = lasting.iter().map(over).sum();
+        lost + times.iter().chain([&world.horizon]).map(under).sum::<f64>()
+    };
+    let mut best = coarsest;
+    for time in lasting.iter().chain(&times).chain([&world.horizon]) {
+        let mut parts = (time / coarsest).ceil().max(1.0);
+        while time / parts >= coarsest / 2.0 {
+            let step = time / parts;
+            if step <= coarsest && loss(step) < loss(best) - 1e-9 {
+                best = step;
+            }
+            parts += 1.0;
+        }
+    }
+    let count = (world.horizon / best + 1e-9).floor();
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "it is a small positive number"
+    )]
+    let count = (count < f64::from(u16::MAX)).then_some(count as usize)?;
+    Some((best, count))
+}
+
+/// How long an action takes, if that is known.
+fn constant(world: &TimedWorld, act: &super::Act) -> Option<f64> {
+    act.rest.as_ref()?;
+    let planned = act.planned.to_f64();
+    let time = match world.model.duration_rule(&act.name) {
+        None => planned,
+        Some(rule) => match rule.distribution {
+            Distribution::Constant(time) if rule.is_relative => time * planned,
+            Distribution::Constant(time) => time,
+            _ => return None,
+        },
+    };
+    (time > 0.0).then_some(time)
+}
