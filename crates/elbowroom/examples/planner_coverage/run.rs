@@ -270,7 +270,7 @@ fn run(job: &Job, options: &Options) -> Row {
             metrics.iter().min()
         };
         row.best_metric = shown(best);
-        row.better = if metric.maximize { "more" } else { "less" }.to_owned();
+        row.better = String::from(if metric.maximize { "more" } else { "less" });
     }
     if let (Some(val), Some(found)) = (&options.val, report.outcome.found()) {
         let plan = write_plan(&task, &found.plan);

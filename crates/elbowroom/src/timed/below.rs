@@ -334,7 +334,8 @@ impl Cell<'_> {
         let mut choice = Choice::new();
         for (p, happenings) in self.bound.happenings(self.number, state) {
             let outcomes = self.bound.outcomes(state, &happenings).unwrap_or_default();
-            let may_act = !happenings.is_empty() || (self.number + 1) % self.bound.stride == 0;
+            let may_act =
+                !happenings.is_empty() || (self.number + 1).is_multiple_of(self.bound.stride);
             let targets = outcomes.into_iter().map(|mut outcome| {
                 outcome.may_act = may_act;
                 if outcome.is_won(world) {

@@ -75,7 +75,7 @@ pub(super) fn certified(finding: &PlanFinding) -> Option<String> {
             let by = match certificate.kind() {
                 Kind::Apart => "pairs that are never true together",
                 Kind::Closed => "a closed set of states",
-                _ => "what can become true, and when",
+                Kind::Reached => "what can become true, and when",
             };
             format!("certified by {by}; --json prints the certificate")
         }

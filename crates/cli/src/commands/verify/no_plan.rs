@@ -89,7 +89,7 @@ fn why(certificate: &NoPlan) -> String {
                 counted(states, "state")
             )
         }
-        _ => {
+        Kind::Reached => {
             let facts: usize = certificate.reached.iter().map(|own| own.facts.len()).sum();
             format!(
                 "even if nothing that has become true were ever lost, only {facts} facts could become \
