@@ -190,12 +190,12 @@ const CELLAR: &str = "(:requirements :typing :durative-actions) (:types match fu
 
 fn cellar(fuses: usize) -> Task {
     let names: Vec<String> = (0..fuses).map(|own| format!("f{own}")).collect();
-    let goal: String = names.iter().map(|own| format!(" (mended {own})")).collect();
-    let names = names.join(" ");
+    let goal: Vec<String> = names.iter().map(|own| format!("(mended {own})")).collect();
+    let (names, goal) = (names.join(" "), goal.join(" "));
     task(
         CELLAR,
         &format!(
-            "(:objects m - match {names} - fuse) (:init (free) (unused m)) (:goal (and{goal}))"
+            "(:objects m - match {names} - fuse) (:init (free) (unused m)) (:goal (and {goal}))"
         ),
     )
 }
