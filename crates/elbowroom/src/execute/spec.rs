@@ -37,6 +37,10 @@ pub const EMBEDDED: &str = "embedded";
 /// only there where they say something are [so marked](RunSpec::planner_time).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a member of its own in the header of a trace"
+)]
 pub struct RunSpec {
     /// The domain, in PDDL.
     pub domain: NamedText,

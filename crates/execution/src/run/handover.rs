@@ -82,7 +82,8 @@ impl Run<'_> {
             return Ok(());
         }
         if self.plans_aside() {
-            return self.search_from_here(reason);
+            self.search_from_here(reason);
+            return Ok(());
         }
         self.news.clear();
         if self.go_without_plan(reason) {

@@ -106,14 +106,12 @@ impl Run<'_> {
     }
 
     /// A plan is needed, and there is none that could go on.
-    pub(super) fn search_from_here(&mut self, reason: &Reason) -> Result<(), Stop> {
+    pub(super) fn search_from_here(&mut self, reason: &Reason) {
         self.let_go_of_plan();
         self.news.clear();
-        if self.go_without_plan(reason) {
-            return Ok(());
+        if !self.go_without_plan(reason) {
+            self.search(reason.clone(), Guess::AQuarterLonger, Course::UnderWay);
         }
-        self.search(reason.clone(), Guess::AQuarterLonger, Course::UnderWay);
-        Ok(())
     }
 
     /// Another plan is needed, because the goals have changed, and the present one goes on until it
@@ -313,7 +311,8 @@ impl Run<'_> {
             _ if search.is_overtaken => self.search_again(&search.reason),
             // What the present plan leads to was only expected.
             _ if !search.expected.is_empty() || search.course != Course::UnderWay => {
-                self.search_from_here(&search.reason)
+                self.search_from_here(&search.reason);
+                Ok(())
             }
             answer => self.without_plan(&search, answer),
         }
