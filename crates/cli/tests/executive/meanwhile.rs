@@ -53,44 +53,13 @@ fn requests_are_taken_in_and_answered_while_the_first_plan_is_made() {
     assert_eq!(own.end().status.code(), Some(0));
 }
 
-#[test]
-fn the_running_plan_is_dispatched_while_another_one_is_made() {
-    let place = folder("other-search");
-    let go = place.join("go");
-    fs::write(&go, "").expect("written");
-    let mut own = with_a_slow_planner(&place);
-    own.await_state(|state| state["running"].as_array().is_some_and(|it| it.len() == 2));
-    fs::remove_file(&go).expect("it is there");
-    // What is done already is to come undone, once nothing needs it, so that no plan has it yet.
-    own.await_state(|state| {
-        let running = state["running"].as_array().expect("a list");
-        let mut names = running.iter().filter_map(|it| it["action"].as_str());
-        names.any(|name| name.ends_with("a1 a2)"))
-    });
-    own.post("/v1/facts", &json!({"fact": "(done a1)", "becomes": false}));
-    let again = json!({"goal": "(done a1)", "name": "again"});
-    let (status, taken) = own.post("/v1/goals", &again);
-    assert_eq!((status, &taken["taken"]), (200, &json!(true)), "{taken}");
-    let plans = own.get("/v1/state").1["plans"].clone();
-    // The planner makes no plan before it may, and yet the last jobs are done.
-    own.await_state(|state| {
-        let facts = state["facts"].as_array();
-        facts.is_some_and(|facts| facts.contains(&json!("(done b3)")))
-    });
-    assert_eq!(own.get("/v1/state").1["plans"], plans);
-    fs::write(&go, "").expect("written");
-    own.await_state(|state| state["activity"] == "resting");
-    own.post("/v1/stop", &Value::Null);
-    assert_eq!(own.end().status.code(), Some(0));
-}
-
-/// A domain that cannot be executed is refused before anybody is asked for a problem.
+/// A domain of which nothing can be executed is refused before anybody is asked for a problem.
 #[test]
 fn a_domain_that_cannot_be_executed_is_refused_before_it_listens() {
     let place = folder("plus");
     let domain = place.join("plus.pddl");
     let text = "(define (domain plus) (:requirements :time :fluents) (:predicates (on)) (:functions (level))
-      (:process rises :parameters () :precondition (on) :effect (increase (level) (* #t 1))))";
+      (:process rises :parameters () :precondition () :effect (increase (level) (* #t 1))))";
     fs::write(&domain, text).expect("written");
     let output = super::command::elbowroom(&[
         "serve",

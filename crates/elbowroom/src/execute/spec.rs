@@ -37,9 +37,9 @@ pub const EMBEDDED: &str = "embedded";
 /// only there where they say something are [so marked](RunSpec::planner_time).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(
+#[expect(
     clippy::struct_excessive_bools,
-    reason = "each is an option of its own"
+    reason = "each is a member of its own in the header of a trace"
 )]
 pub struct RunSpec {
     /// The domain, in PDDL.

@@ -303,18 +303,18 @@ fn goals_and_facts_that_come_in_during_a_search_are_taken_in_at_once() {
 fn where_the_plan_is_lost_nothing_is_started_until_there_is_another_one() {
     let task = task("(free s)", "(and (have book) (have cup) (have key))");
     let planner = Beside::taking(&[seconds(0), seconds(20)]);
-    // Somebody has taken the key, and brings it back.
-    let script = vec![
-        (2, fact(&task, "(here key)", false)),
-        (3, fact(&task, "(here key)", true)),
-    ];
+    // Somebody has taken what nobody fetches yet, whatever that is, and brings it back.
+    let here = |item: &str, truth| fact(&task, &format!("(here {item})"), truth);
+    let gone = ITEMS.map(|item| (2, here(item, false)));
+    let back = ITEMS.map(|item| (3, here(item, true)));
+    let script = gone.into_iter().chain(back).collect();
     let told = lasting(&task, 100, script, &planner);
     assert_has(
         &told,
         &[
             "0: start",
             "2: plan",
-            // There was no plan without the key, which is there again.
+            // There was no plan without it, but it is there again.
             "22: the plan is there",
             "22: plan",
             "42: the plan is there",

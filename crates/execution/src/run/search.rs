@@ -109,10 +109,9 @@ impl Run<'_> {
     pub(super) fn search_from_here(&mut self, reason: &Reason) {
         self.let_go_of_plan();
         self.news.clear();
-        if self.go_without_plan(reason) {
-            return;
+        if !self.go_without_plan(reason) {
+            self.search(reason.clone(), Guess::AQuarterLonger, Course::UnderWay);
         }
-        self.search(reason.clone(), Guess::AQuarterLonger, Course::UnderWay);
     }
 
     /// Another plan is needed, because the goals have changed, and the present one goes on until it
