@@ -4,7 +4,7 @@
 //! planner_coverage run --data FOLDER --planner NAME … -o FILE.csv
 //!                      [--time S] [--memory MB] [--jobs N] [--only TEXT] [--every K] [--first]
 //!                      [--val PROGRAM]
-//! planner_coverage table FILE.csv
+//! planner_coverage table FILE.csv [--first]
 //! ```
 //!
 //! `run` has each planner (`embedded`, those of the registry, `up:ENGINE`, or a command line) plan
@@ -14,7 +14,8 @@
 //! `problem_features` may. Lines that are there already are not run again, so an interrupted run
 //! goes on where it was. `--only` keeps instances whose line in the manifest has the text in it;
 //! `--every` each Kth of a domain; `--first` ends a planner at its first plan; `--val` has VAL's `Validate` judge the
-//! last plan, too. `table` makes Markdown of the file.
+//! last plan, too. `table` makes Markdown of the file, with
+//! `--first` without scores.
 //!
 //! `--time` is processor time, so that a busy machine does not change the results.
 //!

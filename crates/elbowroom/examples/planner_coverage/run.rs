@@ -14,7 +14,7 @@ use elbowroom::flow;
 use elbowroom::model::expression::Expression;
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
-use elbowroom::pddl::{Source, read_problem, write_plan};
+use elbowroom::pddl::{Source, read_problem};
 
 use crate::manifest;
 use crate::row::{self, Row};
@@ -273,8 +273,7 @@ fn run(job: &Job, options: &Options) -> Row {
         row.better = String::from(if metric.maximize { "more" } else { "less" });
     }
     if let (Some(val), Some(found)) = (&options.val, report.outcome.found()) {
-        let plan = write_plan(&task, &found.plan);
-        row.val = val::verdict(val, &job.domain, &job.problem, &plan);
+        row.val = val::verdict(val, &job.domain, &job.problem, &found.plan);
     }
     filled(row, &report)
 }

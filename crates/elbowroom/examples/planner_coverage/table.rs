@@ -6,12 +6,14 @@ use std::path::Path;
 
 use crate::row::{self, Row};
 
-/// `table FILE.csv`
+/// `table FILE.csv [--first]`
 pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
-    let [path] = arguments else {
-        return Err("table FILE.csv".to_owned());
+    let (path, has_scores) = match arguments {
+        [path] => (path, true),
+        [path, option] if option == "--first" => (path, false),
+        _ => return Err("table FILE.csv [--first]".to_owned()),
     };
-    print!("{}", table(&row::read(Path::new(path))?));
+    print!("{}", table(&row::read(Path::new(path))?, has_scores));
     Ok(())
 }
 
@@ -50,18 +52,26 @@ impl<'a> Results<'a> {
     }
 }
 
-fn table(rows: &[Row]) -> String {
+fn table(rows: &[Row], has_scores: bool) -> String {
     let results = Results::of(rows);
     let mut text = String::from("| domain | instances |");
     for planner in &results.planners {
-        let _ = write!(text, " {planner}: solved | first plan | score |");
+        let _ = write!(text, " {planner}: solved | first plan |");
+        if has_scores {
+            text.push_str(" score |");
+        }
     }
     text.push_str("\n|---|--:|");
-    text.push_str(&"--:|--:|--:|".repeat(results.planners.len()));
+    let columns = if has_scores {
+        "--:|--:|--:|"
+    } else {
+        "--:|--:|"
+    };
+    text.push_str(&columns.repeat(results.planners.len()));
     text.push('\n');
     for (domain, instances) in &results.domains {
         let runs: Vec<_> = instances.values().collect();
-        text.push_str(&line(domain, &results.planners, &runs));
+        text.push_str(&line(domain, &results.planners, &runs, has_scores));
     }
     for (title, kind) in [
         ("**with deadlines**", Some("deadlines")),
@@ -76,21 +86,32 @@ fn table(rows: &[Row]) -> String {
             Some(kind) => row.kinds.split(' ').any(|own| own == kind),
         });
         if !runs.is_empty() {
-            text.push_str(&line(title, &results.planners, &runs));
+            text.push_str(&line(title, &results.planners, &runs, has_scores));
         }
     }
     text.push_str(
         "\nSolved: instances with a plan that the judge accepts. First plan: the median of the \
-         seconds to it,\nprocess start included. Score: the sum, over the instances it \
-         solved, of the best value of the metric\n(the makespan, where there is none) that any planner \
-         here found divided by its own, or the other way round\nwhere more is better.\n\n",
+         seconds to it,\nprocess start included.",
     );
+    if has_scores {
+        text.push_str(
+            " Score: the sum, over the instances it solved, of the best value of the metric\n(the \
+             makespan, where there is none) that any planner here found divided by its own, or \
+             the other way round\nwhere more is better.",
+        );
+    }
+    text.push_str("\n\n");
     text.push_str(&outcomes(&results));
     text.push_str(&contradictions(&results));
     text
 }
 
-fn line(title: &str, planners: &[&str], instances: &[&BTreeMap<&str, &Row>]) -> String {
+fn line(
+    title: &str,
+    planners: &[&str],
+    instances: &[&BTreeMap<&str, &Row>],
+    has_scores: bool,
+) -> String {
     let mut text = format!("| {title} | {} |", instances.len());
     for planner in planners {
         let solved: Vec<(&Row, f64)> = instances
@@ -105,9 +126,12 @@ fn line(title: &str, planners: &[&str], instances: &[&BTreeMap<&str, &Row>]) -> 
         firsts.sort_by(f64::total_cmp);
         let median = firsts.get(firsts.len() / 2);
         let median = median.map_or_else(String::new, |seconds| format!("{seconds:.2}"));
-        // The sum of nothing is -0.
-        let scores = solved.iter().fold(0.0, |sum, (_, score)| sum + score);
-        let _ = write!(text, " {} | {median} | {scores:.1} |", solved.len());
+        let _ = write!(text, " {} | {median} |", solved.len());
+        if has_scores {
+            // The sum of nothing is -0.
+            let scores = solved.iter().fold(0.0, |sum, (_, score)| sum + score);
+            let _ = write!(text, " {scores:.1} |");
+        }
     }
     text.push('\n');
     text

@@ -1,6 +1,8 @@
 //! Each feature as a small problem.
 
-use crate::world::{answer, describe, makespan};
+use crate::world::{answer, describe, makespan, task};
+use elbowroom_model::validate::{Settings, validate};
+use elbowroom_pddl::{Source, read_plan};
 use elbowroom_planner::Answer;
 
 const MATCH: &str = "
@@ -26,6 +28,32 @@ fn three_fuses_do_not_fit_under_one_match() {
     let problem = "(:objects a b c - fuse) (:init (unused) (hand))
                    (:goal (and (mended a) (mended b) (mended c)))";
     assert!(matches!(answer(MATCH, problem), Answer::Unsolvable { .. }));
+}
+
+/// The second instance starts later, takes less, and ends with the first: both make false, at one time,
+/// what both need until then. The search does not find it, and must not deny it.
+#[test]
+fn two_instances_that_start_apart_and_end_together_are_not_denied() {
+    let domain = "
+        (:requirements :durative-actions :fluents)
+        (:predicates (power) (coin) (first) (second)) (:functions (left))
+        (:durative-action run :parameters () :duration (= ?duration (left))
+          :condition (over all (power)) :effect (and (at start (coin)) (at end (not (power)))))
+        (:action wait :parameters () :precondition (and) :effect (assign (left) 5))
+        (:action pay-first :parameters () :precondition (coin) :effect (and (not (coin)) (first)))
+        (:action pay-second :parameters () :precondition (and (coin) (first))
+          :effect (and (not (coin)) (second)))";
+    let problem = "(:init (power) (= (left) 10)) (:goal (second))";
+    let task = task(domain, problem);
+    let text = "0: (run) [10]\n1: (pay-first)\n2: (wait)\n5: (run) [5]\n6: (pay-second)";
+    let (plan, _) = read_plan(&Source::new("plan", text), &task).unwrap();
+    assert!(validate(&task, &plan, &Settings::default()).is_valid());
+    let answer = answer(domain, problem);
+    assert!(
+        !matches!(answer, Answer::Unsolvable { .. }),
+        "{}",
+        describe(&answer)
+    );
 }
 
 const DOOR: &str = "

@@ -7,17 +7,14 @@
 //! starts, circles of ends, and numbers or disjunctions that several happenings repair together
 //! have no such order. They are rare; where they are possible, nothing is proved.
 
-use super::{Action, Bound, Change, Conditional, NONE, Snap};
+use super::{Action, Change, Conditional, NONE, Snap};
 use crate::embedded::formula::Literal;
-use elbowroom_model::problem::Comparison;
 
 /// Whether two instances of the action that end together are one and the same but for their
-/// number, and so leave the facts as one of them does.
+/// number, and so leave the facts as one of them does. Where the duration depends on the state, they
+/// can have started one after the other.
 fn is_idempotent(action: &Action) -> bool {
-    let is_equal = |bound: &Bound| bound.comparison == Comparison::Equal && !bound.at_end;
-    let is_fixed = action.duration.most.as_ref() == Some(&action.duration.least)
-        || action.duration.bounds.iter().any(is_equal);
-    action.start != NONE && is_fixed
+    action.start != NONE && action.duration.most.as_ref() == Some(&action.duration.least)
 }
 
 /// Whether an action changes numbers.
