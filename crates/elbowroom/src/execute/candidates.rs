@@ -211,9 +211,17 @@ impl<'a> Candidates<'a> {
         if most == 0 {
             return;
         }
+        // Plans that differ are asked for, not the best one: the states are for searching, not for refining.
+        let mut tuning = self.settings.tuning.clone();
+        let refinement = [
+            embedded::Technique::Rescheduling,
+            embedded::Technique::Repair,
+        ];
+        tuning.without.extend(refinement);
         let settings = embedded::Settings {
             without: variant.without.clone(),
             first_plan_only: false,
+            tuning,
             objective: if variant.is_reliable {
                 embedded::Objective::Metric
             } else {
