@@ -36,6 +36,12 @@ use scarcity::scarcities;
 pub use variant::Pace;
 use variant::{Variant, duration_fixed_by_domain, written};
 
+/// What is left out of searches for plans to choose from.
+const REFINEMENT: [embedded::Technique; 2] = [
+    embedded::Technique::Rescheduling,
+    embedded::Technique::Repair,
+];
+
 /// How many states more than the first plan took a plan of a variant may take.
 const PATIENCE: u64 = 8;
 
@@ -213,11 +219,7 @@ impl<'a> Candidates<'a> {
         }
         // Plans that differ are asked for, not the best one: the states are for searching, not for refining.
         let mut tuning = self.settings.tuning.clone();
-        let refinement = [
-            embedded::Technique::Rescheduling,
-            embedded::Technique::Repair,
-        ];
-        tuning.without.extend(refinement);
+        tuning.without.extend(REFINEMENT);
         let settings = embedded::Settings {
             without: variant.without.clone(),
             first_plan_only: false,
