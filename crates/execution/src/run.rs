@@ -39,7 +39,7 @@
 //! second search in a row the present plan goes on only until that is expected to be over, and during
 //! further ones nothing is started. Each outdated plan counts as a new plan
 //! ([`RunSettings::most_replans`]). Goals that are given during a search wait for its end; one that is
-//! abandoned ends it, at most [three times](search) in a row.
+//! abandoned ends it, at most three times in a row.
 //!
 //! However a run ends, nothing is left running: what has not ended is cancelled, and has
 //! [`FAREWELL`] to stop. Only a world that has failed is told nothing more.

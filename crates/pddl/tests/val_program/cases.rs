@@ -51,10 +51,10 @@ fn compare(
     ) else {
         return (Vec::new(), 0);
     };
-    let changed = changes
+    let shifts = changes
         .iter()
         .filter_map(|(line, is_duration, by)| shifted(plan, *line, *is_duration, by));
-    for plan in std::iter::once(plan.to_owned()).chain(changed) {
+    for plan in std::iter::once(plan.to_owned()).chain(shifts) {
         let theirs = val.says(domain, problem, &plan);
         let (ours, why) = ours(&task, &Source::new("plan", plan.clone()));
         if ours == Said::Nothing && theirs == Said::Invalid {
