@@ -5,12 +5,12 @@
 //! reads, the actions under way, how many timed initials have happened, and bounds on the differences
 //! of times: of now, of the starts of what is under way, and of time 0. The rules for what can happen next
 //! ([`Closure::successors`]) leave out nothing that a valid plan does in the order of time
-//! ([`processes`](super::processes)); they do not ask for ε between happenings, and not for disjunctions and
+//! (`processes`); they do not ask for ε between happenings, and not for disjunctions and
 //! numbers to hold throughout actions. Numbers that depend on durations or on continuous change may be any.
 //!
 //! A listed state stands for more than itself. Its bounds are of all times within them; a number that it
 //! does not list may be any; it has at least as many of the facts that nothing minds, and more are no
-//! hindrance; and objects that can change places without changing the problem ([`alike`]) do so.
+//! hindrance; and objects that can change places without changing the problem (`alike`) do so.
 
 pub(super) mod alike;
 mod reading;

@@ -14,7 +14,7 @@
 //! true together just before, at least ε before if that came about by something else; what it makes true
 //! is so together with what was true before and is not ended by it. So a list of bounds of which each
 //! follows from the list, for each happening that could break it, is kept up by all of them, one after the
-//! other in the order of time ([`processes`](super::processes) says why there is such an order).
+//! other in the order of time (`processes` says why there is such an order).
 //!
 //! Facts that only timed initials make true are no atoms: the windows of happenings see to them. Derived
 //! facts, numbers that change, and disjunctions are taken to be as they are needed.
