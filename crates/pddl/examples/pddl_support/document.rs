@@ -99,7 +99,7 @@ states that a plan goes through.
 - What holds in the end, after the last happening and all timed initials, holds for ever: \
   `hold-during` and `hold-after` may reach beyond the end of the plan.
 - `hold-during t u` and `hold-after t` also ask about the state that holds at `t`, which may have \
-  begun earlier. (VAL looks only at states that begin in the window.)
+  begun earlier. (VAL looks only at the first state that begins in the window: [agreement with VAL](val-agreement.md#beside-val-itself).)
 - Where numbers change continuously, every moment counts, not only those of happenings. Moments \
   are compared exactly; two of them less than a millionth apart, one of them irrational, leave the \
   constraint undecided.
@@ -108,7 +108,7 @@ states that a plan goes through.
   number without a value is violated.
 - A plan that breaks a constraint is invalid, and the judge says since when and why. In \
   mid-execution, what has been so far is not known: the judge says that it cannot tell.
-- The embedded planner finds plans under most of them \
+- The embedded planner finds plans under all forms \
   ([how](planners-embedded.md#constraints-on-the-course)). Networks and envelopes respect those on facts: what changes them keeps its order, and \
   deadlines become bounds. Whatever does not heed constraints refuses them by name: runs and other \
   plans in mid-execution, STN plan files, odds.
