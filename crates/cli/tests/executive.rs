@@ -124,9 +124,9 @@ fn what_is_changed_while_it_runs_is_followed() {
 fn in_a_pause_nothing_is_started() {
     let own = Executive::start(&folder("pause"), &[DOMAIN, PROBLEM, "--realtime", "10"]);
     // It listens a moment before it has a run.
-    own.await_state(|state| state["activity"].is_string());
-    let (status, _) = own.post("/v1/pause", &Value::Null);
-    assert_eq!(status, 200);
+    own.await_state(|state| state["activity"] != "beginning");
+    let (status, answer) = own.post("/v1/pause", &Value::Null);
+    assert_eq!(status, 200, "{answer}");
     let state = own.await_state(|state| state["running"].as_array().is_some_and(Vec::is_empty));
     assert_eq!(state["activity"], "paused");
     let done = state["facts"].clone();

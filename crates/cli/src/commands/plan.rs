@@ -19,6 +19,7 @@ use elbowroom::sim::WorldModel;
 use super::run::spec::contradiction;
 use crate::args::{EMBEDDED, PlanArgs, PlanObjectiveChoice};
 use crate::exit::{Answer, Exit, Failure};
+use crate::look::Look;
 use crate::output::Output;
 use crate::{input, output};
 use watch::Watch;
@@ -167,7 +168,8 @@ fn print(arguments: &PlanArgs, outcome: &PlanOutcome, output: &mut Output) -> An
     } else if let (Some(plan), None) = (&plan, &arguments.output) {
         output::print(plan)?;
     }
-    if let Some(line) = text::certified(&answer.finding).filter(|_| !arguments.json) {
+    let certified = text::certified(&answer.finding, Look::of_stdout());
+    if let Some(line) = certified.filter(|_| !arguments.json) {
         output::tell(&line);
     }
     if let Some(summary) = text::summary(answer).filter(|_| !arguments.json) {

@@ -67,6 +67,9 @@ impl<'a> Ahead<'a> {
         envelope: DecoupledEnvelope,
     ) -> Self {
         Self {
+            // Where little is in the way, a check for each power of two would be most of the work; where
+            // much is, what a long leap comes up against has to be found out anyway.
+            length: oracle.plan().parameters.len().max(1),
             plan: Arc::clone(oracle.plan()),
             oracle,
             settings,
@@ -75,7 +78,6 @@ impl<'a> Ahead<'a> {
             known: Known::default(),
             checks: 1,
             undecided: 0,
-            length: 1,
         }
     }
 

@@ -9,9 +9,10 @@ use elbowroom::verify::no_plan::Kind;
 
 use crate::args::EMBEDDED;
 use crate::exit::Failure;
-use crate::look::{FAINT, HINT, styled};
+use crate::look::{FAINT, HINT, Look, styled};
 use crate::number;
 use crate::words::counted;
+use crate::wrap::wrapped;
 
 /// The plan as text, with a last line, a comment, that says what it is worth where that is not
 /// simply when it ends.
@@ -61,7 +62,7 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
 }
 
 /// Whether there is a certificate that no plan exists, and of which kind, or why there is none.
-pub(super) fn certified(finding: &PlanFinding) -> Option<String> {
+pub(super) fn certified(finding: &PlanFinding, look: Look) -> Option<String> {
     let PlanFinding::NoPlan {
         certificate,
         uncertified,
@@ -82,7 +83,7 @@ pub(super) fn certified(finding: &PlanFinding) -> Option<String> {
         (None, Some(why)) => format!("not certified: {why}"),
         (None, None) => return None,
     };
-    Some(styled(FAINT, &line))
+    Some(styled(FAINT, &wrapped(&line, look.width, 0)))
 }
 
 /// What a plan is worth by its objective, beside the shortest one.
