@@ -8,7 +8,9 @@
 //! - `removal` and `repair`: actions are taken out, and a search among what is left of the plan puts
 //!   others in.
 //!
-//! A plan is kept if it is no worse than the one before. The judge sees each that is better.
+//! A plan is kept if it is no worse than the one before. Now and then one is kept that is a little
+//! worse than the best one (record-to-record travel; Dueck, Journal of Computational Physics 104,
+//! 1993), which is gone back to after a while. The judge sees each that is better than all before.
 
 mod incumbent;
 mod random;
@@ -46,6 +48,9 @@ pub(crate) struct Ticker<'a> {
     pub(crate) is_stopped: bool,
 }
 
+/// One turn in so many goes on from a plan that is a little worse than the best one.
+const LENIENT_ONCE_IN: usize = 4;
+
 /// What a step counts for, beside what an operator of an estimate does.
 const STEP_WORK: u64 = 200;
 
@@ -77,16 +82,34 @@ pub(crate) struct Refiner<'a> {
     relaxed: Relaxed<'a>,
     random: Random,
     compresses: Option<Compressibility>,
+    /// The plan that is changed; for a while it may be a little worse than the best one.
     incumbent: Option<Incumbent>,
+    /// The best plan's worth and items.
+    best: Option<(Worth, Vec<Item>)>,
+    /// How many turns have passed since it was found, or gone back to.
+    idle: u64,
+    /// How many turns have passed since it was found.
+    fruitless: u64,
     /// The costs of the actions, in whole numbers.
     base_costs: Vec<u32>,
     /// Their durations, the mean being four.
     durations: Vec<u32>,
+    /// What other orders have taken so far, and what repairs have.
+    work: Spent,
+}
+
+/// Work, by what it was spent on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spent {
+    rescheduling: u64,
+    repair: u64,
 }
 
 impl<'a> Refiner<'a> {
     pub(crate) fn new(compiled: &'a Compiled, compresses: Option<Compressibility>) -> Self {
         let mut relaxed = Relaxed::new(compiled, compresses);
+        relaxed.stops_early = true;
+        relaxed.lists_actions = true;
         if let Some(metric) = &compiled.metric {
             relaxed.weigh(&StepCosts::of(compiled, metric));
         }
@@ -103,6 +126,7 @@ impl<'a> Refiner<'a> {
         )]
         let durations = numbers().map(|action| (4.0 * least(action) / mean).min(32.0) as u32);
         Self {
+            work: Spent::default(),
             durations: durations.collect(),
             compiled,
             stepper: Stepper::new(compiled),
@@ -110,6 +134,9 @@ impl<'a> Refiner<'a> {
             random: Random::new(1),
             compresses,
             incumbent: None,
+            best: None,
+            idle: 0,
+            fruitless: 0,
             base_costs,
         }
     }
@@ -127,65 +154,104 @@ impl<'a> Refiner<'a> {
         let Some(incumbent) = Incumbent::of(self.compiled, &items) else {
             return;
         };
-        let is_better = self
-            .incumbent
-            .as_ref()
-            .is_none_or(|own| incumbent.worth < own.worth);
-        if is_better {
+        let best = self.best.as_ref();
+        if best.is_none_or(|(worth, _)| incumbent.worth < *worth) {
             self.incumbent = Some(incumbent);
             self.leave_out_needless(ticker);
+            self.keep_best();
         }
     }
 
     /// The judge does not accept the plan: goes on from another one.
     pub(crate) fn forget(&mut self) {
         self.incumbent = None;
+        self.best = None;
     }
 
-    /// Tries one change; the choices of a plan that is better, if that is one.
+    /// Notes that the plan is the best one.
+    fn keep_best(&mut self) {
+        let own = self.incumbent.as_ref();
+        self.best = own.map(|own| (own.worth.clone(), own.items.clone()));
+        (self.idle, self.fruitless) = (0, 0);
+    }
+
+    /// How long it should take for each unit of time of another search.
+    pub(crate) fn share(&self) -> u64 {
+        let tuning = &self.compiled.tuning;
+        if self.fruitless < tuning.refining_patience {
+            tuning.refining_share
+        } else {
+            tuning.refining_share_later
+        }
+    }
+
+    /// Tries one change; the choices of a plan that is better than all before, if that is one.
     pub(crate) fn turn(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Step>> {
-        let incumbent = self.incumbent.as_ref()?;
-        let before = incumbent.worth.clone();
+        let tuning = &self.compiled.tuning;
+        let (best, items) = self.best.as_ref()?;
+        let mut bound = self.incumbent.as_ref()?.worth.clone();
+        self.idle += 1;
+        self.fruitless += 1;
+        if self.idle > tuning.return_after {
+            self.idle = 0;
+            if bound > *best {
+                self.incumbent = Incumbent::of(self.compiled, items);
+                bound = best.clone();
+            }
+        }
+        if tuning.uses(Technique::Leniency) && self.random.once_in(LENIENT_ONCE_IN) {
+            bound = bound.max(best.worse_by(tuning.leniency, self.compiled.now));
+        }
+        let before = (best.metric.clone(), best.end);
+        let done_before = ticker.work;
         let reschedules = self.is_turn_to_reschedule();
         let items = if reschedules {
-            self.reschedule(ticker)
+            self.reschedule(&bound, ticker)
         } else {
-            self.repair(ticker)
+            self.repair(&bound, ticker)
         };
+        let spent = if reschedules {
+            &mut self.work.rescheduling
+        } else {
+            &mut self.work.repair
+        };
+        *spent += ticker.work - done_before;
         if !ticker.ask() {
             return None;
         }
         let items = items?;
         ticker.work += 4 * STEP_WORK * items.len() as u64;
         let candidate = Incumbent::of(self.compiled, &items)?;
-        if candidate.worth > before {
+        if candidate.worth > bound {
             return None;
         }
-        let is_better =
-            (&candidate.worth.metric, candidate.worth.end) < (&before.metric, before.end);
+        let is_better = (&candidate.worth.metric, candidate.worth.end) < (&before.0, before.1);
         self.incumbent = Some(candidate);
         if !is_better {
             return None;
         }
         self.leave_out_needless(ticker);
+        self.keep_best();
         self.incumbent.as_ref().map(|own| own.steps.clone())
     }
 
-    /// Whether other orders are tried next; they seldom change what the same actions cost.
-    fn is_turn_to_reschedule(&mut self) -> bool {
+    /// Whether other orders are tried next. They take much less time than repairs, and seldom
+    /// change what the same actions cost.
+    fn is_turn_to_reschedule(&self) -> bool {
         let tuning = &self.compiled.tuning;
         if !tuning.uses(Technique::Repair) {
             return true;
         }
         let is_timed = |metric: &Metric| !metric.time.is_zero();
         let matters = self.compiled.metric.as_ref().is_none_or(is_timed);
-        let is_its_turn = self.random.once_in(if matters { 2 } else { 16 });
-        is_its_turn && tuning.uses(Technique::Rescheduling)
+        let share = tuning.repair_share * if matters { 1 } else { 4 };
+        tuning.uses(Technique::Rescheduling)
+            && self.work.rescheduling.saturating_mul(share) <= self.work.repair
     }
 
-    fn reschedule(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
+    fn reschedule(&mut self, bound: &Worth, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
         let incumbent = self.incumbent.as_ref()?;
-        self.stepper.horizon = incumbent.worth.end;
+        self.stepper.horizon = bound.end.max(incumbent.worth.end);
         let mut schedule = Schedule {
             compiled: self.compiled,
             stepper: &mut self.stepper,
@@ -195,7 +261,7 @@ impl<'a> Refiner<'a> {
         schedule.next(ticker)
     }
 
-    fn repair(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
+    fn repair(&mut self, bound: &Worth, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
         let Self {
             compiled,
             stepper,
@@ -227,8 +293,7 @@ impl<'a> Refiner<'a> {
             .collect();
         relaxed.set_costs((0..).zip(costs.iter().copied()));
         let may_equal = random.once_in(2);
-        let worth = &incumbent.worth;
-        let latest_end = |state: &State| latest_end(compiled, worth, may_equal, state);
+        let latest_end = |state: &State| latest_end(compiled, bound, may_equal, state);
         let next_block = incumbent
             .blocks
             .keys()

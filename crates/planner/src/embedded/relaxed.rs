@@ -52,6 +52,8 @@ pub(crate) struct Estimate {
     pub(crate) preferred: Vec<Step>,
     /// The literals that the relaxed plan brings about, if they were asked for.
     pub(crate) subgoals: Vec<Literal>,
+    /// The actions that start in the relaxed plan, if they were asked for.
+    pub(crate) actions: Vec<u32>,
 }
 
 /// Something that is out of reach.
@@ -90,6 +92,11 @@ pub(crate) struct Relaxed<'a> {
     pub(crate) is_chronological: bool,
     /// Whether an estimate lists what its relaxed plan brings about.
     pub(crate) lists_subgoals: bool,
+    /// Whether an estimate stops where the goal is reached: what costs more remains unknown, and
+    /// not all applicable steps are listed.
+    pub(crate) stops_early: bool,
+    /// Whether an estimate lists the actions of its relaxed plan.
+    pub(crate) lists_actions: bool,
 }
 
 impl<'a> Relaxed<'a> {
@@ -116,6 +123,8 @@ impl<'a> Relaxed<'a> {
             horizon: NEVER,
             is_chronological: false,
             lists_subgoals: false,
+            stops_early: false,
+            lists_actions: false,
             graph,
         }
     }
@@ -346,13 +355,33 @@ impl<'a> Relaxed<'a> {
     fn spread(&mut self, state: &State) {
         self.fire_sources(state);
         let mut cost = 0;
+        let mut goals_met = 0;
         while cost < self.buckets.len() {
             let Some(proposition) = self.buckets[cost].pop() else {
+                if self.stops_early && self.is_goal_within(state, cost, &mut goals_met) {
+                    self.buckets.iter_mut().for_each(Vec::clear);
+                    return;
+                }
                 cost += 1;
                 continue;
             };
             self.reach(proposition, cost);
         }
+    }
+
+    /// Whether all of the goal costs no more than this, each part by itself, and all that is under
+    /// way can end at no higher cost. Of the goal, the first `met` parts do.
+    fn is_goal_within(&self, state: &State, cost: usize, met: &mut usize) -> bool {
+        while let Some(&goal) = self.graph.goal.get(*met) {
+            if self.cost[goal as usize] as usize > cost {
+                return false;
+            }
+            *met += 1;
+        }
+        state.open.iter().all(|open| {
+            let end = self.graph.end_of[open.action as usize];
+            self.missing[end as usize] == 0
+        })
     }
 
     /// The same for what holds and what follows from it by rules.

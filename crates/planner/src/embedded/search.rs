@@ -306,9 +306,18 @@ impl<'a> Search<'a> {
         let queue = usize::from(!is_preferred_turn);
         self.turns[queue] += 1;
         match queue {
+            0 if self.is_on_plateau() => self.preferred.pop_alternately(),
             0 => self.preferred.pop(),
             _ => self.all.pop().or_else(|| self.preferred.pop()),
         }
+    }
+
+    /// Whether no better estimate was found for a while, in a search where only that decides.
+    fn is_on_plateau(&self) -> bool {
+        let tuning = &self.compiled.tuning;
+        self.strategy.alternates()
+            && tuning.uses(Technique::Alternation)
+            && self.idle >= tuning.alternation_after
     }
 
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {

@@ -285,7 +285,7 @@ fn preferences_that_pay_are_kept() {
         &elbowroom_planner::Settings::default(),
         &mut |progress| {
             values.extend(progress.plan.as_ref().map(|found| found.value.clone()));
-            if progress.counts.evaluated > 30_000 {
+            if progress.counts.evaluated > 60_000 {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())

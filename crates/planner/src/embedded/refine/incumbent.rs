@@ -21,6 +21,20 @@ pub(super) struct Worth {
     pub(super) ends: Ticks,
 }
 
+impl Worth {
+    /// What is worse by one part in so many, in its metric and in its end, where time is counted
+    /// from `now`.
+    pub(super) fn worse_by(&self, parts: u32, now: Ticks) -> Self {
+        let parts = i64::from(parts.max(1));
+        let part = self.metric.abs() / Rational::from(parts);
+        Self {
+            metric: &self.metric + part,
+            end: self.end + (self.end - now) / parts,
+            ends: Ticks::MAX,
+        }
+    }
+}
+
 /// See the module.
 #[derive(Debug)]
 pub(super) struct Incumbent {

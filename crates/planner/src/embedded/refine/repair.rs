@@ -3,19 +3,27 @@
 //! A node is a state and how much of the rest of the plan has been carried out. What follows is the
 //! next of the rest, or a step of a relaxed plan in which what is left costs nothing; what has
 //! become impossible, or is no longer wanted, can be passed over.
+//!
+//! To estimate a state takes much longer than to make it. So the actions of a relaxed plan are put in
+//! one after the other as soon as each is possible, while the rest goes on as it was; only where
+//! something was passed over, or nothing goes on, is there another estimate.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 use super::super::apply::{Step, Stepper};
 use super::super::compile::{Compiled, Compressibility, NONE};
 use super::super::hash::Map;
-use super::super::relaxed::{Estimate, Relaxed};
+use super::super::relaxed::Relaxed;
 use super::super::search::is_goal;
 use super::super::state::State;
 use super::super::time::Ticks;
 use super::Ticker;
 use super::random::Random;
 use super::sequence::{Item, Kind, Scene};
+
+/// How many nodes are looked at for each state that may be estimated.
+const NODES_PER_STATE: u64 = 8;
 
 /// A search for a repair.
 pub(super) struct Repair<'a, 'b> {
@@ -43,6 +51,26 @@ struct Node {
     parent: usize,
     /// The item that led here, unless one was passed over.
     item: Option<Item>,
+    /// What is still to be put in, as far as that is known from the nodes before.
+    intent: Option<Intent>,
+}
+
+/// What a relaxed plan puts in, without what is left of the plan.
+#[derive(Clone)]
+struct Intent {
+    needs: u32,
+    actions: Rc<[u32]>,
+}
+
+impl Intent {
+    /// What remains of it after one of its actions.
+    fn without(&self, action: u32, cost: u32) -> Self {
+        let others = self.actions.iter().copied();
+        Self {
+            needs: self.needs.saturating_sub(cost),
+            actions: others.filter(|&other| other != action).collect(),
+        }
+    }
 }
 
 /// What a search knows.
@@ -68,6 +96,13 @@ impl Tree {
             times.push(end);
         }
         is_new
+    }
+
+    /// The items that lead to a node, and those that follow.
+    fn plan_to(&self, number: usize, tail: Vec<Item>) -> Vec<Item> {
+        let mut items = self.items_to(number);
+        items.extend(tail);
+        items
     }
 
     /// The items that lead to a node.
@@ -96,81 +131,112 @@ impl Repair<'_, '_> {
             place: 0,
             parent: usize::MAX,
             item: None,
+            intent: None,
         };
         tree.queue.insert((0, 0), root);
-        let mut evaluated = 0;
+        let (mut evaluated, mut seen) = (0, 0);
         while evaluated < self.most_states
-            && let Some((_, node)) = tree.queue.pop_first()
+            && seen < NODES_PER_STATE * self.most_states
+            && let Some((_, mut node)) = tree.queue.pop_first()
         {
             let latest = (self.latest_end)(&node.scene.state);
             let is_in_time = latest.is_some_and(|l| node.scene.state.earliest_end() <= l);
             let Some(latest) = latest.filter(|_| is_in_time && tree.is_new(&node)) else {
                 continue;
             };
-            self.move_to(node.place, &mut tree.standing, &mut tree.left);
-            self.relaxed.horizon = latest;
             self.stepper.horizon = latest;
+            seen += 1;
+            ticker.stepped();
+            let number = tree.nodes.len();
+            if let Some(intent) = node.intent.clone() {
+                if intent.actions.is_empty() {
+                    if let Some(tail) = self.follow(&node, ticker) {
+                        tree.nodes.push(node);
+                        return Some(tree.plan_to(number, tail));
+                    }
+                } else {
+                    self.put_in(&node, &intent, &[], &mut tree);
+                    if self.go_on(&node, &intent, &mut tree) {
+                        tree.nodes.push(node);
+                        continue;
+                    }
+                }
+            }
             evaluated += 1;
             if !ticker.evaluated() {
                 return None;
             }
+            self.move_to(node.place, &mut tree);
+            self.relaxed.horizon = latest;
             let Some(estimate) = self.relaxed.evaluate(&node.scene.state) else {
                 continue;
             };
-            if estimate.steps == 0
-                && let Some(tail) = self.follow(&node, ticker)
-            {
+            let is_done = estimate.steps == 0;
+            let actions = estimate.actions.iter().copied();
+            let intent = Intent {
+                needs: estimate.steps,
+                actions: actions
+                    .filter(|action| !tree.left.contains_key(action))
+                    .collect(),
+            };
+            node.intent = Some(intent.clone());
+            if is_done && let Some(tail) = self.follow(&node, ticker) {
                 tree.nodes.push(node);
-                let mut items = tree.items_to(tree.nodes.len() - 1);
-                items.extend(tail);
-                return Some(items);
+                return Some(tree.plan_to(number, tail));
             }
-            self.put_in(&node, &estimate, &mut tree);
-            self.go_on(&node, estimate.steps, &mut tree);
+            self.put_in(&node, &intent, &estimate.preferred, &mut tree);
+            self.go_on(&node, &intent, &mut tree);
             tree.nodes.push(node);
         }
         None
     }
 
     /// Lets what may be put in after the node wait for its turn: it is estimated to save what it
-    /// costs. Of the same estimate, most of it comes before what is left.
-    fn put_in(&mut self, node: &Node, estimate: &Estimate, tree: &mut Tree) {
-        let rest = &self.rest[node.place..];
-        for &step in &estimate.preferred {
-            let (is_left, cost) = match step {
+    /// costs.
+    fn put_in(&mut self, node: &Node, intent: &Intent, preferred: &[Step], tree: &mut Tree) {
+        let starts = intent.actions.iter().map(|&action| Step::Start(action));
+        let ends = preferred
+            .iter()
+            .copied()
+            .filter(|step| matches!(step, Step::End(_)));
+        for step in starts.chain(ends) {
+            let next = match step {
                 Step::Start(action) | Step::Compressed(action) => {
-                    let is_left = tree.left.contains_key(&action);
-                    (is_left, self.costs[action as usize])
+                    intent.without(action, self.costs[action as usize])
                 }
                 Step::End(at) => {
                     let block = node.scene.open.get(at as usize);
-                    let is_due = |item: &Item| Some(&item.block) == block;
-                    (rest.iter().any(is_due), 1)
+                    let mut rest = self.rest[node.place..].iter();
+                    if rest.any(|item| Some(&item.block) == block) {
+                        continue;
+                    }
+                    intent.clone()
                 }
-                Step::Timed => (true, 0),
+                Step::Timed => continue,
             };
-            if is_left {
-                continue;
-            }
             if let Some((item, scene)) = self.make(&node.scene, step) {
                 let order = u64::from(self.random.once_in(4));
+                let key = self.key(next.needs, order);
                 let next = Node {
                     scene,
                     place: node.place,
                     parent: tree.nodes.len(),
+                    // What has started must end; an estimate says when.
+                    intent: (item.kind == Kind::Whole).then_some(next),
                     item: Some(item),
                 };
-                let key = self.key(estimate.steps.saturating_sub(cost), order);
                 tree.queue.insert(key, next);
             }
         }
     }
 
-    /// Lets the next of what is left wait for its turn, and what comes of passing it over.
-    fn go_on(&mut self, node: &Node, needs: u32, tree: &mut Tree) {
+    /// Lets the next of what is left wait for its turn, and what comes of passing it over. Whether
+    /// the next is possible.
+    fn go_on(&mut self, node: &Node, intent: &Intent, tree: &mut Tree) -> bool {
         let Some(&next) = self.rest.get(node.place) else {
-            return;
+            return false;
         };
+        let needs = intent.needs;
         let after = node.scene.after(self.stepper, next);
         let is_possible = after.is_some();
         if let Some(scene) = after {
@@ -180,16 +246,18 @@ impl Repair<'_, '_> {
                 place: node.place + 1,
                 parent: tree.nodes.len(),
                 item: Some(next),
+                intent: Some(intent.clone()),
             };
             tree.queue.insert(key, next);
         }
+        let is_end = next.kind == Kind::End;
         let is_due = match next.kind {
             Kind::Timed => true,
             Kind::End => node.scene.open.contains(&next.block),
             Kind::Start | Kind::Whole => false,
         };
         if is_due {
-            return;
+            return is_possible;
         }
         let cost = match next.kind {
             Kind::End => 0,
@@ -202,8 +270,11 @@ impl Repair<'_, '_> {
             place: node.place + 1,
             parent: tree.nodes.len(),
             item: None,
+            // The end of what has been passed over is nothing new.
+            intent: is_end.then(|| intent.clone()),
         };
         tree.queue.insert(key, next);
+        is_possible || is_end
     }
 
     /// A place in the queue: by estimate, then by order, then by chance.
@@ -212,7 +283,8 @@ impl Repair<'_, '_> {
     }
 
     /// Lets the estimates stand at a place of the rest: what is behind it costs what it costs.
-    fn move_to(&mut self, place: usize, standing: &mut usize, left: &mut BTreeMap<u32, u32>) {
+    fn move_to(&mut self, place: usize, tree: &mut Tree) {
+        let Tree { standing, left, .. } = tree;
         while *standing < place {
             let item = self.rest[*standing];
             *standing += 1;

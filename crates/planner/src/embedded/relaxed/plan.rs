@@ -37,6 +37,11 @@ impl Relaxed<'_> {
             let own = self.own_cost[operator as usize];
             estimate.steps += own;
             self.is_used[operator as usize] = false;
+            if self.lists_actions
+                && let Kind::Start(action) | Kind::Compressed(action) = data.kind
+            {
+                estimate.actions.push(action);
+            }
             let is_next = self.operator_cost[operator as usize] == own;
             if is_next || matches!(data.kind, Kind::Timed(_)) {
                 push_steps(data.kind, state, &mut estimate.preferred);
@@ -52,6 +57,8 @@ impl Relaxed<'_> {
         }
         estimate.preferred.sort_unstable();
         estimate.preferred.dedup();
+        estimate.actions.sort_unstable();
+        estimate.actions.dedup();
     }
 
     /// Collects the operators of the relaxed plan for what is wanted.

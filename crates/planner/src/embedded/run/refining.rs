@@ -36,7 +36,7 @@ impl<'a> Planner<'a> {
             Refiner::new(compiled, compresses)
         });
         let most = states
-            .saturating_mul(compiled.tuning.refining_share)
+            .saturating_mul(refiner.share())
             .saturating_mul(1 + refiner.weight());
         let mut work = 0;
         while work < most {

@@ -8,6 +8,7 @@ use super::super::apply::Step;
 #[derive(Debug, Default)]
 pub(super) struct Queue {
     buckets: BTreeMap<i64, VecDeque<(u32, Step)>>,
+    is_turn_of_newest: bool,
 }
 
 impl Queue {
@@ -23,8 +24,25 @@ impl Queue {
     }
 
     pub(super) fn pop(&mut self) -> Option<(u32, Step)> {
+        self.pop_from(false)
+    }
+
+    /// The same, but of the first rank the newest and the oldest take turns.
+    ///
+    /// The oldest first, a search looks at all of a plateau before it goes on from any of its
+    /// states; the newest first, it goes straight on, and plans are long.
+    pub(super) fn pop_alternately(&mut self) -> Option<(u32, Step)> {
+        self.is_turn_of_newest = !self.is_turn_of_newest;
+        self.pop_from(self.is_turn_of_newest)
+    }
+
+    fn pop_from(&mut self, newest: bool) -> Option<(u32, Step)> {
         let mut first = self.buckets.first_entry()?;
-        let entry = first.get_mut().pop_front();
+        let entry = if newest {
+            first.get_mut().pop_back()
+        } else {
+            first.get_mut().pop_front()
+        };
         if first.get().is_empty() {
             first.remove();
         }

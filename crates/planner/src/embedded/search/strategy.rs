@@ -111,6 +111,12 @@ impl Strategy {
         }
     }
 
+    /// Whether the newest and the oldest preferred successors take turns on a plateau: where actions are
+    /// compressed and only the estimate decides. A search for what is new leaves plateaus by itself.
+    pub(crate) fn alternates(&self) -> bool {
+        self.compresses.is_some() && self.novelty.is_none() && self.aim == Aim::Goal
+    }
+
     /// Whether it loses nothing but what
     /// [`Search::is_incomplete`](super::Search::is_incomplete) tells.
     pub(crate) fn is_complete(&self) -> bool {
