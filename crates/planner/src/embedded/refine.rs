@@ -108,8 +108,7 @@ struct Spent {
 impl<'a> Refiner<'a> {
     pub(crate) fn new(compiled: &'a Compiled, compresses: Option<Compressibility>) -> Self {
         let mut relaxed = Relaxed::new(compiled, compresses);
-        relaxed.stops_early = true;
-        relaxed.lists_actions = true;
+        relaxed.serves_repairs = true;
         if let Some(metric) = &compiled.metric {
             relaxed.weigh(&StepCosts::of(compiled, metric));
         }

@@ -92,11 +92,9 @@ pub(crate) struct Relaxed<'a> {
     pub(crate) is_chronological: bool,
     /// Whether an estimate lists what its relaxed plan brings about.
     pub(crate) lists_subgoals: bool,
-    /// Whether an estimate stops where the goal is reached: what costs more remains unknown, and
-    /// not all applicable steps are listed.
-    pub(crate) stops_early: bool,
-    /// Whether an estimate lists the actions of its relaxed plan.
-    pub(crate) lists_actions: bool,
+    /// Whether it serves repairs: an estimate stops where all of the goal is reached, so that not all
+    /// applicable steps are listed, and lists the actions of its relaxed plan.
+    pub(crate) serves_repairs: bool,
 }
 
 impl<'a> Relaxed<'a> {
@@ -123,8 +121,7 @@ impl<'a> Relaxed<'a> {
             horizon: NEVER,
             is_chronological: false,
             lists_subgoals: false,
-            stops_early: false,
-            lists_actions: false,
+            serves_repairs: false,
             graph,
         }
     }
@@ -358,7 +355,7 @@ impl<'a> Relaxed<'a> {
         let mut goals_met = 0;
         while cost < self.buckets.len() {
             let Some(proposition) = self.buckets[cost].pop() else {
-                if self.stops_early && self.is_goal_within(state, cost, &mut goals_met) {
+                if self.serves_repairs && self.is_goal_within(state, cost, &mut goals_met) {
                     self.buckets.iter_mut().for_each(Vec::clear);
                     return;
                 }

@@ -96,8 +96,11 @@ impl Planner<'_> {
         } else {
             tuning.first_round
         };
-        let most = tuning.first_round_work / (1 + searches[0].size());
-        budget = budget.min(most.max(tuning.root_check_after));
+        // Where there are reservoirs, the first search fills them up, and has by far the best chance.
+        if !self.has_reservoirs {
+            let most = tuning.first_round_work / (1 + searches[0].size());
+            budget = budget.min(most.max(tuning.root_check_after));
+        }
         while stopped.is_none() && !self.is_first_plan_enough() {
             let was_refining = self.is_refining();
             for (number, is_over) in is_over.iter_mut().enumerate() {

@@ -37,7 +37,7 @@ impl Relaxed<'_> {
             let own = self.own_cost[operator as usize];
             estimate.steps += own;
             self.is_used[operator as usize] = false;
-            if self.lists_actions
+            if self.serves_repairs
                 && let Kind::Start(action) | Kind::Compressed(action) = data.kind
             {
                 estimate.actions.push(action);
