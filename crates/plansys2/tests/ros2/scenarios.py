@@ -130,7 +130,8 @@ def end(*processes):
     for it in processes:
         if it is not None:
             try:
-                it.wait(timeout=PATIENCE)
+                # Now and then, rclpy sleeps on after the signal.
+                it.wait(timeout=30)
             except subprocess.TimeoutExpired:
                 it.kill()
 
