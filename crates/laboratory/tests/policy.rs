@@ -154,11 +154,17 @@ struct Small<'a> {
     ends: Rational,
 }
 
-/// What `policy` makes of a world: its table's lower bound, and the runs.
+/// What `policy` makes of a world: its table's bounds, and the runs.
 struct Made {
     lower: f64,
+    upper: f64,
     reports: Vec<Report>,
+    /// Those of executors that do not weigh moves, in the same worlds.
+    others: Vec<Vec<Report>>,
 }
+
+/// Executors that do not go by likelihood.
+const BASELINES: [&str; 5] = ["esterel", "stn", "guarded", "live", "fixed:100"];
 
 /// `None` if there is no plan: whoever has none does not begin.
 fn made_of(small: &Small<'_>, runs: u64) -> Option<Made> {
@@ -183,31 +189,39 @@ fn made_of(small: &Small<'_>, runs: u64) -> Option<Made> {
     };
     let policy = Policy::new(&task, &model, &settings, &|| true);
     let policy = policy.expect("all of it is known to the process")?;
-    let lower = policy.optimum().lower;
+    let (lower, upper) = (policy.optimum().lower, policy.optimum().upper);
     let outlook: Arc<dyn Outlook> = Arc::new(policy);
-    let reports = (0..runs).map(|seed| {
-        let execution = Execution::of(&task)
-            .by("policy".parse().expect("it is registered"))
-            .beginning_with(plan.clone())
-            .with_outlook(Some(Arc::clone(&outlook)));
-        execution.run_in(&mut *model.world(&task, seed))
-    });
+    let runs_of = |executor: &str| -> Vec<Report> {
+        let runs = (0..runs).map(|seed| {
+            let execution = Execution::of(&task)
+                .by(executor.parse().expect("it is registered"))
+                .beginning_with(plan.clone())
+                .with_outlook(Some(Arc::clone(&outlook)));
+            execution.run_in(&mut *model.world(&task, seed))
+        });
+        runs.collect()
+    };
     Some(Made {
         lower,
-        reports: reports.collect(),
+        upper,
+        reports: runs_of("policy"),
+        others: BASELINES.map(runs_of).into(),
     })
 }
 
 /// Run in the world that it knows, it succeeds as often as its table and the plain recursion say,
 /// but for the dice: in worlds in which one can be sure, in those that are left to chance, in
 /// those in which facts change at rates, and in those in which failures leave something behind and
-/// take time.
+/// take time. It is between the bounds of its table, and no executor that does not weigh moves is better in the same
+/// worlds, but for the dice and the two points.
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few runs")]
 fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
     const RUNS: u64 = 200;
     const OF_EACH_KIND: usize = 10;
     let mut tried = [0; 4];
+    // Of all worlds, by baseline: runs that only it wins, and that only `policy` wins.
+    let mut pairs = [(0.0_f64, 0.0_f64); BASELINES.len()];
     for number in 0..800 {
         let mut rng = ChaCha8Rng::seed_from_u64(number);
         let asks_for_less = number % 2 == 0;
@@ -231,9 +245,15 @@ fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
             plan: None,
             ends: Rational::from(i64::from(twin::ENDS)),
         };
-        let Some(Made { lower, reports }) = made_of(&small, RUNS) else {
+        let Some(made) = made_of(&small, RUNS) else {
             continue;
         };
+        let Made {
+            lower,
+            upper,
+            reports,
+            others,
+        } = made;
         // What happens one after another is ε apart, so that the last second's end is a little
         // late.
         let ends = &small.ends + Rational::new(1, 10);
@@ -247,9 +267,37 @@ fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
             share >= at_least - doubt(at_least, RUNS) && share <= best + doubt(best, RUNS),
             "{number}: {share} is not between {worst} and {best}, table {lower}\n{world:#?}\n{lost:#?}"
         );
+        assert!(
+            share <= upper + doubt(upper, RUNS),
+            "{number}: {share} is more than {upper}, which nobody exceeds"
+        );
+        for (place, others) in others.iter().enumerate() {
+            let both = reports.iter().zip(others);
+            let only = |wins: bool| {
+                let runs = both.clone();
+                let runs =
+                    runs.filter(|(own, other)| is_won(own) != is_won(other) && is_won(own) == wins);
+                runs.count() as f64
+            };
+            let (lost, won) = (only(false), only(true));
+            assert!(
+                lost - won <= 3.0 * (lost + won).sqrt() + 0.02 * RUNS as f64,
+                "{number}: {} is better: {lost} against {won}\n{world:#?}",
+                BASELINES[place]
+            );
+            pairs[place].0 += lost;
+            pairs[place].1 += won;
+        }
         tried[kind] += 1;
     }
     assert_eq!(tried, [OF_EACH_KIND; 4], "too few worlds have a plan");
+    for (name, (lost, won)) in BASELINES.iter().zip(pairs) {
+        println!("only {name} {lost}, only policy {won}");
+        assert!(
+            won - lost > 3.0 * (lost + won).sqrt(),
+            "{name}: {lost} against {won}: weighing moves should gain something"
+        );
+    }
 }
 
 /// A door closes once in ten seconds and opens again within five on average. Whoever fails at it
