@@ -40,9 +40,6 @@ fn in_the_tightest_problem_of_table_1_hardly_anything_need_be_lost() {
     assert_eq!(columns.len(), 5);
     for optimum in columns {
         assert!(optimum.unknown.is_none(), "{optimum:?}");
-        assert!(
-            optimum.lower >= 0.99 && optimum.upper <= 1.0,
-            "{optimum:?}"
-        );
+        assert!(optimum.lower >= 0.99 && optimum.upper <= 1.0, "{optimum:?}");
     }
 }
