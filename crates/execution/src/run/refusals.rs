@@ -3,7 +3,7 @@
 //! The same situation leads to the same plan, and that to the same refusal. When nothing else has
 //! happened in between, only time can help: the plan after the second refusal of an action in a row is
 //! asked for a tenth of a second later, and after each further one twice as much later. So a world that
-//! refuses something for a moment costs a few plans, and [`RunSettings::most_replans`] are not used up
+//! refuses something for a moment costs a few plans, and the number of new plans that may be made is not used up
 //! before anybody could have done anything about it.
 
 use std::collections::BTreeMap;
