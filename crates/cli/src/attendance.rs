@@ -7,7 +7,7 @@ mod world;
 
 use std::sync::Arc;
 
-use elbowroom::execution::run::Rested;
+use elbowroom::execution::run::Stand;
 use elbowroom::execution::{Entry, Recorder};
 use elbowroom::executive::Status;
 use elbowroom::model::Task;
@@ -41,10 +41,10 @@ impl Attendance {
         Self(Some(Attendants { desk, asked: None }))
     }
 
-    /// The run goes on where it rested, and what was before is no longer known.
-    pub(crate) fn begin_at_rest(&self, snapshot: &SnapshotLine) {
+    /// The run goes on as it stood, and what was before is no longer known.
+    pub(crate) fn begin_at(&self, snapshot: &SnapshotLine) {
         if let Some((status, board)) = self.0.as_ref().and_then(|it| it.asked.as_ref()) {
-            status.begin_at_rest(snapshot.now());
+            status.begin_at(snapshot);
             board.add(&format!("{}\n", snapshot_text(snapshot)));
         }
     }
@@ -105,7 +105,7 @@ impl<R: Recorder> Recorder for Witnessed<R> {
         }
     }
 
-    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
-        self.inner.begin_anew(rested)
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        self.inner.begin_anew(stand)
     }
 }

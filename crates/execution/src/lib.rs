@@ -51,7 +51,7 @@ pub use odds::{Compared, Odds, Remainder};
 pub use outlook::{Move, Outlook, Standing, Weighed};
 pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
 pub use preparation::{Need, PrepareError, Prepared, Preparer, Region};
-pub use progression::{Progression, Standstill, Underway, Unreadable};
+pub use progression::{Guards, Parts, Progression, Underway, UnderwayParts, Unreadable};
 pub use reason::{About, Behind, Cause, Changed, Promise, Reason};
 pub use record::{Entry, NoRecord, Recorder};
 pub use rehearsal::{Rehearsal, Rehearsed, Rehearsing, Scene, SeenChange, Tells};

@@ -10,9 +10,9 @@
 mod effects;
 mod goal;
 mod motion;
+mod parts;
 mod polynomial;
 mod reading;
-mod standstill;
 mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,8 +25,8 @@ use elbowroom_model::{RunningAction, State, Task};
 use elbowroom_num::{Interval, Rational};
 
 pub(crate) use goal::Outlook;
+pub use parts::{Guards, Parts, UnderwayParts};
 pub use reading::Unreadable;
-pub use standstill::Standstill;
 
 use crate::event::{Measured, Ticket};
 use motion::{Motion, Rate};
@@ -341,7 +341,7 @@ impl Progression {
     pub fn running_action(&self, underway: &Underway, duration: Interval) -> RunningAction {
         let mut action = Action::clone(&underway.action);
         if let Body::Durative(body) = &mut action.body {
-            decide_guards(body, underway);
+            decide_guards(body, &underway.end_guards, &underway.continuous);
         }
         RunningAction {
             action: Arc::new(action),
@@ -410,15 +410,15 @@ impl Progression {
 }
 
 /// Leaves out the effects that will not take place, and what is decided of the others' guards.
-fn decide_guards(body: &mut DurativeBody, underway: &Underway) {
-    let mut on = underway.end_guards.iter();
+fn decide_guards(body: &mut DurativeBody, at_end: &[bool], continuous: &[bool]) {
+    let mut on = at_end.iter();
     body.end
         .effects
         .retain(|_| on.next().copied().unwrap_or(true));
     for effect in &mut body.end.effects {
         effect.guard.at_start = Condition::TRUE;
     }
-    let mut on = underway.continuous.iter();
+    let mut on = continuous.iter();
     body.continuous
         .retain(|_| on.next().copied().unwrap_or(true));
     for effect in &mut body.continuous {

@@ -6,7 +6,7 @@ use elbowroom_num::Rational;
 use crate::event::{Command, Observation, Ticket};
 use crate::executor::{Decided, Mission, Planned};
 use crate::reason::Reason;
-use crate::run::{Report, Rested, Verdict};
+use crate::run::{Report, Stand, Verdict};
 
 /// Takes the record of a run as it comes about.
 pub trait Recorder: Send {
@@ -14,11 +14,12 @@ pub trait Recorder: Send {
     /// leaves its record.
     fn record(&mut self, entry: &Entry<'_>);
 
-    /// A lasting run rests, without goals and with nothing under way, and could be gone on with from
-    /// what `rested` says, without what was recorded before: whoever wants to, may begin its record
-    /// anew here, and says whether it has. Asked as long as the run rests.
-    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
-        let _ = rested;
+    /// A lasting run takes up a plan, or rests with nothing under way, and could be gone on with from
+    /// what `stand` says, without what was recorded before: whoever wants to, may begin its record
+    /// anew here, and says whether it has. Asked whenever a plan is taken up, before that is recorded,
+    /// and as long as the run rests.
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        let _ = stand;
         false
     }
 }
@@ -28,8 +29,8 @@ impl<R: Recorder + ?Sized> Recorder for &mut R {
         (**self).record(entry);
     }
 
-    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
-        (**self).begin_anew(rested)
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        (**self).begin_anew(stand)
     }
 }
 

@@ -17,6 +17,7 @@
 //! | a success after a cancel | the success counts: the action was faster |
 //! | a report with a time in the future, or before the action's start | its time is taken as the nearest possible one |
 //! | a report that comes late | it counts from its own time on for durations, from its arrival on for the state |
+//! | a refusal, again and again, and nothing else | plans beside the run are asked for later and later ([`Refusals`]) |
 //! | feedback | a sign of life: silence counts from then on |
 //! | a report that cannot be understood, or names what the problem does not have | nothing; the record has it |
 //! | answers without end while the clock stands still, or creeps | the world is broken ([`Verdict::WorldFailed`]) |
@@ -54,31 +55,35 @@ mod amid;
 mod dead_end;
 mod drive;
 mod farewell;
+mod goals;
 mod handover;
 pub mod here;
 mod intake;
 mod lasting;
 mod oblivion;
 mod progress;
-mod rested;
+mod refusals;
 mod room;
 mod search;
 mod settings;
+mod stand;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-pub use account::{Account, ExecutedStep};
+pub use account::{Account, ExecutedStep, KnownStart};
 pub use amid::{Amid, Beginning};
 pub use drive::{Next, NotAsked};
 pub use farewell::FAREWELL;
 pub use lasting::{FIRST_GOAL, GoalReader};
-pub use rested::Rested;
+pub use refusals::Refusals;
 pub use settings::{
     Patience, PlanningTime, Report, RunSettings, RunningRule, UnknownSetting, Verdict,
 };
+pub use stand::{Doing, Goals, Stand, TakesUp};
 
 use crate::event::{Command, Ticket};
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned};
@@ -147,6 +152,8 @@ pub struct Run<'a> {
     plan_task: Option<Arc<Task>>,
     /// What became of earlier searches, while plans are made beside the run.
     lost: Lost,
+    /// What the world has refused since anything else has happened.
+    refusals: Refusals,
     /// How the run ends, while what is running is told to stop.
     closing: Option<Closing>,
     /// The report, once the run is over.
@@ -213,6 +220,7 @@ impl<'a> Run<'a> {
             search: None,
             plan_task: None,
             lost: Lost::default(),
+            refusals: Refusals::default(),
             closing: None,
             report: None,
             reopenings: 0,
@@ -379,7 +387,7 @@ impl<'a> Run<'a> {
     /// Plans from here; see [`RunningRule`] for what becomes of what is running.
     fn replan(&mut self, reason: &Reason) -> Result<(), Stop> {
         // What deviated may have been the last thing to do.
-        if self.go_without_plan(reason) {
+        if self.go_without_plan(reason) || self.has_patience(reason) {
             return Ok(());
         }
         if reason.cause != Cause::NewPlan {
@@ -404,17 +412,36 @@ impl<'a> Run<'a> {
         situation: &Situation,
         running: &[Ticket],
     ) -> Result<(), Stop> {
-        let task = Arc::clone(&self.task);
-        match self.prepare(&task, plan, situation, running) {
-            Ok(mission) => {
-                self.note_plan(plan);
-                self.begin_mission(&mission)
-            }
+        let (task, goals) = (Arc::clone(&self.task), self.goals());
+        self.take_up_for(&task, &goals, (plan, situation, running))
+    }
+
+    /// The same with a plan for these goals, which this task has.
+    fn take_up_for(
+        &mut self,
+        task: &Task,
+        goals: &Goals,
+        (plan, situation, running): (&TimeTriggeredPlan, &Situation, &[Ticket]),
+    ) -> Result<(), Stop> {
+        match self.prepare(task, plan, situation, running) {
+            Ok(mission) => self.begin_with((plan, situation, running), goals, &mission),
             Err(error) => {
                 let why = error.to_string();
                 Err(Stop::Over(Verdict::NoPlan { why }))
             }
         }
+    }
+
+    /// Begins with a plan for these goals that is ready.
+    fn begin_with(
+        &mut self,
+        (plan, situation, running): (&TimeTriggeredPlan, &Situation, &[Ticket]),
+        goals: &Goals,
+        mission: &Mission,
+    ) -> Result<(), Stop> {
+        self.note_plan(plan);
+        self.begin_anew_with((plan, situation, running), goals);
+        self.begin_mission(mission)
     }
 
     /// Begins with a plan that is ready.
@@ -429,6 +456,7 @@ impl<'a> Run<'a> {
         self.news.clear();
         self.ports.recorder.record(&Entry::Mission(mission));
         if let Err(reason) = self.ports.executor.adopt(mission) {
+            self.account.begin_plan(&BTreeMap::new());
             return self.replan(&reason);
         }
         // What has ended while the plan was made, the plan still waits for.

@@ -51,7 +51,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
     // What was believed follows from the beginning.
     let mut belief = task
         .as_ref()
-        .filter(|_| left_out == 0 && stored.snapshot.is_none())
+        .filter(|_| left_out == 0 && !stored.has_snapshot())
         .map(|task| Belief::new(task, &mut texts));
     let (mut bars, mut guarantees, mut log) =
         (Bars::default(), Guarantees::default(), Log::default());
@@ -144,7 +144,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
 
 /// What of the run is not on the page, as its record does not begin at the beginning.
 fn not_shown(stored: &Stored, left_out: usize) -> Option<String> {
-    if stored.snapshot.is_some() {
+    if stored.has_snapshot() {
         let words = "what was before this segment of the journal, and facts and numbers";
         return Some(words.to_owned());
     }

@@ -17,7 +17,9 @@ use serde::Serialize;
 
 pub use crate::line::{self, Line};
 pub use replay::{Difference, Replay, ReplayPlanner, ReplayWorld, Stored, TraceError};
-pub use snapshot::SnapshotLine;
+pub use snapshot::{
+    GoalLine, NewsLine, SituatedLine, SnapshotLine, StartLine, TakenUpLine, TurnLine, UnderWayLine,
+};
 
 /// The value of `format` in the first line of a trace.
 pub const FORMAT: &str = "elbowroom-trace";

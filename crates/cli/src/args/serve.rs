@@ -41,7 +41,7 @@ pub(crate) struct ServeArgs {
     /// stop. Without it, the executive can only be looked at
     #[arg(long, value_name = "FILE")]
     pub(crate) token: Option<PathBuf>,
-    /// Begin the journal anew when it is as long and the executive rests, without goals and with
+    /// Begin the journal anew when it is as long and the executive takes up a plan, or rests with
     /// nothing under way: in bytes, or with K, M or G; 10M unless it is given. `--resume` then goes on
     /// from there
     #[arg(long, value_name = "SIZE", value_parser = size)]

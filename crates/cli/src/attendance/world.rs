@@ -73,6 +73,12 @@ impl<'a, W: World> Attended<'a, W> {
         Self { bell, ..self }
     }
 
+    /// The same, of a run in which these are under way.
+    pub(crate) fn under_way(self, open: impl IntoIterator<Item = u64>) -> Self {
+        let open = open.into_iter().collect();
+        Self { open, ..self }
+    }
+
     /// The same, which takes no requests before that.
     pub(crate) fn once(self, is_live: impl Fn() -> bool + Send + 'a) -> Self {
         let is_live = Box::new(is_live);

@@ -115,8 +115,18 @@ fn reached(journal: &str) -> BTreeSet<String> {
     reached
 }
 
-/// Kills an executive some times. How often, and how often its journal was begun anew.
-fn killed(number: u64) -> (u64, usize) {
+/// How often an executive was killed, and its journal begun anew: at rest, and while it took up a plan.
+#[derive(Clone, Copy, Debug, Default)]
+struct Killed {
+    kills: u64,
+    at_rest: usize,
+    amid: usize,
+    /// Of these, while something was under way.
+    under_way: usize,
+}
+
+/// Kills an executive some times.
+fn killed(number: u64) -> Killed {
     let (place, mut dice) = (folder(&format!("serve-kill-{number}")), Dice(number));
     dice.below(2);
     let journal = place.join("journal").display().to_string();
@@ -169,8 +179,20 @@ fn killed(number: u64) -> (u64, usize) {
         begun.len(),
         "{what}: begun twice: {begun:#?}"
     );
+    let mut told = Killed {
+        kills,
+        ..Killed::default()
+    };
     let segments = segments(&journal);
     for segment in &segments {
+        let text = fs::read_to_string(segment).expect("a journal");
+        let second = text.lines().nth(1).unwrap_or_default();
+        if second.contains("\"event\":\"snapshot\"") {
+            let is_amid = second.contains("\"plan\":{");
+            told.at_rest += usize::from(!is_amid);
+            told.amid += usize::from(is_amid);
+            told.under_way += usize::from(second.contains("\"under_way\":["));
+        }
         let replayed = command::elbowroom(&["run", "--replay", segment]);
         assert_eq!(
             replayed.status.code(),
@@ -183,7 +205,7 @@ fn killed(number: u64) -> (u64, usize) {
         "{what}: half a segment is left"
     );
     fs::remove_dir_all(&place).expect("the folder is there");
-    (kills, segments.len() - 1)
+    told
 }
 
 fn launched(place: &Path, journal: &str, beginning: &[String]) -> Executive {
@@ -218,12 +240,15 @@ fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
     for worker in workers {
         all.extend(worker.join().expect("each executive was right"));
     }
-    let kills: u64 = all.iter().map(|(kills, _)| kills).sum();
-    let anew: usize = all.iter().map(|(_, anew)| anew).sum();
+    let kills: u64 = all.iter().map(|it| it.kills).sum();
+    let sum = |of: fn(&Killed) -> usize| all.iter().map(of).sum::<usize>();
+    let (at_rest, amid) = (sum(|it| it.at_rest), sum(|it| it.amid));
+    let under_way = sum(|it| it.under_way);
     println!(
-        "{count} executives, killed {kills} times; their journals were begun anew {anew} times"
+        "{count} executives, killed {kills} times; their journals were begun anew {at_rest} times at rest, and \
+         {amid} times with a plan, {under_way} of these with something under way"
     );
-    assert!(anew > 0, "no journal was begun anew");
+    assert!(amid > 0, "no journal was begun anew amid a run");
 }
 
 /// Wherever a program is killed while it begins its journal anew, the next one goes on: from the old

@@ -11,15 +11,26 @@ use super::{DOMAIN, PROBLEM};
 
 /// An executive whose planner waits for the file `go` in that folder.
 fn with_a_slow_planner(place: &Path) -> Executive {
-    let (script, go) = (place.join("planner.sh"), place.join("go"));
+    with_a_slow_planner_for(place, PROBLEM)
+}
+
+fn with_a_slow_planner_for(place: &Path, problem: &str) -> Executive {
+    let (script, go, once) = (
+        place.join("planner.sh"),
+        place.join("go"),
+        place.join("once"),
+    );
     let own = env!("CARGO_BIN_EXE_elbowroom");
+    // With the file `once`, each `go` is for one plan.
     let program = format!(
-        "while ! test -e '{}'; do sleep 0.05; done\nexec '{own}' plan \"$1\" \"$2\"\n",
-        go.display()
+        "while ! test -e '{go}'; do sleep 0.05; done\nif test -e '{once}'; then rm '{go}'; fi\n\
+         exec '{own}' plan \"$1\" \"$2\"\n",
+        go = go.display(),
+        once = once.display()
     );
     fs::write(&script, program).expect("written");
     let command = format!("sh {} {{domain}} {{problem}}", script.display());
-    let line = [DOMAIN, PROBLEM, "--realtime", "2", "--planner", &command];
+    let line = [DOMAIN, problem, "--realtime", "2", "--planner", &command];
     Executive::start(place, &line)
 }
 
@@ -51,6 +62,89 @@ fn requests_are_taken_in_and_answered_while_the_first_plan_is_made() {
     own.await_state(|state| state["why"] == "reached: problem, second");
     own.post("/v1/stop", &Value::Null);
     assert_eq!(own.end().status.code(), Some(0));
+}
+
+/// Another chain of errands, of which the problem's own goal needs nothing, so that a plan has to be
+/// made for them.
+fn with_another_chain(place: &Path) -> String {
+    let text = fs::read_to_string(super::command::root().join(PROBLEM)).expect("a problem");
+    let text = text
+        .replace("b1 b2 b3 - errand", "b1 b2 b3 c1 c2 - errand")
+        .replace("(open a1)", "(open c1) (open c2) (open a1)")
+        .replace(
+            "(first nothing a1)",
+            "(first nothing c1) (first c1 c2) (first nothing a1)",
+        );
+    let problem = place.join("problem.pddl");
+    fs::write(&problem, text).expect("written");
+    problem.display().to_string()
+}
+
+/// The lines of the trace so far; the last one may be in the writing.
+fn trace(place: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(place.join("trace.jsonl")).unwrap_or_default();
+    let lines = text.lines().map(serde_json::from_str);
+    lines.filter_map(Result::ok).collect()
+}
+
+fn is_event(line: &Value, event: &str) -> bool {
+    line["event"] == event
+}
+
+fn is_start(line: &Value) -> bool {
+    is_event(line, "command") && line["command"]["type"] == "start"
+}
+
+/// The lines since the last plan was asked for, if it is still in the making.
+fn of_the_search(lines: &[Value]) -> Option<&[Value]> {
+    let asked = lines.iter().rposition(|it| is_event(it, "planning"))?;
+    let since = &lines[asked..];
+    (!since.iter().any(|it| is_event(it, "planned"))).then_some(since)
+}
+
+/// A goal is given that the running plan does not reach, so that another one has to be made: one that it
+/// reaches as well would be kept for. Its planner is slow: the running plan is dispatched all the same, and
+/// requests are answered. The goal is given before there is a plan, so that nothing of that plan has been
+/// started when the search for the next one begins, however slow this machine is.
+#[test]
+fn the_running_plan_is_dispatched_while_a_slow_planner_plans() {
+    let place = folder("dispatched-meanwhile");
+    let (go, once) = (place.join("go"), place.join("once"));
+    fs::write(&once, "").expect("written");
+    let problem = with_another_chain(&place);
+    let mut own = with_a_slow_planner_for(&place, &problem);
+    own.await_state(is_planning);
+    let goal = json!({"goal": "(done c2)", "name": "more"});
+    assert_eq!(own.post("/v1/goals", &goal).0, 200);
+    fs::write(&go, "").expect("written");
+    // What is started is started by the plan that was there before.
+    let state = own.await_state(|state| {
+        let lines = trace(&place);
+        let plans = lines.iter().filter(|it| is_event(it, "plan")).count();
+        let has_started = of_the_search(&lines).is_some_and(|it| it.iter().any(is_start));
+        plans == 1 && has_started && is_planning(state)
+    });
+    assert_eq!(
+        state["goals"].as_array().expect("goals").len(),
+        2,
+        "{state}"
+    );
+    for path in ["/v1/plan", "/v1/guarantee", "/v1/next"] {
+        assert_eq!(own.get(path).0, 200, "{path}");
+    }
+    let fact = json!({"fact": "(done b3)", "becomes": true});
+    assert_eq!(own.post("/v1/facts", &fact).1["taken"], json!(true));
+    own.await_state(|_| {
+        let lines = trace(&place);
+        let heard = |it: &Value| is_event(it, "observed") && it["observation"]["type"] == "fact";
+        of_the_search(&lines).is_some_and(|it| it.iter().any(heard))
+    });
+    fs::remove_file(&once).expect("it is there");
+    fs::write(&go, "").expect("written");
+    own.await_state(|state| state["why"] == "reached: problem, more");
+    own.post("/v1/stop", &Value::Null);
+    assert_eq!(own.end().status.code(), Some(0));
+    fs::remove_dir_all(&place).expect("the folder is there");
 }
 
 /// A domain of which nothing can be executed is refused before anybody is asked for a problem.

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom_execution::run::{Report, Rested, Verdict};
+use elbowroom_execution::run::{Report, Stand, Verdict};
 use elbowroom_execution::{Entry, NoRecord, Planner, Progression, Recorder, World};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -21,8 +21,8 @@ pub struct RunRequest<'a> {
     pub task: &'a Arc<Task>,
     /// The plan to begin with; without one, one is made.
     pub plan: Option<TimeTriggeredPlan>,
-    /// Where a lasting run rested, to go on from there instead.
-    pub rested: Option<Rested>,
+    /// How a lasting run stood, to go on from there instead.
+    pub stand: Option<Stand>,
     /// How many times the run was over, without a plan, and was gone on with.
     pub reopened: usize,
     /// Who makes plans, if it is not whom the specification names: a replay, or a planner on
@@ -83,7 +83,7 @@ impl<'a> RunRequest<'a> {
             spec,
             task,
             plan: None,
-            rested: None,
+            stand: None,
             reopened: 0,
             planner: None,
             recorder: Box::new(NoRecord),
@@ -98,11 +98,11 @@ impl<'a> RunRequest<'a> {
         Self { plan, ..self }
     }
 
-    /// Goes on where a lasting run rested.
+    /// Goes on as a lasting run stood.
     #[must_use]
-    pub fn resting(self, rested: impl Into<Option<Rested>>) -> Self {
-        let rested = rested.into();
-        Self { rested, ..self }
+    pub fn standing(self, stand: impl Into<Option<Stand>>) -> Self {
+        let stand = stand.into();
+        Self { stand, ..self }
     }
 
     /// Goes on after the run was over, so many times.
@@ -179,7 +179,7 @@ pub fn run(
             }
         })
         .beginning_with(request.plan)
-        .resting(request.rested)
+        .standing(request.stand)
         .reopened(request.reopened)
         .planned_by(planner)
         .recorded_by(recorder)
@@ -270,7 +270,7 @@ impl Recorder for Heard<'_, '_> {
             .notice(&Event::Run(RunProgress { entry, plans }));
     }
 
-    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
-        self.inner.begin_anew(rested)
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        self.inner.begin_anew(stand)
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, UnknownExecutor};
-use elbowroom_execution::run::{Ports, Report, Rested, Run, RunSettings};
+use elbowroom_execution::run::{Ports, Report, Run, RunSettings, Stand};
 use elbowroom_execution::{
     Executor, NoRecord, Odds, Outlook, Planner, Preparer, Progression, Recorder, Rehearsal, World,
 };
@@ -107,7 +107,7 @@ pub fn execute(
 pub struct Execution<'a> {
     task: Arc<Task>,
     plan: Option<TimeTriggeredPlan>,
-    rested: Option<Rested>,
+    stand: Option<Stand>,
     reopened: usize,
     executor: Decider<'a>,
     settings: RunSettings,
@@ -142,7 +142,7 @@ impl<'a> Execution<'a> {
         Self {
             task: Arc::clone(task),
             plan: None,
-            rested: None,
+            stand: None,
             reopened: 0,
             executor: Decider::Registered(ExecutorSpec::default()),
             settings: RunSettings::default(),
@@ -169,10 +169,10 @@ impl<'a> Execution<'a> {
         Self { plan, ..self }
     }
 
-    /// Goes on where a lasting run rested: see [`Run::resting`].
-    pub fn resting(self, rested: impl Into<Option<Rested>>) -> Self {
-        let rested = rested.into();
-        Self { rested, ..self }
+    /// Goes on as a lasting run stood: see [`Run::standing`].
+    pub fn standing(self, stand: impl Into<Option<Stand>>) -> Self {
+        let stand = stand.into();
+        Self { stand, ..self }
     }
 
     /// Goes on after it was over, so many times: see [`Run::reopened`].
@@ -328,8 +328,8 @@ impl<'a> Execution<'a> {
         } else if self.is_attended {
             run = run.attended();
         }
-        if let Some(rested) = self.rested {
-            run = run.resting(rested);
+        if let Some(stand) = self.stand {
+            run = run.standing(stand);
         }
         if let Some(listener) = self.listener {
             run = run.told_to(listener);

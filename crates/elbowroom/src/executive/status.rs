@@ -13,6 +13,7 @@ use elbowroom_model::{Situation, Task};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_pddl::{ProblemText, write_problem};
 use elbowroom_report::exact::Exact;
+use elbowroom_report::trace::SnapshotLine;
 
 use super::documents::{
     Activity, GuaranteeNow, NextNow, NumberNow, OpenGoal, PlanNow, Room, Running, State, StepNow,
@@ -73,12 +74,9 @@ impl Status {
         self.known().record(entry);
     }
 
-    /// The run begins where an earlier one rested, without goals.
-    pub fn begin_at_rest(&self, now: &Rational) {
-        let mut known = self.known();
-        known.now.clone_from(now);
-        known.goals.clear();
-        known.rest = Some(NO_GOAL.to_owned());
+    /// The run begins as an earlier one stood.
+    pub fn begin_at(&self, snapshot: &SnapshotLine) {
+        self.known().begin_at(snapshot);
     }
 
     /// Takes note of what is believed.
@@ -165,6 +163,8 @@ impl Status {
     }
 }
 
+/// Why a run rests whose record does not say.
+const BEFORE: &str = "why stands in an earlier segment of the journal";
 /// Why a run rests that was asked for nothing.
 const NO_GOAL: &str = "there is no goal";
 const TO_COME: &str = "to-come";
@@ -198,6 +198,42 @@ impl Known {
             plans: self.plans,
             facts: Vec::new(),
             numbers: Vec::new(),
+        }
+    }
+
+    fn begin_at(&mut self, snapshot: &SnapshotLine) {
+        self.now.clone_from(snapshot.now());
+        self.is_paused = snapshot.paused;
+        let of_the_problem = std::mem::take(&mut self.goals);
+        let goals = snapshot.goals.iter().map(|line| {
+            let own = of_the_problem.first().map(|it| it.goal.clone());
+            let goal = line.goal.clone().or(own).unwrap_or_default();
+            let name = line.name.clone();
+            OpenGoal { name, goal }
+        });
+        self.goals = goals.collect();
+        if snapshot.plan.is_none() {
+            let why = if self.goals.is_empty() {
+                NO_GOAL
+            } else {
+                BEFORE
+            };
+            self.rest = Some(why.to_owned());
+        }
+        for start in snapshot.starts.iter().filter(|it| it.is_open()) {
+            if start.started.is_some() {
+                self.started.insert(start.ticket);
+            }
+            let running = Running {
+                ticket: start.ticket,
+                action: start.action.clone(),
+                since: start.ordered.clone(),
+                planned: start.duration.clone(),
+                needed: None,
+                completion: None,
+                note: None,
+            };
+            self.running.insert(start.ticket, running);
         }
     }
 

@@ -20,10 +20,10 @@ use crate::lasting::scripted::{Notes, Scripted, abandon, fact, pursue, task};
 
 /// A planner that works beside the run.
 #[derive(Clone, Default)]
-struct Beside(Arc<Mutex<Desk>>);
+pub(crate) struct Beside(Arc<Mutex<Desk>>);
 
 #[derive(Default)]
-struct Desk {
+pub(crate) struct Desk {
     now: Rational,
     /// How long each search takes, one after the other; the last one again and again.
     seconds: Vec<Rational>,
@@ -37,7 +37,7 @@ struct Desk {
 }
 
 impl Beside {
-    fn taking(seconds: &[Rational]) -> Self {
+    pub(crate) fn taking(seconds: &[Rational]) -> Self {
         let desk = Desk {
             seconds: seconds.to_vec(),
             ..Desk::default()
@@ -80,8 +80,8 @@ impl Planner for Beside {
 }
 
 /// That world, which says when a plan is there, and in which actions take longer or less long than planned.
-struct Telling {
-    inner: Scripted,
+pub(crate) struct Telling {
+    pub(crate) inner: Scripted,
     planner: Beside,
     /// By how many quarters of itself the nth start's duration differs.
     quarters: Vec<i64>,
@@ -162,17 +162,16 @@ fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
         .with_settings(settings())
 }
 
-fn told(
-    execution: Execution<'_>,
-    task: &Arc<Task>,
+/// The world of a script, and what says when it is over.
+pub(crate) fn telling(
     (end, script): (i64, Vec<(Rational, Event)>),
     planner: &Beside,
     quarters: &[i64],
-) -> Told {
+) -> (Telling, Arc<AtomicBool>) {
     let is_to_end = Arc::new(AtomicBool::new(false));
     let script = script.into_iter();
     let script = script.map(|(time, event)| Observation { time, event });
-    let mut world = Telling {
+    let world = Telling {
         inner: Scripted {
             now: Rational::ZERO,
             coming: script.collect(),
@@ -185,6 +184,17 @@ fn told(
         quarters: quarters.to_vec(),
         started: 0,
     };
+    (world, is_to_end)
+}
+
+fn told(
+    execution: Execution<'_>,
+    task: &Arc<Task>,
+    script: (i64, Vec<(Rational, Event)>),
+    planner: &Beside,
+    quarters: &[i64],
+) -> Told {
+    let (mut world, is_to_end) = telling(script, planner, quarters);
     let (notes, lines) = (Notes::default(), Arc::default());
     let report = execution
         .planned_by(planner.clone())

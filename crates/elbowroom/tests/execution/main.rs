@@ -17,6 +17,7 @@ mod one_time;
 mod openings;
 mod others;
 mod reasons;
+mod refusals;
 mod reports;
 mod scene;
 #[path = "../shared/mod.rs"]

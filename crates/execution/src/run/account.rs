@@ -17,6 +17,10 @@ use crate::progression::Progression;
 /// So many of the starts before a rest are in the report of a lasting run.
 const MOST_REPORTED: usize = 2000;
 
+/// Late reports on so many of the starts that had ended when a plan was taken up, the last ones, are
+/// understood.
+const MOST_REMEMBERED: usize = 100;
+
 /// Everything that was started, but for what a lasting run has forgotten.
 #[derive(Clone, Debug, Default)]
 pub struct Account {
@@ -51,6 +55,33 @@ pub(super) struct Opened {
     /// Until when the plan could bear it when that was warned of.
     pub(super) warned: Option<Rational>,
     pub(super) measured: [Vec<Measured>; 2],
+    /// Whether it had ended long before the present plan: late reports on it count for nothing.
+    is_past: bool,
+}
+
+/// One start, as all that has to be known of it to go on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownStart {
+    /// By which the world's reports refer to it.
+    pub ticket: Ticket,
+    /// The action.
+    pub action: Arc<Action>,
+    /// The planned duration; `None` for an instantaneous action.
+    pub planned: Option<Rational>,
+    /// When it was told to start.
+    pub ordered: Rational,
+    /// When it has started, if it has.
+    pub started: Option<Rational>,
+    /// When it last gave a sign of life, after its start.
+    pub heard: Option<Rational>,
+    /// When and how it has ended, if it has.
+    pub ended: Option<(Rational, Ending)>,
+    /// When it was told to stop, if it was.
+    pub cancelled: Option<Rational>,
+    /// Until when the plan could bear it when that was warned of.
+    pub warned: Option<Rational>,
+    /// What was measured at its start, and at its end.
+    pub measured: [Vec<Measured>; 2],
 }
 
 /// Something that was done, as a step of a plan that the judge can look at.
@@ -84,6 +115,7 @@ impl Account {
                 cancelled: None,
                 warned: None,
                 measured: [Vec::new(), Vec::new()],
+                is_past: false,
             };
             account.entries.insert(*ticket, opened);
             // Numbers in between were of what has ended.
@@ -100,12 +132,65 @@ impl Account {
         self.started
     }
 
-    /// So many were started before, and have ended.
-    pub(super) fn begin_at(&mut self, started: usize) {
+    /// So many were started before; what is not among those that are known is long past.
+    pub(super) fn begin_at(&mut self, started: usize, known: Vec<KnownStart>) {
         *self = Self {
             started,
             ..Self::default()
         };
+        for it in known {
+            let opened = Opened {
+                action: it.action,
+                planned: it.planned,
+                step: None,
+                ordered: it.ordered,
+                started: it.started,
+                heard: it.heard,
+                ended: it.ended,
+                cancelled: it.cancelled,
+                warned: it.warned,
+                measured: it.measured,
+                is_past: false,
+            };
+            if opened.ended.is_none() {
+                self.open.insert(it.ticket);
+            }
+            self.entries.insert(it.ticket, opened);
+        }
+    }
+
+    /// All that is not long past.
+    pub(super) fn known(&self) -> Vec<KnownStart> {
+        let known = self.entries.iter().filter(|(_, it)| !it.is_past);
+        let known = known.map(|(ticket, it)| KnownStart {
+            ticket: *ticket,
+            action: Arc::clone(&it.action),
+            planned: it.planned.clone(),
+            ordered: it.ordered.clone(),
+            started: it.started.clone(),
+            heard: it.heard.clone(),
+            ended: it.ended.clone(),
+            cancelled: it.cancelled.clone(),
+            warned: it.warned.clone(),
+            measured: it.measured.clone(),
+        });
+        known.collect()
+    }
+
+    /// A plan is taken up, or the run rests: of what has ended, all but the last is long past from now
+    /// on, but for what is named.
+    pub(super) fn leave_behind(&mut self, but_for: &[Ticket]) {
+        let ended = self.entries.iter_mut().rev();
+        let ended = ended.filter(|(ticket, it)| it.ended.is_some() && !but_for.contains(ticket));
+        for (_, it) in ended.skip(MOST_REMEMBERED) {
+            it.is_past = true;
+        }
+    }
+
+    /// Forgets what is long past, for the report, too.
+    pub(super) fn forget_what_is_past(&mut self) {
+        self.entries.retain(|_, it| !it.is_past);
+        self.forget_closed();
     }
 
     /// Nothing is under way, and no plan: what was done is only of interest for the report, which
@@ -130,7 +215,12 @@ impl Account {
 
     /// Whether that was started, and is no longer known.
     pub(super) fn is_forgotten(&self, ticket: Ticket) -> bool {
-        ticket.0 < self.started as u64 && !self.entries.contains_key(&ticket)
+        ticket.0 < self.started as u64 && self.recent(ticket).is_none()
+    }
+
+    /// That start, unless it is long past.
+    pub(super) fn recent(&self, ticket: Ticket) -> Option<&Opened> {
+        self.entries.get(&ticket).filter(|it| !it.is_past)
     }
 
     /// Forgets the first starts that have ended and are not of the present plan, until no more than
@@ -168,6 +258,7 @@ impl Account {
             cancelled: None,
             warned: None,
             measured: [Vec::new(), Vec::new()],
+            is_past: false,
         };
         self.entries.insert(ticket, opened);
         self.steps.insert(order.step, ticket);

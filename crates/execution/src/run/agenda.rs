@@ -1,8 +1,11 @@
 //! What a run has to do before its executor is asked again.
 
-use elbowroom_model::{Situation, TimeTriggeredPlan};
+use std::sync::Arc;
+
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
+use super::stand::TakesUp;
 use super::{Next, Run, Stop};
 use crate::event::{Command, Ticket};
 use crate::executor::{Mission, News, Order};
@@ -36,6 +39,8 @@ pub(super) enum Todo {
     Adopt(Box<Made>),
     /// Begin with a plan that is ready.
     TakeUp(Box<Mission>),
+    /// Begin with a plan with which another run has begun, of this task.
+    TakeUpAgain(Arc<Task>, Box<TakesUp>),
     /// Events that happened while the plan was made, of which it does not know.
     Tell(Vec<News>),
     /// Wait until then for what was told to stop, and end the run.
@@ -81,6 +86,10 @@ impl Run<'_> {
             Todo::Plan(reason) => self.plan_from_here(&reason)?,
             Todo::Adopt(made) => self.adopt(made)?,
             Todo::TakeUp(mission) => self.begin_mission(&mission)?,
+            Todo::TakeUpAgain(task, it) => {
+                self.agenda.push(Todo::Tell(it.news));
+                self.take_up_for(&task, &it.goals, (&it.plan, &it.situation, &it.running))?;
+            }
             Todo::Tell(news) => {
                 self.news.splice(0..0, news);
             }

@@ -42,8 +42,11 @@ const MOST_STEPS: u64 = 10_000_000;
 const MOST_NAMED: usize = 3;
 
 impl Run<'_> {
-    /// Records an event, for a later explanation of a dead end.
+    /// Something has happened that was believed: records it, for a later explanation of a dead end.
     pub(super) fn note(&mut self, time: &Rational, what: What) {
+        if !matches!(what, What::Stopped(_)) {
+            self.refusals.forget();
+        }
         if self.is_explaining {
             self.history.push(Happened {
                 time: time.clone(),

@@ -99,7 +99,7 @@ impl Run<'_> {
 
     /// An action gives a sign of life: so long it has not been silent.
     fn heard(&mut self, ticket: Ticket, time: &Rational) -> Remark {
-        match self.account.get(ticket) {
+        match self.account.recent(ticket) {
             None => Some(self.unknown(ticket)),
             Some(entry) if entry.ended.is_some() => Some("it had ended already"),
             Some(_) => {
@@ -125,7 +125,7 @@ impl Run<'_> {
     }
 
     fn started(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) -> Remark {
-        let Some(entry) = self.account.get(ticket) else {
+        let Some(entry) = self.account.recent(ticket) else {
             return Some(self.unknown(ticket));
         };
         if entry.started.is_some() {
@@ -170,7 +170,7 @@ impl Run<'_> {
         ending: &Ending,
         measured: &[Measured],
     ) -> Remark {
-        let Some(entry) = self.account.get(ticket) else {
+        let Some(entry) = self.account.recent(ticket) else {
             return Some(self.unknown(ticket));
         };
         if let Some((_, earlier)) = &entry.ended {
@@ -205,6 +205,9 @@ impl Run<'_> {
             self.belief.stop(ticket);
             self.note(&time, What::Stopped(ticket));
             self.note_surprise();
+            if is_refused && let Some(entry) = self.account.get(ticket) {
+                self.refusals.note(&entry.action.name, &self.now);
+            }
         }
         // An instantaneous action is over when it has started; what follows says nothing new.
         let is_over = self

@@ -26,8 +26,10 @@ use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan, problem};
 use elbowroom_num::Rational;
 
 use super::agenda::Todo;
+use super::goals::OpenGoal;
 use super::here::{Guess, rest_of};
 use super::intake::Remark;
+use super::search::Lost;
 use super::{Run, Stop, Verdict};
 use crate::event::{Request, Ticket};
 use crate::executor::News;
@@ -64,14 +66,14 @@ impl<F: Fn(&Task, &str) -> Result<problem::Condition, String> + Send> GoalReader
 
 /// What a run needs to go on when its goal is reached.
 pub(super) struct Lasting<'a> {
-    reader: Box<dyn GoalReader + 'a>,
-    /// The open goals, by name.
-    goals: Vec<(String, problem::Condition)>,
+    pub(super) reader: Box<dyn GoalReader + 'a>,
+    /// The open goals.
+    pub(super) goals: Vec<OpenGoal>,
     /// Whether the goals were ever changed.
-    has_other_goals: bool,
-    is_paused: bool,
+    pub(super) has_other_goals: bool,
+    pub(super) is_paused: bool,
     /// How the goals have changed since the present plan was made.
-    change: Option<Turn>,
+    pub(super) change: Option<Turn>,
     /// The plan that is executed, on the world's clock.
     plan: Option<TimeTriggeredPlan>,
     /// Since when the run rests.
@@ -91,10 +93,10 @@ enum AtRest {
 }
 
 /// A change of the goals.
-struct Turn {
-    reason: Reason,
+pub(super) struct Turn {
+    pub(super) reason: Reason,
     /// Whether goals were only added, so that the plan may be right for these, too.
-    may_keep: bool,
+    pub(super) may_keep: bool,
 }
 
 impl<'a> Run<'a> {
@@ -107,7 +109,7 @@ impl<'a> Run<'a> {
         let goals = if goal.is_trivial() {
             Vec::new()
         } else {
-            vec![(FIRST_GOAL.to_owned(), goal)]
+            vec![OpenGoal::of_the_problem(goal)]
         };
         self.lasting = Some(Lasting {
             reader: Box::new(reader),
@@ -148,18 +150,23 @@ impl<'a> Run<'a> {
                 let Ok(condition) = lasting.reader.read(&self.task, goal) else {
                     return Some("it is no goal of this problem; nothing was made of it");
                 };
-                let known = lasting.goals.iter_mut().find(|(known, _)| known == name);
+                let given = OpenGoal {
+                    name: name.clone(),
+                    text: Some(goal.clone()),
+                    condition,
+                };
+                let known = lasting.goals.iter_mut().find(|known| known.name == *name);
                 let is_new = known.is_none();
                 match known {
-                    Some(known) => known.1 = condition,
-                    None => lasting.goals.push((name.clone(), condition)),
+                    Some(known) => *known = given,
+                    None => lasting.goals.push(given),
                 }
                 self.turn(format!("`{name}` is to be reached"), is_new);
                 None
             }
             Request::Abandon { name } => {
                 let before = lasting.goals.len();
-                lasting.goals.retain(|(known, _)| known != name);
+                lasting.goals.retain(|known| known.name != *name);
                 if lasting.goals.len() == before {
                     return Some("no goal of that name is open");
                 }
@@ -173,43 +180,6 @@ impl<'a> Run<'a> {
                 None
             }
         }
-    }
-
-    /// The goals have changed.
-    fn turn(&mut self, what: String, may_keep: bool) {
-        self.set_goal();
-        let Some(lasting) = &mut self.lasting else {
-            return;
-        };
-        let earlier = lasting.change.take();
-        let what = match earlier.as_ref().and_then(|turn| turn.reason.about.as_ref()) {
-            Some(earlier) => format!("{earlier}, {what}"),
-            None => what,
-        };
-        lasting.change = Some(Turn {
-            reason: Reason::new(Cause::Asked).about(About::Said(what)),
-            may_keep: may_keep && earlier.is_none_or(|earlier| earlier.may_keep),
-        });
-    }
-
-    /// All open goals together are the goal.
-    fn set_goal(&mut self) {
-        let Some(lasting) = &mut self.lasting else {
-            return;
-        };
-        lasting.has_other_goals = true;
-        let mut goals: Vec<_> = lasting.goals.iter().map(|(_, goal)| goal.clone()).collect();
-        let goal = match (goals.pop(), goals.is_empty()) {
-            (None, _) => problem::Condition::TRUE,
-            (Some(only), true) => only,
-            (Some(last), false) => {
-                goals.push(last);
-                problem::Condition::And(goals)
-            }
-        };
-        self.foreseen = None;
-        self.task = Arc::new(self.task.with_goal(goal));
-        self.belief.pursue(&self.task);
     }
 
     /// Whether the goals are not, or no longer, those of the problem.
@@ -267,7 +237,7 @@ impl<'a> Run<'a> {
             let reason = Reason::new(Cause::Surprise).about(About::AnyObservation);
             self.replan(&reason)?;
         } else {
-            self.begin_anew();
+            self.begin_anew_at_rest();
             self.stay();
         }
         Ok(true)
@@ -278,16 +248,9 @@ impl<'a> Run<'a> {
         self.lasting.as_ref()?.rests_since.as_ref()
     }
 
-    pub(super) fn has_no_goals(&self) -> bool {
-        let lasting = self.lasting.as_ref();
-        lasting.is_some_and(|lasting| lasting.goals.is_empty())
-    }
-
-    /// Rests since then, without goals.
-    pub(super) fn rest_without_goals(&mut self, since: Rational) {
+    /// Rests since then.
+    pub(super) fn rest_since(&mut self, since: Rational) {
         if let Some(lasting) = &mut self.lasting {
-            lasting.goals.clear();
-            lasting.has_other_goals = true;
             lasting.rests_since = Some(since);
         }
     }
@@ -319,8 +282,8 @@ impl<'a> Run<'a> {
                 now: &self.now,
                 reason: &turn.reason,
             });
-            self.note_plan(&plan);
-            return self.begin_mission(&mission);
+            let goals = self.goals();
+            return self.begin_with((&plan, &situation, &running), &goals, &mission);
         }
         if self.search_while_the_plan_goes_on(&turn.reason)? {
             return Ok(());
@@ -436,7 +399,7 @@ impl<'a> Run<'a> {
             return;
         };
         lasting.rests_since = Some(self.now.clone());
-        let goals: Vec<String> = lasting.goals.iter().map(|(name, _)| name.clone()).collect();
+        let goals: Vec<String> = lasting.goals.iter().map(|it| it.name.clone()).collect();
         let is_reached = verdict == Some(&Verdict::GoalReached);
         if is_reached {
             lasting.goals.clear();
@@ -458,6 +421,8 @@ impl<'a> Run<'a> {
         self.news.clear();
         self.reasons.clear();
         self.replans = 0;
+        self.lost = Lost::default();
+        self.refusals.forget();
         self.progress.begin_plan();
     }
 }

@@ -29,6 +29,7 @@ impl Progress {
     /// against it. How many plans there are is bounded by itself.
     pub(super) fn begin_plan(&mut self) {
         self.answers = 0;
+        self.unintelligible = None;
     }
 
     /// From when the answers are counted, and how many there were.

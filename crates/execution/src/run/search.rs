@@ -11,6 +11,7 @@ use elbowroom_num::Rational;
 use super::agenda::Todo;
 use super::here::Guess;
 use super::intake::Remark;
+use super::stand::Goals;
 use super::{Outlook, Run, Stop, Verdict};
 use crate::event::Ticket;
 use crate::planning::{PlanAnswer, Planned};
@@ -34,6 +35,8 @@ pub(super) struct Search {
     guess: Guess,
     /// With the goals that it is made for.
     task: Arc<Task>,
+    /// These goals, as they were given.
+    goals: Goals,
     /// Where it begins.
     situation: Situation,
     /// What is under way there. Tickets that were not given out when it was begun are those of
@@ -173,6 +176,7 @@ impl Run<'_> {
             reason,
             guess,
             task: Arc::clone(&self.task),
+            goals: self.goals(),
             situation: fit.situation,
             running: fit.running,
             expected: fit.expected,
@@ -356,21 +360,16 @@ impl Run<'_> {
             && let Some((plan, situation, running)) = self.fitted(search, plan)
             && let Ok(mission) = self.prepare(&search.task, &plan, &situation, &running)
         {
-            self.note_plan(&plan);
-            return self.begin_mission(&mission);
+            return self.begin_with((&plan, &situation, &running), &search.goals, &mission);
+        }
+        if !is_as_expected && !search.expected.is_empty() {
+            // It continues what was never started.
+            return self.search_again(&search.reason);
         }
         let surprises = std::mem::take(&mut self.news);
-        match self.prepare(&search.task, plan, &search.situation, &search.running) {
-            Ok(mission) => {
-                self.agenda.push(Todo::Tell(surprises));
-                self.note_plan(plan);
-                self.begin_mission(&mission)
-            }
-            Err(error) => {
-                let why = error.to_string();
-                Err(Stop::Over(Verdict::NoPlan { why }))
-            }
-        }
+        self.agenda.push(Todo::Tell(surprises));
+        let begun = (plan, &search.situation, &search.running[..]);
+        self.take_up_for(&search.task, &search.goals, begun)
     }
 
     /// A plan that is there takes over from the present one when it is time for that; whether the
@@ -398,8 +397,7 @@ impl Run<'_> {
         if let Some((plan, situation, running)) = fit
             && let Ok(mission) = self.prepare(&search.task, &plan, &situation, &running)
         {
-            self.note_plan(&plan);
-            self.begin_mission(&mission)?;
+            self.begin_with((&plan, &situation, &running), &search.goals, &mission)?;
             return Ok(true);
         }
         self.search_again(&search.reason)?;

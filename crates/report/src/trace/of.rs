@@ -387,7 +387,7 @@ fn interval(interval: &Interval) -> IntervalLine {
     )
 }
 
-fn steps(plan: &TimeTriggeredPlan) -> Vec<StepLine> {
+pub(super) fn steps(plan: &TimeTriggeredPlan) -> Vec<StepLine> {
     let steps = plan.steps.iter();
     steps
         .map(|step| StepLine {

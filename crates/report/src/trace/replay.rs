@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use elbowroom_execution::run::Rested;
 use elbowroom_execution::{
     Command, Entry, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder, World,
     WorldError,
@@ -34,8 +33,8 @@ pub struct TraceError {
 pub struct Stored {
     /// The first line.
     header: Map<String, Value>,
-    /// Where the run rested, if the record begins there and not at the beginning of the run.
-    pub snapshot: Option<SnapshotLine>,
+    /// How the run stood, if the record does not begin at the beginning of the run.
+    snapshot: Option<Map<String, Value>>,
     /// The other lines. A last one that was cut off is left out.
     pub lines: Vec<Line>,
     /// Whether the last line was cut off.
@@ -84,8 +83,7 @@ impl Stored {
             let mut value: Map<String, Value> =
                 serde_json::from_str(line).map_err(|error| wrong(1, error.to_string()))?;
             value.shift_remove("event");
-            let read = serde_json::from_value(Value::Object(value));
-            snapshot = Some(read.map_err(|error| wrong(1, error.to_string()))?);
+            snapshot = Some(value);
             rest = &rest[1..];
         }
         let before = lines.len() - rest.len();
@@ -148,15 +146,22 @@ impl Stored {
         (self.first_number()..).zip(&self.lines)
     }
 
-    /// Where the run rested, if the record begins there.
+    /// Whether the record does not begin at the beginning of the run.
+    pub fn has_snapshot(&self) -> bool {
+        self.snapshot.is_some()
+    }
+
+    /// How the run stood, if the record does not begin at the beginning of the run, as a line.
     ///
     /// # Errors
-    /// When that is none of the task.
-    pub fn rested(&self, task: &Arc<Task>) -> Result<Option<Rested>, TraceError> {
-        let rested = self.snapshot.as_ref().map(|it| it.rested(task));
-        rested
-            .transpose()
-            .map_err(|message| TraceError { line: 2, message })
+    /// When it is of another kind.
+    pub fn snapshot(&self) -> Result<Option<SnapshotLine>, TraceError> {
+        let line = self.snapshot.clone().map(Value::Object);
+        let read = line.map(serde_json::from_value).transpose();
+        read.map_err(|error| TraceError {
+            line: 2,
+            message: error.to_string(),
+        })
     }
 
     /// The plan that the run began with, if it was given one: `start`, `(action …)`, duration.
@@ -287,7 +292,7 @@ impl Planner for ReplayPlanner {
     }
 }
 
-fn read_plan(
+pub(super) fn read_plan(
     steps: &[StepLine],
     task: &Task,
     situation: Option<&Situation>,
@@ -315,7 +320,10 @@ fn message(line: &ObservationLine) -> Value {
     serde_json::to_value(line).unwrap_or(Value::Null)
 }
 
-fn instantiate(name: &str, task: &Task) -> Result<elbowroom_model::ground::Action, String> {
+pub(super) fn instantiate(
+    name: &str,
+    task: &Task,
+) -> Result<elbowroom_model::ground::Action, String> {
     let mut words = name.trim_matches(['(', ')']).split_whitespace();
     let problem = task.problem();
     let schema = words.next().and_then(|word| problem.schema(word));

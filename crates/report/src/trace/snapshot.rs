@@ -1,9 +1,12 @@
-//! Where a record begins anew: a run at rest, as a line.
+//! Where a record begins anew: how a run stands, as a line.
+
+mod starts;
+mod taken_up;
 
 use std::sync::Arc;
 
-use elbowroom_execution::run::Rested;
-use elbowroom_execution::{Progression, Standstill};
+use elbowroom_execution::run::{Doing, Goals, Refusals, Stand};
+use elbowroom_execution::{Parts, Progression, Ticket};
 use elbowroom_model::Task;
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
@@ -12,15 +15,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::exact::Exact;
 
-/// The second line of a record that begins where a lasting run rested, in place of all that was
-/// recorded before: `docs/formats/journal.md`.
+pub use starts::{StartLine, UnderWayLine};
+pub use taken_up::{GoalLine, NewsLine, SituatedLine, TakenUpLine, TurnLine};
+
+/// The second line of a record that begins where a lasting run rested or took up a plan, in place of all
+/// that was recorded before: `docs/formats/journal.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SnapshotLine {
     /// The time.
     pub now: Exact,
-    /// Since when the run rests.
-    pub since: Exact,
+    /// Since when the run rests, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub since: Option<Exact>,
     /// How many actions were started.
     pub started: usize,
     /// How long making a plan is expected to take.
@@ -45,12 +52,57 @@ pub struct SnapshotLine {
     pub doubtful_facts: Vec<String>,
     /// Numbers about which reports contradict each other.
     pub doubtful_numbers: Vec<String>,
+    /// The open goals.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub goals: Vec<GoalLine>,
+    /// Whether the goals have never been other than those of the problem.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub problem_goals: bool,
+    /// Whether nothing is to be started.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub paused: bool,
+    /// How many new plans were made since the run last rested.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub replans: usize,
+    /// What the world has refused since anything else has happened, and how often.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub refused: IndexMap<String, u32>,
+    /// Until when no plan is asked for because of that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused_until: Option<Exact>,
+    /// What was started and is under way, or has not ended long ago.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub starts: Vec<StartLine>,
+    /// What is believed to be under way.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub under_way: Vec<UnderWayLine>,
+    /// The plan that is taken up, if the run does not rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<TakenUpLine>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+fn is_false(truth: &bool) -> bool {
+    !truth
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+fn is_zero(number: &usize) -> bool {
+    *number == 0
 }
 
 impl SnapshotLine {
-    /// The line of a run of this task at rest.
-    pub fn of(task: &Task, rested: &Rested) -> Self {
-        let parts = rested.belief.standstill();
+    /// The line of a run of this task. `None` if it has a plan that a line cannot have.
+    pub fn of(task: &Task, stand: &Stand) -> Option<Self> {
+        let parts = stand.belief.parts();
+        let plan = match &stand.doing {
+            Doing::Rests(_) => None,
+            Doing::TakesUp(it) => Some(TakenUpLine::of(task, it, &stand.starts)?),
+        };
+        let since = match &stand.doing {
+            Doing::Rests(since) => Some(Exact(since.clone())),
+            Doing::TakesUp(_) => None,
+        };
         let facts = (0..task.fact_count()).map(|index| {
             let truth = parts.facts.get(index).copied().unwrap_or(false);
             (task.fact_name(FactId(narrow(index))), truth)
@@ -63,13 +115,16 @@ impl SnapshotLine {
         let numbers_before = parts.values_on_arrival.iter();
         let doubtful_facts = parts.doubtful_facts.iter();
         let doubtful_numbers = parts.doubtful_values.iter();
-        Self {
+        let starts = stand.starts.iter();
+        let under_way = parts.running.iter();
+        let refused = stand.refusals.times.iter();
+        Some(Self {
             now: Exact(parts.time.clone()),
-            since: Exact(rested.since.clone()),
-            started: rested.started,
-            allowance: Exact(rested.allowance.clone()),
-            answers: rested.answers.1,
-            answers_since: Exact(rested.answers.0.clone()),
+            since,
+            started: stand.started,
+            allowance: Exact(stand.allowance.clone()),
+            answers: stand.answers.1,
+            answers_since: Exact(stand.answers.0.clone()),
             timed: parts.timed,
             group: Exact(parts.group.clone()),
             facts: facts.collect(),
@@ -84,15 +139,29 @@ impl SnapshotLine {
             doubtful_numbers: doubtful_numbers
                 .map(|fluent| task.fluent_name(*fluent))
                 .collect(),
-        }
+            goals: taken_up::goal_lines(&stand.goals),
+            problem_goals: !stand.goals.are_others,
+            paused: stand.is_paused,
+            replans: stand.replans,
+            refused: refused
+                .map(|(name, times)| (name.clone(), *times))
+                .collect(),
+            refused_until: (!stand.refusals.times.is_empty())
+                .then(|| Exact(stand.refusals.until.clone())),
+            starts: starts.map(|it| StartLine::of(task, it)).collect(),
+            under_way: under_way
+                .map(|(ticket, it)| UnderWayLine::of(*ticket, it))
+                .collect(),
+            plan,
+        })
     }
 
-    /// The run at rest. Its facts and numbers get the same places in the table of the task that they
+    /// How the run stands. Its facts and numbers get the same places in the table of the task that they
     /// had, so that whatever goes by their order is decided as it would have been.
     ///
     /// # Errors
-    /// In words, when the task has no such facts or numbers, or has others first.
-    pub fn rested(&self, task: &Arc<Task>) -> Result<Rested, String> {
+    /// In words, when the task has no such facts, numbers or actions, or has others first.
+    pub fn stand(&self, task: &Arc<Task>) -> Result<Stand, String> {
         for (index, name) in self.facts.keys().enumerate() {
             if fact(task, name)? != FactId(narrow(index)) {
                 return Err(out_of_order(name));
@@ -109,7 +178,9 @@ impl SnapshotLine {
         let value = |value: &Option<Exact>| value.as_ref().map(|it| it.0.clone());
         let facts_before = self.facts_before.iter();
         let numbers_before = self.numbers_before.iter();
-        let parts = Standstill {
+        let starts = self.starts.iter().map(|it| it.start(task));
+        let starts = starts.collect::<Result<Vec<_>, String>>()?;
+        let parts = Parts {
             time: self.now.0.clone(),
             group: self.group.0.clone(),
             facts: self.facts.values().copied().collect(),
@@ -123,13 +194,43 @@ impl SnapshotLine {
             doubtful_facts: named(&self.doubtful_facts, |name| fact(task, name))?,
             doubtful_values: named(&self.doubtful_numbers, |name| fluent(task, name))?,
             timed: self.timed,
+            running: self.under_way.iter().map(UnderWayLine::parts).collect(),
         };
-        Ok(Rested {
-            belief: Progression::at_standstill(Arc::clone(task), parts),
-            since: self.since.0.clone(),
+        let doing = match (&self.plan, &self.since) {
+            (Some(plan), _) => Doing::TakesUp(Box::new(plan.takes_up(task, &starts)?)),
+            (None, Some(since)) => Doing::Rests(since.0.clone()),
+            (None, None) => {
+                return Err("it says neither a plan nor since when there is none".to_owned());
+            }
+        };
+        let action = |ticket: Ticket| starts::action_of(&starts, ticket).cloned();
+        if let Some(unknown) = parts.running.keys().find(|it| action(**it).is_none()) {
+            return Err(format!("{unknown} is under way, and was not started"));
+        }
+        let refused = self.refused.iter();
+        Ok(Stand {
+            belief: Progression::of_parts(Arc::clone(task), parts, action),
             started: self.started,
+            starts,
             allowance: self.allowance.0.clone(),
             answers: (self.answers_since.0.clone(), self.answers),
+            replans: self.replans,
+            refusals: Refusals {
+                times: refused
+                    .map(|(name, times)| (name.clone(), *times))
+                    .collect(),
+                until: self
+                    .refused_until
+                    .as_ref()
+                    .map(|it| it.0.clone())
+                    .unwrap_or_default(),
+            },
+            goals: Goals {
+                open: taken_up::goals_of(&self.goals),
+                are_others: !self.problem_goals,
+            },
+            is_paused: self.paused,
+            doing,
         })
     }
 

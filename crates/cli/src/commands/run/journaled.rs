@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use elbowroom::execution::run::Rested;
+use elbowroom::execution::run::Stand;
 use elbowroom::execution::{
     Command, Ending, Entry, Event, Observation, Passage, Recorder, World, WorldError,
 };
@@ -51,11 +51,10 @@ impl Recorder for JournalWriter<'_> {
         }
     }
 
-    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
-        self.file.is_long() && {
-            let snapshot = SnapshotLine::of(&self.task, &rested());
-            self.file.begin_anew(&snapshot_text(&snapshot))
-        }
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        self.file.is_long()
+            && SnapshotLine::of(&self.task, &stand())
+                .is_some_and(|snapshot| self.file.begin_anew(&snapshot_text(&snapshot)))
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom::execution::Entry;
-use elbowroom::execution::run::Rested;
+use elbowroom::execution::run::Stand;
 use elbowroom::execution::{Command, Event, Recorder};
 use elbowroom::num::Rational;
 
@@ -83,7 +83,7 @@ impl Recorder for Live<'_> {
         }
     }
 
-    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
-        self.inner.begin_anew(rested)
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        self.inner.begin_anew(stand)
     }
 }

@@ -26,8 +26,10 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
         Failure::new(format!("{name}, {error}"), hint)
     })?;
     let task = Arc::new(super::task(&spec, output)?);
-    let rested = stored.rested(&task);
-    let rested = rested.map_err(|error| unreadable(error.to_string()))?;
+    let snapshot = stored.snapshot();
+    let snapshot = snapshot.map_err(|error| unreadable(error.to_string()))?;
+    let stand = snapshot.map(|it| it.stand(&task)).transpose();
+    let stand = stand.map_err(|why| unreadable(format!("line 2: {why}")))?;
     let first = if spec.has_plan {
         let first = stored.first_plan(&task);
         first.map_err(|error| unreadable(error.to_string()))?
@@ -37,7 +39,7 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
     let mut replay = Replay::new(&stored, Arc::clone(&task));
     let request = RunRequest::new(&spec, &task)
         .beginning_with(first)
-        .resting(rested)
+        .standing(stand)
         .reopened(stored.reopened())
         .planned_by(ReplayPlanner::new(&stored));
     let mut watch = AsStored(replay.interruption());

@@ -170,9 +170,11 @@ pub(in crate::commands) fn run(
     };
     let task = Arc::new(super::task(&spec, output)?);
     // Before anything else is mentioned: the table of facts is as it was.
-    let rested = stored.rested(&task);
-    let rested = rested.map_err(|error| unreadable(&name, &error.to_string()))?;
-    let now = stored.snapshot.as_ref().map(|it| it.now().clone());
+    let snapshot = stored.snapshot();
+    let snapshot = snapshot.map_err(|error| unreadable(&name, &error.to_string()))?;
+    let stand = snapshot.as_ref().map(|it| it.stand(&task)).transpose();
+    let stand = stand.map_err(|why| unreadable(&name, &format!("line 2: {why}")))?;
+    let now = snapshot.as_ref().map(|it| it.now().clone());
     let first = spec.has_plan.then(|| stored.first_plan(&task)).transpose();
     let first = first.map_err(|error| unreadable(&name, &error.to_string()))?;
     let first = first.flatten();
@@ -180,8 +182,8 @@ pub(in crate::commands) fn run(
     let interrupt = Interrupt::listen();
     let attendance = host.attend(&spec, &task, &interrupt)?;
     let aside = super::aside(arguments, &interrupt);
-    if let Some(snapshot) = &stored.snapshot {
-        attendance.begin_at_rest(snapshot);
+    if let Some(snapshot) = &snapshot {
+        attendance.begin_at(snapshot);
     }
     let kept = Kept::default();
     let believed = Believed::default();
@@ -206,7 +208,7 @@ pub(in crate::commands) fn run(
             .map_err(contradiction)?;
         let request = RunRequest::new(&spec, &task)
             .beginning_with(first)
-            .resting(rested)
+            .standing(stand)
             .reopened(stored.reopened() + usize::from(stored.is_complete()))
             .planned_by(PastPlanner::new(
                 &stored,
@@ -219,7 +221,7 @@ pub(in crate::commands) fn run(
                 replay: ReplayWorld::new(&stored, &task),
                 left: stored.lines.iter().filter(|line| is_answer(line)).count(),
                 past: Arc::clone(&past),
-                under_way: UnderWay::of(&stored),
+                under_way: UnderWay::of(&stored, snapshot.as_ref()),
                 launch: Launch {
                     command,
                     task: &task,
@@ -238,6 +240,7 @@ pub(in crate::commands) fn run(
         };
         let mut world = Attended::new(world, &attendance, &task, &interrupt, &Rational::ONE)
             .ringing(&aside.bell)
+            .under_way(under_way::open(snapshot.as_ref()))
             .once(|| past.is_over());
         let mut watch = Watch {
             inner: Stopwatch::start(&interrupt),

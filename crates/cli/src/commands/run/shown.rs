@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::execute::RunSpec;
-use elbowroom::execution::run::Rested;
+use elbowroom::execution::run::Stand;
 use elbowroom::execution::{Entry, Recorder};
 use elbowroom::model::Task;
 use elbowroom::report::trace::{Line, TraceWriter};
@@ -32,8 +32,8 @@ impl<R: Recorder> Recorder for Shown<R> {
         }
     }
 
-    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
-        self.inner.begin_anew(rested)
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        self.inner.begin_anew(stand)
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom::execute::{Embedded, Execution};
-use elbowroom::execution::run::{Rested, RunSettings};
+use elbowroom::execution::run::{Doing, RunSettings, Stand};
 use elbowroom::execution::{
     Ending, Entry, Event, Observation, Planner, PlannerAnswer, Recorder, Request, Ticket,
 };
@@ -43,8 +43,13 @@ impl Recorder for Tape<'_> {
         self.lines.push(Line::of(&self.task, entry).text());
     }
 
-    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
-        let snapshot = snapshot_text(&SnapshotLine::of(&self.task, &rested()));
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        let stand = stand();
+        if !matches!(stand.doing, Doing::Rests(_)) || !stand.goals.open.is_empty() {
+            return false;
+        }
+        let line = SnapshotLine::of(&self.task, &stand).expect("it rests");
+        let snapshot = snapshot_text(&line);
         self.beginnings.push((self.lines.len(), snapshot));
         false
     }
@@ -157,12 +162,13 @@ fn a_run_goes_on_from_where_it_rested_as_if_all_before_were_known() {
             let rest = lines[count..].join("\n");
             let stored = Stored::read(&format!("{header}\n{snapshot}\n{rest}\n")).expect("whole");
             let task = day();
-            let rested = stored.rested(&task).expect("of this task");
+            let snapshot = stored.snapshot().expect("a snapshot");
+            let rested = snapshot.map(|it| it.stand(&task).expect("of this task"));
             assert!(rested.is_some(), "the snapshot is read");
             let mut replay = Replay::new(&stored, Arc::clone(&task));
             let interruption = replay.interruption();
             execution(&task, executor)
-                .resting(rested)
+                .standing(rested)
                 .planned_by(ReplayPlanner::new(&stored))
                 .recorded_by(&mut replay)
                 .ending_when(move || interruption.load(Ordering::SeqCst))
@@ -202,8 +208,9 @@ fn a_snapshot_of_another_problem_is_refused() {
     let read = |snapshot: &str| Stored::read(&format!("{header}\n{snapshot}\n"));
     let other = snapshot.replacen("(power)", "(steam)", 1);
     let stored = read(&other).expect("it can be read");
-    let error = stored.rested(&day()).expect_err("there is no such fact");
-    assert_eq!(error.line, 2);
-    assert!(error.message.contains("no fact `(steam)`"), "{error}");
-    assert!(read(&snapshot.replacen("\"now\"", "\"then\"", 1)).is_err());
+    let line = stored.snapshot().expect("a snapshot").expect("there");
+    let error = line.stand(&day()).expect_err("there is no such fact");
+    assert!(error.contains("no fact `(steam)`"), "{error}");
+    let other = read(&snapshot.replacen("\"now\"", "\"then\"", 1)).expect("it can be read");
+    assert_eq!(other.snapshot().expect_err("it has no time").line, 2);
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use elbowroom::answers::{Halt, Watcher};
-use elbowroom::execution::run::Rested;
+use elbowroom::execution::run::Stand;
 use elbowroom::execution::{Entry, Planner, PlannerAnswer, Recorder};
 use elbowroom::model::{Situation, Task};
 use elbowroom::report::trace::{Line, ReplayPlanner, Stored};
@@ -87,9 +87,9 @@ impl Recorder for PastRecorder<'_> {
         }
     }
 
-    fn begin_anew(&mut self, rested: &dyn Fn() -> Rested) -> bool {
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
         // What the journal has is only played again until then.
-        self.past.is_over() && self.past.difference().is_none() && self.writer.begin_anew(rested)
+        self.past.is_over() && self.past.difference().is_none() && self.writer.begin_anew(stand)
     }
 }
 

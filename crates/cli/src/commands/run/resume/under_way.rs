@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use elbowroom::num::Rational;
 use elbowroom::report::trace::line::{GivenLine, ObservationLine};
-use elbowroom::report::trace::{Line, Stored};
+use elbowroom::report::trace::{Line, SnapshotLine, Stored};
 use elbowroom::report::wire;
 use serde_json::{Value, json};
 
@@ -24,12 +24,27 @@ pub(super) struct Open {
     pub(super) is_cancelled: bool,
 }
 
+/// The tickets of what was under way where the journal begins.
+pub(super) fn open(before: Option<&SnapshotLine>) -> impl Iterator<Item = u64> {
+    let starts = before.into_iter().flat_map(|it| &it.starts);
+    starts.filter(|it| it.is_open()).map(|it| it.ticket)
+}
+
 impl UnderWay {
-    pub(super) fn of(stored: &Stored) -> Self {
-        let before = stored.snapshot.as_ref().map_or(0, |it| it.started as u64);
+    pub(super) fn of(stored: &Stored, before: Option<&SnapshotLine>) -> Self {
+        let starts = before.iter().flat_map(|it| &it.starts);
+        let open = starts.filter(|it| it.is_open()).map(|it| {
+            let open = Open {
+                action: it.action.clone(),
+                is_instantaneous: it.duration.is_none(),
+                has_started: it.started.is_some(),
+                is_cancelled: it.cancelled.is_some(),
+            };
+            (it.ticket, open)
+        });
         let mut under_way = Self {
-            given: before,
-            ..Self::default()
+            given: before.map_or(0, |it| it.started as u64),
+            open: open.collect(),
         };
         for line in &stored.lines {
             match line {

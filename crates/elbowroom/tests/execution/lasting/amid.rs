@@ -1,0 +1,389 @@
+//! Records that begin anew in the middle of a run: what follows is decided as if all that was before
+//! were known.
+
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+
+use elbowroom::execute::{Embedded, Execution};
+use elbowroom::execution::run::{Doing, RunSettings, Stand};
+use elbowroom::execution::{
+    Ending, Entry, Event, Planner, PlannerAnswer, Recorder, Request, Ticket,
+};
+use elbowroom::model::{Situation, Task};
+use elbowroom::num::Rational;
+use elbowroom::pddl::{self, Source};
+use elbowroom::report::trace::{
+    Line, Replay, ReplayPlanner, ReplayWorld, SnapshotLine, Stored, snapshot_text,
+};
+
+use super::scripted::{abandon, fact, pursue};
+use crate::aside::{Beside, telling};
+
+const HEADER: &str = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
+
+/// Errands that take charge while they last, and in which what is found depends on the lamp at their
+/// start and throughout.
+const DOMAIN: &str =
+    "(define (domain errands) (:requirements :durative-actions :typing :fluents :conditional-effects)
+    (:types robot item)
+    (:predicates (free ?r - robot) (here ?x - item) (have ?x - item) (power) (lamp) (seen ?x - item)
+      (quiet))
+    (:functions (charge))
+    (:durative-action fetch :parameters (?r - robot ?x - item) :duration (= ?duration 10)
+      :condition (and (at start (free ?r)) (at start (here ?x)) (at start (>= (charge) 1))
+        (over all (power)))
+      :effect (and (at start (not (free ?r))) (at end (free ?r)) (at end (have ?x))
+        (when (at start (lamp)) (at end (seen ?x)))
+        (when (over all (quiet)) (at end (here ?x))))))";
+
+fn task(init: &str) -> Arc<Task> {
+    let problem = format!(
+        "(define (problem day) (:domain errands)
+           (:objects r s - robot book cup key pen map - item)
+           (:init (free r) (here book) (here cup) (here key) (here pen) (here map)
+             (power) (= (charge) 9) (quiet) {init})
+           (:goal (have book)))"
+    );
+    let source = |text: &str| Source::new("test", text);
+    let read = pddl::read_problem(&source(DOMAIN), &source(&problem));
+    Arc::new(Task::new(read.expect("a correct test").0))
+}
+
+/// Numbers that look random.
+#[derive(Clone)]
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, limit: u64) -> u64 {
+        let factor = 6_364_136_223_846_793_005;
+        self.0 = self.0.wrapping_mul(factor).wrapping_add(1_442_695);
+        (self.0 >> 33) % limit
+    }
+
+    fn small(&mut self, limit: u64) -> i64 {
+        i64::try_from(self.below(limit)).expect("small")
+    }
+}
+
+const ITEMS: [&str; 5] = ["book", "cup", "key", "pen", "map"];
+
+/// What people ask, what others do, and reports on what is long over, never was, or comes to something
+/// else than was said.
+fn script(task: &Task, dice: &mut Dice) -> Vec<(Rational, Event)> {
+    let fluent = task.fluent_named("(charge)").expect("a correct test");
+    let mut script = Vec::new();
+    for _ in 0..70 {
+        let item = ITEMS[usize::try_from(dice.below(5)).expect("small")];
+        let ticket = Ticket(dice.below(12));
+        let event = match dice.below(20) {
+            0..=7 => pursue(item, &format!("(have {item})")),
+            8 => abandon(item),
+            9 | 10 => fact(task, &format!("(have {item})"), false),
+            11 => fact(task, &format!("(here {item})"), dice.below(4) > 0),
+            12 => fact(task, "(lamp)", dice.below(2) > 0),
+            13 => fact(task, "(quiet)", dice.below(2) > 0),
+            14 => fact(task, "(power)", dice.below(4) > 0),
+            15 => Event::Value {
+                fluent,
+                value: Rational::from(dice.small(4)),
+            },
+            16 => Event::Ended {
+                ticket,
+                ending: Ending::Failed {
+                    why: "so they say".to_owned(),
+                },
+                measured: Vec::new(),
+            },
+            17 => Event::Feedback {
+                ticket,
+                completion: None,
+                note: "under way".to_owned(),
+            },
+            18 => Event::Asked(Request::Pause),
+            _ => Event::Asked(Request::Resume),
+        };
+        script.push((Rational::new(dice.small(2400), 10), event));
+    }
+    script.push((Rational::from(241), Event::Asked(Request::Resume)));
+    script
+}
+
+/// The embedded planner, whose plans take a while by the world's clock.
+struct Slow(u64);
+
+impl Planner for Slow {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        self.0 += 1;
+        let tenths = i64::try_from(self.0 % 7).expect("a small number");
+        PlannerAnswer {
+            seconds: Some(Rational::new(tenths, 10)),
+            ..Embedded::default().plan(task, situation)
+        }
+    }
+}
+
+/// A part of a record, with the snapshot that it begins with.
+#[derive(Default)]
+struct Segment {
+    snapshot: Option<String>,
+    lines: Vec<String>,
+}
+
+/// Begins anew at some of the moments at which it can.
+struct Rotating {
+    task: Arc<Task>,
+    segments: Arc<Mutex<Vec<Segment>>>,
+    /// How likely, and by which dice.
+    percent: u64,
+    dice: Dice,
+}
+
+impl Recorder for Rotating {
+    fn record(&mut self, entry: &Entry<'_>) {
+        let mut segments = self.segments.lock().expect("not poisoned");
+        let last = segments.last_mut().expect("there is one");
+        last.lines.push(Line::of(&self.task, entry).text());
+    }
+
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        // It is asked all the time as long as it rests.
+        let is_at_rest = matches!(stand().doing, Doing::Rests(_));
+        if self.dice.below(100) >= self.percent || (is_at_rest && self.dice.below(6) > 0) {
+            return false;
+        }
+        let snapshot = SnapshotLine::of(&self.task, &stand());
+        let Some(snapshot) = snapshot else {
+            return false;
+        };
+        self.segments.lock().expect("not poisoned").push(Segment {
+            snapshot: Some(snapshot_text(&snapshot)),
+            lines: Vec::new(),
+        });
+        true
+    }
+}
+
+/// A run by a random script.
+#[derive(Clone, Copy, Debug)]
+struct Case {
+    executor: &'static str,
+    seed: u64,
+    is_aside: bool,
+}
+
+impl Case {
+    fn task(self) -> Arc<Task> {
+        let init = [
+            "(free s)",
+            "(lamp)",
+            "(free s) (lamp)",
+            "(free s) (at 90 (not (power))) (at 130 (power))",
+        ];
+        task(init[usize::try_from(self.seed / 2 % 4).expect("small")])
+    }
+
+    fn execution<'a>(self, task: &Arc<Task>) -> Execution<'a> {
+        Execution::of(task)
+            .by(self.executor.parse().expect("a registered one"))
+            .with_settings(RunSettings {
+                plans_aside: self.is_aside,
+                watches_room: self.is_aside,
+                ..RunSettings::default()
+            })
+            .lasting(true)
+            .explaining()
+    }
+
+    /// Its record, which begins anew at so many of a hundred moments at which it can.
+    fn recorded(self, percent: u64) -> Vec<Segment> {
+        let task = self.task();
+        let dice = &mut Dice(self.seed);
+        let script = script(&task, dice);
+        let lengths: Vec<Rational> = (0..12).map(|_| Rational::new(dice.small(60), 10)).collect();
+        let quarters: Vec<i64> = (0..7).map(|_| dice.small(3) - 1).collect();
+        let planner = Beside::taking(&lengths);
+        let (mut world, is_to_end) = telling((300, script), &planner, &quarters);
+        let segments = Arc::new(Mutex::new(vec![Segment::default()]));
+        let recorder = Rotating {
+            task: Arc::clone(&task),
+            segments: Arc::clone(&segments),
+            percent,
+            dice: dice.clone(),
+        };
+        let execution = self.execution(&task);
+        let execution = if self.is_aside {
+            execution.planned_by(planner)
+        } else {
+            execution.planned_by(Slow(self.seed))
+        };
+        execution
+            .recorded_by(recorder)
+            .ending_when(move || is_to_end.load(Ordering::SeqCst))
+            .run_in(&mut world);
+        std::mem::take(&mut *segments.lock().expect("not poisoned"))
+    }
+
+    /// Plays a segment, or its beginning, and says how much came out as it did, and the first line that
+    /// did not.
+    fn played(self, segment: &Segment, lines: &[String]) -> (usize, Option<String>) {
+        let snapshot = segment.snapshot.as_ref();
+        let all = [HEADER].into_iter();
+        let all = all.chain(snapshot.map(String::as_str));
+        let all: Vec<&str> = all.chain(lines.iter().map(String::as_str)).collect();
+        let stored = Stored::read(&format!("{}\n", all.join("\n"))).expect("whole");
+        let task = self.task();
+        let line = stored.snapshot().expect("a snapshot");
+        let stand = line.map(|it| it.stand(&task).expect("of this task"));
+        assert_eq!(stand.is_some(), snapshot.is_some());
+        let mut replay = Replay::new(&stored, Arc::clone(&task));
+        let interruption = replay.interruption();
+        self.execution(&task)
+            .standing(stand)
+            .planned_by(ReplayPlanner::new(&stored))
+            .recorded_by(&mut replay)
+            .ending_when(move || interruption.load(Ordering::SeqCst))
+            .run_in(&mut ReplayWorld::new(&stored, &task));
+        let (agreed, difference) = replay.outcome();
+        let difference = difference.map(|it| format!("{it:#?}"));
+        (agreed, difference)
+    }
+}
+
+/// A line without what depends on how far the record reaches back.
+fn plain(line: &str) -> Line {
+    let mut line: Line = serde_json::from_str(line).expect("a line");
+    match &mut line {
+        Line::Resting(resting) => resting.dead_end.clear(),
+        Line::Over(report) => {
+            report.executed.clear();
+            report.reasons.clear();
+        }
+        _ => {}
+    }
+    line
+}
+
+fn cases() -> impl Iterator<Item = Case> {
+    let executors = [
+        "guarded",
+        "live",
+        "stn",
+        "fixed(50)",
+        "adaptable",
+        "esterel",
+    ];
+    (0..36).map(move |seed| Case {
+        executor: executors[usize::try_from(seed % 6).expect("small")],
+        seed,
+        is_aside: seed % 4 != 0,
+    })
+}
+
+/// Whether a record begins anew, and when, changes nothing of what is done; and each of its segments
+/// alone leads to the same decisions, down to the words, wherever it is cut off.
+#[test]
+fn a_record_that_begins_anew_in_the_middle_of_a_run_leads_to_the_same_decisions() {
+    let (mut taken_up, mut resting, mut under_way, mut with_news, mut turning) = (0, 0, 0, 0, 0);
+    for case in cases() {
+        let whole = case.recorded(0);
+        assert_eq!(whole.len(), 1);
+        for percent in [100, 30] {
+            let segments = case.recorded(percent);
+            let lines = segments.iter().flat_map(|it| &it.lines);
+            let (mut place, mut same) = (0, whole[0].lines.iter());
+            for line in lines {
+                let other = same.next().map(|it| plain(it));
+                assert_eq!(Some(plain(line)), other, "{case:?}, line {place}");
+                place += 1;
+            }
+            assert_eq!(same.next(), None, "{case:?}");
+            let dice = &mut Dice(case.seed + percent);
+            for (number, segment) in segments.iter().enumerate() {
+                let count = segment.lines.len();
+                let cut = usize::try_from(dice.below(count as u64 + 1)).expect("small");
+                let cut = if dice.below(4) == 0 { cut.min(1) } else { cut };
+                for lines in [count, cut] {
+                    let (agreed, difference) = case.played(segment, &segment.lines[..lines]);
+                    assert_eq!(
+                        (agreed, difference.as_deref()),
+                        (lines, None),
+                        "{case:?}, segment {number} of {}: {:?}",
+                        segments.len(),
+                        segment.snapshot
+                    );
+                }
+                let snapshot = segment.snapshot.as_deref().unwrap_or_default();
+                taken_up += usize::from(snapshot.contains("\"plan\":{"));
+                resting += usize::from(snapshot.contains("\"since\":"));
+                under_way += usize::from(snapshot.contains("\"under_way\":["));
+                with_news += usize::from(snapshot.contains("\"news\":["));
+                turning += usize::from(snapshot.contains("\"turn\":{"));
+            }
+        }
+    }
+    let counts = (taken_up, resting, under_way, with_news, turning);
+    assert!(
+        taken_up > 300 && resting > 100 && under_way > 60 && with_news > 2 && turning > 5,
+        "{counts:?}"
+    );
+}
+
+/// A snapshot that a run of this problem cannot have been at is refused, in words.
+#[test]
+fn a_snapshot_that_does_not_fit_is_refused() {
+    let case = Case {
+        executor: "stn",
+        seed: 2,
+        is_aside: true,
+    };
+    let segments = case.recorded(100);
+    let mut snapshots = segments.iter().filter_map(|it| it.snapshot.as_ref());
+    let is_busy = |it: &&String| {
+        it.contains("\"plan\":{") && it.contains("\"under_way\":[") && it.contains("succeeded")
+    };
+    let busy = snapshots.find(is_busy).expect("there is one");
+    for (from, to, why) in [
+        ("(fetch ", "(carry ", "there is no action `(carry "),
+        (
+            "\"outcome\":\"succeeded\"",
+            "\"outcome\":\"so-so\"",
+            "nothing ends `so-so`",
+        ),
+        ("\"starts\":", "\"starts_once\":", "unknown field"),
+    ] {
+        assert!(busy.contains(from), "{busy}");
+        let stored = Stored::read(&format!("{HEADER}\n{}\n", busy.replace(from, to)));
+        let error = match stored.expect("a trace").snapshot() {
+            Ok(line) => line.expect("there").stand(&case.task()).expect_err(from),
+            Err(error) => error.to_string(),
+        };
+        assert!(error.contains(why), "{error}");
+    }
+}
+
+/// What a plan is taken up from stands in its snapshot.
+#[test]
+fn what_a_busy_run_knows_stands_in_its_snapshot() {
+    let case = Case {
+        executor: "stn",
+        seed: 2,
+        is_aside: true,
+    };
+    let segments = case.recorded(100);
+    let snapshots = segments.iter().filter_map(|it| it.snapshot.as_ref());
+    let mut seen = 0;
+    for snapshot in snapshots {
+        let stored = Stored::read(&format!("{HEADER}\n{snapshot}\n")).expect("whole");
+        let line = stored.snapshot().expect("a snapshot").expect("there");
+        let stand = line.stand(&case.task()).expect("of this task");
+        let Doing::TakesUp(it) = &stand.doing else {
+            continue;
+        };
+        seen += 1;
+        assert_eq!(it.running.len(), it.situation.running.len());
+        assert!(it.plan.steps.len() >= it.running.len());
+        let open = stand.starts.iter().filter(|it| it.ended.is_none());
+        assert!(open.count() >= stand.belief.running().len());
+    }
+    assert!(seen > 3, "{seen}");
+}

@@ -1,0 +1,136 @@
+//! Worlds that refuse to start something, again and again.
+
+use std::sync::atomic::Ordering;
+
+use elbowroom::execute::Execution;
+use elbowroom::execution::run::{RunSettings, Verdict};
+use elbowroom::execution::{
+    Command, Ending, Event, Observation, Passage, Request, World, WorldError,
+};
+use elbowroom::model::ground::{FactId, FluentId};
+use elbowroom::num::Rational;
+
+use crate::aside::{Beside, Telling, telling};
+use crate::lasting::scripted::{Notes, fact, pursue, task};
+
+/// That world, which starts nothing before a time.
+struct Refusing {
+    inner: Telling,
+    before: Rational,
+}
+
+impl World for Refusing {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        match command {
+            Command::Start { ticket, .. } if *now < self.before => {
+                let why = "not now".to_owned();
+                self.inner.inner.coming.push(Observation {
+                    time: now.clone(),
+                    event: Event::Ended {
+                        ticket: *ticket,
+                        ending: Ending::Failed { why },
+                        measured: Vec::new(),
+                    },
+                });
+                Ok(())
+            }
+            _ => self.inner.command(now, command),
+        }
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        self.inner.wait(until)
+    }
+
+    fn look(
+        &mut self,
+        facts: &[FactId],
+        fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        self.inner.look(facts, fluents)
+    }
+}
+
+/// The times at which something was started, what was noted, and how it ended. Nothing is started before
+/// so many tenths of a second.
+fn told(
+    tenths: i64,
+    script: Vec<(Rational, Event)>,
+    is_lasting: bool,
+    plans_aside: bool,
+) -> (Vec<f64>, Vec<String>, Verdict) {
+    let task = task("", "(have book)");
+    let planner = Beside::taking(&[Rational::ZERO]);
+    let (inner, is_to_end) = telling((300, script), &planner, &[]);
+    let mut world = Refusing {
+        inner,
+        before: Rational::new(tenths, 10),
+    };
+    let notes = Notes::default();
+    let report = Execution::of(&task)
+        .by("stn".parse().expect("a registered one"))
+        .with_settings(RunSettings {
+            plans_aside,
+            ..RunSettings::default()
+        })
+        .lasting(is_lasting)
+        .planned_by(planner)
+        .recorded_by(notes.clone())
+        .ending_when(move || is_to_end.load(Ordering::SeqCst))
+        .run_in(&mut world);
+    let notes = notes.0.lock().expect("not poisoned").clone();
+    let starts = notes.iter().filter(|it| it.contains(": start"));
+    let starts = starts.filter_map(|it| it.split(':').next()?.parse().ok());
+    (starts.collect(), notes, report.verdict)
+}
+
+/// What is refused for twenty seconds does not use up ten new plans, and what is refused once or twice is
+/// tried again at once.
+#[test]
+fn what_is_refused_again_and_again_is_tried_later_and_later() {
+    for is_lasting in [false, true] {
+        let (starts, notes, verdict) = told(200, Vec::new(), is_lasting, true);
+        let reached = verdict == Verdict::GoalReached
+            || notes.iter().any(|it| it.contains("rest: goal-reached"));
+        assert!(reached, "{verdict:?}: {notes:#?}");
+        assert!((8..=11).contains(&starts.len()), "{notes:#?}");
+        assert!(starts[1] < 0.1 && starts[2] < 0.2, "{starts:?}");
+        let waits: Vec<f64> = starts.windows(2).map(|it| it[1] - it[0]).collect();
+        let last = waits.len() - 1;
+        assert!(
+            (waits[last] - 2.0 * waits[last - 1]).abs() < 0.3,
+            "{waits:?}"
+        );
+        // Where a plan is waited for, time is the planner's.
+        let (_, _, verdict) = told(200, Vec::new(), false, false);
+        assert_eq!(verdict, Verdict::ReplanLimit);
+    }
+    // In the end it is given up all the same.
+    let (starts, notes, _) = told(10_000, Vec::new(), true, true);
+    assert!(
+        notes.iter().any(|it| it.contains("rest: replan-limit")),
+        "{notes:#?}"
+    );
+    assert!(starts[10] > 50.0, "{starts:?}");
+}
+
+/// Whatever else happens may be why it was refused: then nothing is waited for.
+#[test]
+fn patience_ends_with_whatever_else_happens() {
+    let day = task("", "(have book)");
+    let seen = vec![
+        (Rational::from(7), fact(&day, "(power)", false)),
+        (Rational::from(7), fact(&day, "(power)", true)),
+    ];
+    let asked = vec![(Rational::from(7), pursue("cup", "(have cup)"))];
+    let paused = vec![
+        (Rational::from(7), Event::Asked(Request::Pause)),
+        (Rational::from(8), Event::Asked(Request::Resume)),
+    ];
+    for (script, is_soon) in [(seen, true), (asked, true), (paused, false)] {
+        let (starts, notes, _) = told(65, script, true, true);
+        let first = starts.iter().find(|it| **it > 6.5).expect("it goes on");
+        // Plans are asked for after 6.3 seconds, and then after 12.7.
+        assert_eq!(*first < 7.5, is_soon, "{starts:?} {notes:#?}");
+    }
+}

@@ -1,0 +1,166 @@
+//! What is believed at one moment, in parts that can be written down.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use elbowroom_model::ground::{Action, Body, Condition, FactId, FluentId, Guard};
+use elbowroom_model::{RunningAction, Task};
+use elbowroom_num::{Interval, Rational};
+
+use super::{Progression, Underway, decide_guards};
+use crate::event::Ticket;
+
+/// A [`Progression`], but for its task and the actions under way in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parts {
+    /// The moment.
+    pub time: Rational,
+    /// The time of the last group of happenings.
+    pub group: Rational,
+    /// By fact: whether it is true. What is not listed is false.
+    pub facts: Vec<bool>,
+    /// By fluent: its value, if it has one. What is not listed has none.
+    pub values: Vec<Option<Rational>>,
+    /// What the facts that have changed in that group were on arrival.
+    pub facts_on_arrival: BTreeMap<FactId, bool>,
+    /// The values on arrival, likewise.
+    pub values_on_arrival: BTreeMap<FluentId, Option<Rational>>,
+    /// Facts about which reports contradict each other.
+    pub doubtful_facts: BTreeSet<FactId>,
+    /// Fluents about which reports contradict each other.
+    pub doubtful_values: BTreeSet<FluentId>,
+    /// How many groups of timed initials have happened.
+    pub timed: usize,
+    /// What is under way.
+    pub running: BTreeMap<Ticket, UnderwayParts>,
+}
+
+/// An [`Underway`], but for its action.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnderwayParts {
+    /// The time at which it started.
+    pub start: Rational,
+    /// The planned duration.
+    pub planned: Rational,
+    /// What is decided of its guards.
+    pub guards: Guards,
+    /// The conjuncts of the over-all condition that have not held at some moment since the start.
+    pub broken: BTreeSet<usize>,
+}
+
+/// Which conditional effects of an action under way can still take place.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Guards {
+    /// By end effect.
+    pub at_end: Vec<bool>,
+    /// By continuous effect.
+    pub continuous: Vec<bool>,
+}
+
+impl Progression {
+    /// The parts of what is believed.
+    pub fn parts(&self) -> Parts {
+        let running = self.running.iter().map(|(ticket, underway)| {
+            let parts = UnderwayParts {
+                start: underway.start.clone(),
+                planned: underway.planned.clone(),
+                guards: Guards {
+                    at_end: underway.end_guards.clone(),
+                    continuous: underway.continuous.clone(),
+                },
+                broken: underway.broken.clone(),
+            };
+            (*ticket, parts)
+        });
+        Parts {
+            time: self.time.clone(),
+            group: self.group.clone(),
+            facts: self.facts.clone(),
+            values: self.values.clone(),
+            facts_on_arrival: self.facts_on_arrival.clone(),
+            values_on_arrival: self.values_on_arrival.clone(),
+            doubtful_facts: self.doubtful_facts.clone(),
+            doubtful_values: self.doubtful_values.clone(),
+            timed: self.timed,
+            running: running.collect(),
+        }
+    }
+
+    /// What is believed, of these parts. `action` says which action a ticket is of; what has none is
+    /// left out.
+    pub fn of_parts(
+        task: Arc<Task>,
+        parts: Parts,
+        action: impl Fn(Ticket) -> Option<Arc<Action>>,
+    ) -> Self {
+        let running = parts.running.into_iter().filter_map(|(ticket, parts)| {
+            let underway = Underway {
+                action: action(ticket)?,
+                start: parts.start,
+                planned: parts.planned,
+                end_guards: parts.guards.at_end,
+                continuous: parts.guards.continuous,
+                broken: parts.broken,
+            };
+            Some((ticket, underway))
+        });
+        Self {
+            running: running.collect(),
+            task,
+            time: parts.time,
+            facts: parts.facts,
+            values: parts.values,
+            group: parts.group,
+            facts_on_arrival: parts.facts_on_arrival,
+            values_on_arrival: parts.values_on_arrival,
+            doubtful_facts: parts.doubtful_facts,
+            doubtful_values: parts.doubtful_values,
+            timed: parts.timed,
+        }
+    }
+}
+
+impl Guards {
+    /// What was decided of an action's guards where it is this running action. `None` if it is none of
+    /// the action.
+    pub fn of(action: &Action, running: &RunningAction) -> Option<Self> {
+        let (whole, left) = (action.durative()?, running.action.durative()?);
+        let at_end = whole.end.effects.iter().cloned().map(|mut effect| {
+            undecided(&mut effect.guard);
+            effect
+        });
+        let continuous = whole.continuous.iter().cloned().map(|mut effect| {
+            undecided(&mut effect.guard);
+            effect
+        });
+        Some(Self {
+            at_end: which(at_end, &left.end.effects)?,
+            continuous: which(continuous, &left.continuous)?,
+        })
+    }
+
+    /// The running action of this action.
+    pub fn running(&self, action: &Action, start: Rational, duration: Interval) -> RunningAction {
+        let mut action = action.clone();
+        if let Body::Durative(body) = &mut action.body {
+            decide_guards(body, &self.at_end, &self.continuous);
+        }
+        RunningAction {
+            action: Arc::new(action),
+            start,
+            duration,
+        }
+    }
+}
+
+fn undecided(guard: &mut Guard) {
+    guard.at_start = Condition::TRUE;
+}
+
+/// Which of all are left, in their order; `None` if there are others.
+fn which<T: PartialEq>(all: impl Iterator<Item = T>, left: &[T]) -> Option<Vec<bool>> {
+    let mut left = left.iter().peekable();
+    let is_left = all.map(|it| left.next_if(|next| **next == it).is_some());
+    let is_left: Vec<bool> = is_left.collect();
+    left.next().is_none().then_some(is_left)
+}

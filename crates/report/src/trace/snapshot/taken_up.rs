@@ -1,0 +1,216 @@
+//! A plan that is taken up, in a snapshot.
+
+use elbowroom_execution::run::{Goals, KnownStart, TakesUp};
+use elbowroom_execution::{Guards, News, Ticket};
+use elbowroom_model::{RunningAction, Situation, State, Task};
+use elbowroom_num::Interval;
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+
+use super::super::line::StepLine;
+use super::super::of::steps;
+use super::super::replay::read_plan;
+use super::starts::{action_of, exact};
+use super::{fact, fluent};
+use crate::exact::Exact;
+
+/// A plan that is taken up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TakenUpLine {
+    /// Its actions, on the world's clock; those under way come first.
+    pub steps: Vec<StepLine>,
+    /// The time from which on it is.
+    pub time: Exact,
+    /// The facts that are true there.
+    pub facts: Vec<String>,
+    /// The numbers there.
+    pub numbers: IndexMap<String, Exact>,
+    /// What is under way there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub under_way: Vec<SituatedLine>,
+    /// The goals that it is for.
+    pub goals: Vec<GoalLine>,
+    /// Whether these are those of the problem.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub problem_goals: bool,
+    /// What it does not know of.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub news: Vec<NewsLine>,
+    /// How the goals have changed since it was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turn: Option<TurnLine>,
+}
+
+/// Something under way where a plan begins.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SituatedLine {
+    /// Which start it is.
+    pub ticket: u64,
+    /// When it started.
+    pub start: Exact,
+    /// How long it is expected to take.
+    pub duration: Exact,
+    /// By end effect of the action: whether it can still take place.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub end_effects: Vec<bool>,
+    /// By continuous effect: whether it is at work.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub continuous: Vec<bool>,
+}
+
+/// A goal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GoalLine {
+    /// Its name.
+    pub name: String,
+    /// As it was given; none if it is that of the problem.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub goal: Option<String>,
+}
+
+/// Something that a plan does not know of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NewsLine {
+    /// A fact is not as believed.
+    Fact(String),
+    /// A number is not as believed.
+    Number(String),
+    /// Reports on this action contradict each other.
+    Contradiction(String),
+}
+
+/// A change of the goals.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TurnLine {
+    /// In words.
+    pub words: String,
+    /// Whether they have only become more.
+    pub only_more: bool,
+}
+
+pub(super) fn goal_lines(goals: &Goals) -> Vec<GoalLine> {
+    let lines = goals.open.iter().map(|(name, goal)| GoalLine {
+        name: name.clone(),
+        goal: goal.clone(),
+    });
+    lines.collect()
+}
+
+pub(super) fn goals_of(lines: &[GoalLine]) -> Vec<(String, Option<String>)> {
+    let goals = lines.iter().map(|it| (it.name.clone(), it.goal.clone()));
+    goals.collect()
+}
+
+impl TakenUpLine {
+    pub(super) fn of(task: &Task, it: &TakesUp, starts: &[KnownStart]) -> Option<Self> {
+        let state = &it.situation.state;
+        let under_way = it.situation.running.iter().zip(&it.running);
+        let numbers = state.values.iter();
+        Some(Self {
+            steps: steps(&it.plan),
+            time: exact(&it.situation.time),
+            facts: state.facts.iter().map(|it| task.fact_name(*it)).collect(),
+            numbers: numbers
+                .map(|(fluent, value)| (task.fluent_name(*fluent), exact(value)))
+                .collect(),
+            under_way: under_way
+                .map(|(running, ticket)| SituatedLine::of(running, *ticket, starts))
+                .collect::<Option<_>>()?,
+            goals: goal_lines(&it.goals),
+            problem_goals: !it.goals.are_others,
+            news: it
+                .news
+                .iter()
+                .map(|it| NewsLine::of(task, it))
+                .collect::<Option<_>>()?,
+            turn: it
+                .turn
+                .clone()
+                .map(|(words, only_more)| TurnLine { words, only_more }),
+        })
+    }
+
+    pub(super) fn takes_up(&self, task: &Task, starts: &[KnownStart]) -> Result<TakesUp, String> {
+        let facts = self.facts.iter().map(|name| fact(task, name));
+        let values = self.numbers.iter();
+        let values = values.map(|(name, value)| Ok((fluent(task, name)?, value.0.clone())));
+        let running = self.under_way.iter().map(|it| it.running(starts));
+        let situation = Situation {
+            time: self.time.0.clone(),
+            state: State {
+                facts: facts.collect::<Result<_, _>>()?,
+                values: values.collect::<Result<_, String>>()?,
+            },
+            running: running.collect::<Result<_, _>>()?,
+        };
+        let plan = read_plan(&self.steps, task, Some(&situation), 2);
+        let news = self.news.iter().map(|it| it.news(task));
+        Ok(TakesUp {
+            plan: plan.map_err(|error| error.message)?,
+            situation,
+            running: self.under_way.iter().map(|it| Ticket(it.ticket)).collect(),
+            goals: Goals {
+                open: goals_of(&self.goals),
+                are_others: !self.problem_goals,
+            },
+            news: news.collect::<Result<_, _>>()?,
+            turn: self.turn.clone().map(|it| (it.words, it.only_more)),
+        })
+    }
+}
+
+impl SituatedLine {
+    fn of(running: &RunningAction, ticket: Ticket, starts: &[KnownStart]) -> Option<Self> {
+        let guards = Guards::of(action_of(starts, ticket)?, running)?;
+        let duration = running.duration.lower.value()?;
+        let is_point = running.duration == Interval::point(duration.clone());
+        is_point.then(|| Self {
+            ticket: ticket.0,
+            start: exact(&running.start),
+            duration: exact(duration),
+            end_effects: guards.at_end,
+            continuous: guards.continuous,
+        })
+    }
+
+    fn running(&self, starts: &[KnownStart]) -> Result<RunningAction, String> {
+        let ticket = Ticket(self.ticket);
+        let action = action_of(starts, ticket);
+        let action = action
+            .ok_or_else(|| format!("the plan goes on with {ticket}, which was not started"))?;
+        let guards = Guards {
+            at_end: self.end_effects.clone(),
+            continuous: self.continuous.clone(),
+        };
+        let duration = Interval::point(self.duration.0.clone());
+        Ok(guards.running(action, self.start.0.clone(), duration))
+    }
+}
+
+impl NewsLine {
+    fn of(task: &Task, news: &News) -> Option<Self> {
+        match news {
+            News::Fact(fact) => Some(Self::Fact(task.fact_name(*fact))),
+            News::Value(fluent) => Some(Self::Number(task.fluent_name(*fluent))),
+            News::Contradiction { action } => Some(Self::Contradiction(action.clone())),
+            // What concerns steps of a plan means nothing to another one.
+            News::Started { .. } | News::Ended { .. } | News::Silence { .. } => None,
+        }
+    }
+
+    fn news(&self, task: &Task) -> Result<News, String> {
+        Ok(match self {
+            Self::Fact(name) => News::Fact(fact(task, name)?),
+            Self::Number(name) => News::Value(fluent(task, name)?),
+            Self::Contradiction(action) => {
+                let action = action.clone();
+                News::Contradiction { action }
+            }
+        })
+    }
+}
