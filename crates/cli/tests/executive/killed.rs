@@ -246,7 +246,7 @@ fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
     let under_way = sum(|it| it.under_way);
     println!(
         "{count} executives, killed {kills} times; their journals were begun anew {at_rest} times at rest, and \
-         {amid} times with a plan, {under_way} of these with something under way"
+         {amid} times with a plan; {under_way} times, something was under way"
     );
     assert!(amid > 0, "no journal was begun anew amid a run");
 }
