@@ -177,7 +177,8 @@ impl<'a> Refiner<'a> {
     /// How long it should take for each unit of time of another search.
     pub(crate) fn share(&self) -> u64 {
         let tuning = &self.compiled.tuning;
-        if self.fruitless < tuning.refining_patience {
+        let spent = self.work.rescheduling.saturating_add(self.work.repair);
+        if spent >= tuning.refining_share_after && self.fruitless < tuning.refining_patience {
             tuning.refining_share
         } else {
             tuning.refining_share_later
