@@ -49,3 +49,34 @@ impl Queue {
         entry
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Queue, Step};
+
+    fn filled() -> Queue {
+        let mut queue = Queue::default();
+        for (rank, parent) in [(2, 9), (1, 0), (1, 1), (1, 2), (1, 3)] {
+            queue.push(rank, parent, Step::Timed);
+        }
+        queue
+    }
+
+    fn parents(mut next: impl FnMut() -> Option<(u32, Step)>) -> Vec<u32> {
+        std::iter::from_fn(|| Some(next()?.0)).collect()
+    }
+
+    #[test]
+    fn the_lowest_rank_is_first_and_of_one_rank_who_came_first() {
+        let mut queue = filled();
+        assert_eq!(parents(|| queue.pop()), [0, 1, 2, 3, 9]);
+        assert!(queue.is_empty());
+    }
+
+    #[test]
+    fn the_newest_and_the_oldest_of_the_lowest_rank_take_turns() {
+        let mut queue = filled();
+        assert_eq!(parents(|| queue.pop_alternately()), [3, 0, 2, 1, 9]);
+        assert!(queue.is_empty());
+    }
+}
