@@ -215,7 +215,7 @@ fn run(job: &Job, options: &Options) -> Row {
         Ok((problem, _)) => Task::new(problem),
         Err(errors) => {
             let first = errors.errors().next().map(ToString::to_string);
-            return outcome(row, "not read", first.unwrap_or_default());
+            return outcome(row, "not read", without_folders(&first.unwrap_or_default()));
         }
     };
     let planner = match planner(&row.planner) {
@@ -322,7 +322,16 @@ fn filled(row: Row, report: &Report) -> Row {
             .unwrap_or_default(),
         seconds: seconds(statistics.work),
         megabytes: (statistics.peak_memory >> 20).to_string(),
-        note: note.chars().take(300).collect(),
+        note: without_folders(&note).chars().take(300).collect(),
         ..row
     }
+}
+
+/// A message in which absolute paths are names of files: where they lie is of no interest elsewhere.
+fn without_folders(message: &str) -> String {
+    let words = message.split(' ').map(|word| match word.rsplit_once('/') {
+        Some((_, name)) if word.starts_with('/') && !name.is_empty() => name,
+        _ => word,
+    });
+    words.collect::<Vec<_>>().join(" ")
 }
