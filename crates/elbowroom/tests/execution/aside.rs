@@ -16,7 +16,7 @@ use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan, problem};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, Replay, ReplayPlanner, ReplayWorld, Stored};
 
-use crate::lasting::scripted::{Notes, Scripted, abandon, fact, pursue, task};
+use crate::lasting::scripted::{Dice, Notes, Scripted, abandon, fact, pursue, task};
 
 /// A planner that works beside the run.
 #[derive(Clone, Default)]
@@ -474,21 +474,6 @@ fn a_plan_that_is_outdated_when_it_comes_is_made_again() {
         ],
     );
     assert_eq!(told.report.starts, 3, "{:#?}", told.notes);
-}
-
-/// Numbers that look random.
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, limit: u64) -> u64 {
-        let factor = 6_364_136_223_846_793_005;
-        self.0 = self.0.wrapping_mul(factor).wrapping_add(1_442_695);
-        (self.0 >> 33) % limit
-    }
-
-    fn small(&mut self, limit: u64) -> i64 {
-        i64::try_from(self.below(limit)).expect("small")
-    }
 }
 
 const ITEMS: [&str; 3] = ["book", "cup", "key"];

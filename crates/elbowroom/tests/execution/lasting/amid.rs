@@ -4,19 +4,17 @@
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-use elbowroom::execute::{Embedded, Execution};
+use elbowroom::execute::Execution;
 use elbowroom::execution::run::{Doing, RunSettings, Stand};
-use elbowroom::execution::{
-    Ending, Entry, Event, Planner, PlannerAnswer, Recorder, Request, Ticket,
-};
-use elbowroom::model::{Situation, Task};
+use elbowroom::execution::{Ending, Entry, Event, Recorder, Request, Ticket};
+use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use elbowroom::report::trace::{
     Line, Replay, ReplayPlanner, ReplayWorld, SnapshotLine, Stored, snapshot_text,
 };
 
-use super::scripted::{abandon, fact, pursue};
+use super::scripted::{Dice, Slow, abandon, fact, pursue};
 use crate::aside::{Beside, telling};
 
 const HEADER: &str = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
@@ -47,22 +45,6 @@ fn task(init: &str) -> Arc<Task> {
     let source = |text: &str| Source::new("test", text);
     let read = pddl::read_problem(&source(DOMAIN), &source(&problem));
     Arc::new(Task::new(read.expect("a correct test").0))
-}
-
-/// Numbers that look random.
-#[derive(Clone)]
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, limit: u64) -> u64 {
-        let factor = 6_364_136_223_846_793_005;
-        self.0 = self.0.wrapping_mul(factor).wrapping_add(1_442_695);
-        (self.0 >> 33) % limit
-    }
-
-    fn small(&mut self, limit: u64) -> i64 {
-        i64::try_from(self.below(limit)).expect("small")
-    }
 }
 
 const ITEMS: [&str; 5] = ["book", "cup", "key", "pen", "map"];
@@ -106,20 +88,6 @@ fn script(task: &Task, dice: &mut Dice) -> Vec<(Rational, Event)> {
     }
     script.push((Rational::from(241), Event::Asked(Request::Resume)));
     script
-}
-
-/// The embedded planner, whose plans take a while by the world's clock.
-struct Slow(u64);
-
-impl Planner for Slow {
-    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        self.0 += 1;
-        let tenths = i64::try_from(self.0 % 7).expect("a small number");
-        PlannerAnswer {
-            seconds: Some(Rational::new(tenths, 10)),
-            ..Embedded::default().plan(task, situation)
-        }
-    }
 }
 
 /// A part of a record, with the snapshot that it begins with.

@@ -4,32 +4,16 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use elbowroom::execute::{Embedded, Execution};
+use elbowroom::execute::Execution;
 use elbowroom::execution::run::{Doing, RunSettings, Stand};
-use elbowroom::execution::{
-    Ending, Entry, Event, Observation, Planner, PlannerAnswer, Recorder, Request, Ticket,
-};
-use elbowroom::model::{Situation, Task};
+use elbowroom::execution::{Ending, Entry, Event, Observation, Recorder, Request, Ticket};
+use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{
     Line, Replay, ReplayPlanner, ReplayWorld, SnapshotLine, Stored, snapshot_text,
 };
 
-use super::scripted::{Scripted, abandon, fact, pursue, task};
-
-/// The embedded planner, whose plans take a while by the world's clock.
-struct Slow(u64);
-
-impl Planner for Slow {
-    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        self.0 += 1;
-        let tenths = i64::try_from(self.0 % 7).expect("a small number");
-        PlannerAnswer {
-            seconds: Some(Rational::new(tenths, 10)),
-            ..Embedded::default().plan(task, situation)
-        }
-    }
-}
+use super::scripted::{Dice, Scripted, Slow, abandon, fact, pursue, task};
 
 /// The lines of a run's record, and after how many of them it could have begun anew, with what.
 struct Tape<'a> {
@@ -52,17 +36,6 @@ impl Recorder for Tape<'_> {
         let snapshot = snapshot_text(&line);
         self.beginnings.push((self.lines.len(), snapshot));
         false
-    }
-}
-
-/// Numbers that look random.
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, limit: u64) -> u64 {
-        let factor = 6_364_136_223_846_793_005;
-        self.0 = self.0.wrapping_mul(factor).wrapping_add(1_442_695);
-        (self.0 >> 33) % limit
     }
 }
 

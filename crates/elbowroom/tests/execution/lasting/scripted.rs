@@ -277,3 +277,33 @@ pub(super) fn assert_has(told: &Told, notes: &[&str]) {
         assert!(found, "no `{note}` in its place in {:#?}", told.notes);
     }
 }
+
+/// Numbers that look random.
+#[derive(Clone)]
+pub(crate) struct Dice(pub(crate) u64);
+
+impl Dice {
+    pub(crate) fn below(&mut self, limit: u64) -> u64 {
+        let factor = 6_364_136_223_846_793_005;
+        self.0 = self.0.wrapping_mul(factor).wrapping_add(1_442_695);
+        (self.0 >> 33) % limit
+    }
+
+    pub(crate) fn small(&mut self, limit: u64) -> i64 {
+        i64::try_from(self.below(limit)).expect("small")
+    }
+}
+
+/// The embedded planner, whose plans take a while by the world's clock.
+pub(super) struct Slow(pub(super) u64);
+
+impl Planner for Slow {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        self.0 += 1;
+        let tenths = i64::try_from(self.0 % 7).expect("a small number");
+        PlannerAnswer {
+            seconds: Some(Rational::new(tenths, 10)),
+            ..Embedded::default().plan(task, situation)
+        }
+    }
+}
