@@ -45,6 +45,17 @@ fn options_of_run_that_could_do_nothing_are_refused() {
             "cannot be used with",
         ),
         (&["--answer-within", "3"], "--world-process"),
+        // Only a world that is a program outlives the run; a simulated one had no journal, silently.
+        (
+            &["--journal", "j", "--world", "cases/delivery/world.toml"],
+            "cannot be used with",
+        ),
+        (&["--journal", "j"], "--world-process"),
+        (
+            &["--spoil", "{dur_0: [9, 11]}", "--world-process", "cat"],
+            "cannot be used with",
+        ),
+        (&["--spoil", "{dur_0: [9, 11]}"], "--world"),
         (&["--realtime", "1e-30"], "between 0.000001"),
         (&["--planning-time", "soon"], "--planning-time 2.5"),
     ] {

@@ -55,7 +55,13 @@ pub(crate) struct RunArgs {
     pub(crate) world: Option<PathBuf>,
     /// The box from which the spoiler chooses durations, as in `envelope --contains`; by default
     /// the plan's envelope
-    #[arg(long, value_name = "BOX", requires = "world")]
+    // What a given argument conflicts with, clap does not ask for: the conflict has to be named here, too.
+    #[arg(
+        long,
+        value_name = "BOX",
+        requires = "world",
+        conflicts_with = "world_process"
+    )]
     pub(crate) spoil: Option<String>,
     /// A program that is the world and speaks JSON Lines (docs/formats/world-protocol.md)
     #[arg(long, value_name = "COMMAND", conflicts_with = "world")]
@@ -138,12 +144,13 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "FILE.mcap", conflicts_with = "replay")]
     pub(crate) mcap: Option<PathBuf>,
     /// Write a journal of the run to this file (docs/formats/journal.md): a trace that survives a
-    /// crash. Nothing is started that is not on the disk
+    /// crash. Nothing is started that is not on the disk. A simulated world ends with the program
+    /// and has none
     #[arg(
         long,
         value_name = "FILE",
         requires = "world_process",
-        conflicts_with = "trace"
+        conflicts_with_all = ["trace", "world"]
     )]
     pub(crate) journal: Option<PathBuf>,
     /// Show the page of `elbowroom report` while the run goes on, at this port or HOST:PORT of this
