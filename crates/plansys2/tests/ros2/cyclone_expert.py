@@ -14,6 +14,7 @@ from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import final
 from cyclonedds.idl.types import float64, int64, sequence, uint8, uint32, uint64
+from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -118,7 +119,9 @@ class Expert:
     def serve(self):
         for reader, answer in self.services:
             for request in reader.take(10):
-                answer(request)
+                # One who has left is told of by a sample without content.
+                if not isinstance(request, InvalidSample):
+                    answer(request)
 
 
 def main():
