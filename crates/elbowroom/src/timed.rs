@@ -287,11 +287,12 @@ fn grid(
         return Ok(Err(Stop::TooManyStates));
     }
     let mut left = settings.most_states;
-    let upper = match bound(world, (cells, Side::Above), &mut left, goes_on)? {
+    // That from below first: where there are too many states, it is sooner known.
+    let lower = match bound(world, (cells, Side::Below), &mut left, goes_on)? {
         Ok(value) => value,
         Err(why) => return Ok(Err(why)),
     };
-    let lower = match bound(world, (cells, Side::Below), &mut left, goes_on)? {
+    let upper = match bound(world, (cells, Side::Above), &mut left, goes_on)? {
         Ok(value) => value,
         Err(why) => return Ok(Err(why)),
     };

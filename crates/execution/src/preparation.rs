@@ -6,10 +6,12 @@ use std::sync::Arc;
 
 use elbowroom_model::validate::Violation;
 use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
 use elbowroom_plan::deorder::DeorderError;
 use elbowroom_plan::parametrize::ParametrizeError;
 use elbowroom_plan::{
-    DecoupledEnvelope, InstanceId, ParametrizedPlan, PartialOrderPlan, Schedule, Valuation,
+    DecoupledEnvelope, InstanceId, ParameterId, ParametrizedPlan, PartialOrderPlan, Schedule,
+    Valuation,
 };
 
 use crate::forms::Forms;
@@ -106,6 +108,25 @@ pub trait Region: Send {
         plan: &ParametrizedPlan,
         values: &Valuation,
     ) -> Option<String>;
+
+    /// Asks again and again how much greater one of the values may be, the others being as they are: whether the
+    /// plan is guaranteed to work with that value of the parameter. It works for `values`.
+    ///
+    /// Whoever has seen that it works with all values up to a greater one may say so without looking again; where it
+    /// does not work with something in between, that may be said of what is beyond, too.
+    fn growing<'a>(
+        &'a mut self,
+        task: &'a Arc<Task>,
+        plan: &'a ParametrizedPlan,
+        values: &Valuation,
+        parameter: ParameterId,
+    ) -> Box<dyn FnMut(&Rational) -> bool + 'a> {
+        let mut tried = values.clone();
+        Box::new(move |value| {
+            tried[parameter].clone_from(value);
+            self.objection(task, plan, &tried).is_none()
+        })
+    }
 
     /// One more of it; `None` if it cannot be had.
     fn fork(&self) -> Option<Box<dyn Region>> {

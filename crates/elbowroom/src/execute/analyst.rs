@@ -8,10 +8,11 @@ use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{BestSettings, Guarantee, Objective, Oracle, best, irr};
 use elbowroom_execution::{Forms, Need, PrepareError, Prepared, Preparer, Region};
 use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
 use elbowroom_plan::deorder;
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
 use elbowroom_plan::partial_order::partial_order;
-use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side, Valuation};
 
 use super::facts_only::{as_timed, facts_only};
 use super::vary::is_about_an_absent_action;
@@ -197,6 +198,21 @@ impl Preparer for Analyst {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WholeRegion;
 
+impl WholeRegion {
+    /// The oracle for a plan whose nominal values are these.
+    fn oracle_at(
+        task: &Arc<Task>,
+        plan: &ParametrizedPlan,
+        values: &Valuation,
+    ) -> Result<Oracle, Refusal> {
+        let mut plan = plan.clone();
+        for (parameter, value) in plan.parameters.iter_mut().zip(values) {
+            parameter.nominal = value.clone();
+        }
+        Oracle::new(task, &Arc::new(plan), Guarantee::Weak)
+    }
+}
+
 impl Region for WholeRegion {
     fn objection(
         &mut self,
@@ -208,22 +224,38 @@ impl Region for WholeRegion {
             // What facts need is in the network, whatever the durations; the executor has it.
             return None;
         }
-        let mut plan = plan.clone();
-        for (parameter, value) in plan.parameters.iter_mut().zip(values) {
-            parameter.nominal = value.clone();
-        }
-        let plan = Arc::new(plan);
-        let mut oracle = match Oracle::new(task, &plan, Guarantee::Weak) {
+        let mut oracle = match Self::oracle_at(task, plan, values) {
             Ok(oracle) => oracle,
             Err(refusal) => return Some(refusal.to_string()),
         };
-        let objection = match oracle.objection(&DecoupledEnvelope::point(values)) {
+        let envelope = DecoupledEnvelope::point(values);
+        let objection = match oracle.objection(&envelope) {
             Ok(objection) => objection?,
             Err(refusal) => return Some(refusal.to_string()),
         };
-        let explainer = crate::Explainer::new(task, &plan);
-        let envelope = DecoupledEnvelope::point(values);
+        let explainer = crate::Explainer::new(task, oracle.plan());
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
+    }
+
+    /// One oracle for all values: only the proofs that use the greater value are looked for again.
+    fn growing<'a>(
+        &'a mut self,
+        task: &'a Arc<Task>,
+        plan: &'a ParametrizedPlan,
+        values: &Valuation,
+        parameter: ParameterId,
+    ) -> Box<dyn FnMut(&Rational) -> bool + 'a> {
+        if !plan.reads_numbers(task) {
+            return Box::new(|_| true);
+        }
+        let Ok(mut oracle) = Self::oracle_at(task, plan, values) else {
+            return Box::new(|_| false);
+        };
+        let end = BoxEnd {
+            parameter,
+            side: Side::Upper,
+        };
+        Box::new(move |value| matches!(oracle.try_reach(end, Some(value.clone())), Ok(true)))
     }
 
     fn fork(&self) -> Option<Box<dyn Region>> {

@@ -226,3 +226,48 @@ fn live_looks_at_the_numbers_again_only_when_one_is_not_as_planned() {
         );
     }
 }
+
+/// Asks about each value by itself, as [`Region::growing`] does by default.
+#[derive(Clone, Copy)]
+struct PointByPoint;
+
+impl Region for PointByPoint {
+    fn objection(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &ParametrizedPlan,
+        values: &Valuation,
+    ) -> Option<String> {
+        WholeRegion.objection(task, plan, values)
+    }
+}
+
+/// How long an action under way may take is found with one oracle that widens a box; asking about each
+/// duration by itself gives the same limits, and so the same runs.
+#[test]
+fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_about() {
+    let mut outlived = 0;
+    for case in ["battery", "tank", "hatchery", "delivery"] {
+        let scene = Scene::case(case);
+        for (seed, spread) in (0..12).zip(["0.1", "0.3", "0.6", "1.2"].into_iter().cycle()) {
+            let model = scene.world(&format!(
+                "[[duration]]\naction = \"*\"\nnormal = {{ mean = 1.1, deviation = {spread} }}\nrelative = true\n"
+            ));
+            let run = |means: Means| {
+                let live: ExecutorSpec = "live".parse().unwrap();
+                let execution = scene.execution("live").decided_by(Made(live.build(means)));
+                execution.run_in(&mut *model.world(&scene.task, seed))
+            };
+            let widened = run(Means::from(Box::new(WholeRegion)));
+            let asked = run(Means::from(Box::new(PointByPoint)));
+            assert_eq!(
+                format!("{widened:?}"),
+                format!("{asked:?}"),
+                "{case}, seed {seed}"
+            );
+            let mut causes = widened.reasons.iter().map(|reason| reason.cause);
+            outlived += usize::from(causes.any(|cause| cause == Cause::Outlived));
+        }
+    }
+    assert!(outlived > 3, "{outlived}");
+}

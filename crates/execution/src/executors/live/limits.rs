@@ -21,13 +21,7 @@ impl Rest {
             if !self.dispatch.running().contains(&instance) {
                 continue;
             }
-            let mut tried = values.clone();
-            let mut does = |duration: &Rational| {
-                tried[parameter].clone_from(duration);
-                region
-                    .objection(&self.mission.task, &plan, &tried)
-                    .is_none()
-            };
+            let mut does = region.growing(&self.mission.task, &plan, &values, parameter);
             let least = &values[parameter];
             let (_, most) = range(&self.mission.plan, parameter);
             let limit = greatest(least, most.as_ref(), self.mission.task.epsilon(), &mut does);
