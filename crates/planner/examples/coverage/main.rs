@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! coverage [--limit SECONDS] [--processor-time] [--memory MEGABYTES] [--first] [--only TEXT]…
-//!          [--plans]
+//!          [--plans] [--threads N]
 //!          [--set NAME=VALUE]… [--without TECHNIQUE]… [--search NAME] FOLDER|DOMAIN PROBLEM…
 //! ```
 //!
@@ -91,6 +91,10 @@ fn options() -> Result<Options, String> {
                 let megabytes: Result<usize, _> = value()?.parse();
                 let megabytes = megabytes.map_err(|_| "--memory takes megabytes")?;
                 options.settings.max_memory = megabytes << 20;
+            }
+            "--threads" => {
+                let threads: Result<usize, _> = value()?.parse();
+                options.settings.threads = threads.map_err(|_| "--threads takes a number")?;
             }
             "--set" => {
                 let value = value()?;

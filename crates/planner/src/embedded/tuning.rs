@@ -246,6 +246,14 @@ constants! {
     /// After so many turns without a better plan that is so. Not measured; small problems come to it
     /// within a second.
     refining_patience: u64 = 500;
+    /// How much work each strand does between two exchanges, in operators of estimates: about a tenth of
+    /// a second. Not measured.
+    leg: u64 = 20_000_000;
+    /// The same at the beginning; each time as much as so far. About a millisecond.
+    first_leg: u64 = 200_000;
+    /// After so much work on better plans, about 20 ms, a second strand begins: small problems are done
+    /// by then, and do not pay for a thread.
+    second_strand_after: u64 = 4_000_000;
     /// How many actions, about, are taken out of a plan at most, to be done otherwise. With 2 and with
     /// 8, the makespan is worse on two and one of four instances tried, and better on none and two.
     most_removed: usize = 4;
