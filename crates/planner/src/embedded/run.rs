@@ -20,7 +20,7 @@ use super::symmetry::Symmetry;
 use super::tuning::{Member, Technique};
 use improve::Entrant;
 use refining::Nearby;
-use side_by_side::{Job, side_by_side};
+use side_by_side::{Job, Tell, side_by_side};
 pub(super) use strand::Frame;
 use strand::{Allowance, Best, Outcome, Report, Strand};
 
@@ -142,7 +142,7 @@ impl<'a> Planner<'a> {
     fn first_plan(&mut self, entrants: &mut [Entrant<'a>]) -> First {
         let compiled = self.frame.compiled;
         let tuning = &compiled.tuning;
-        self.take_turn(&mut entrants[0], |_| tuning.root_check_after);
+        self.begin(&mut entrants[0], Allowance::turns(tuning.root_check_after));
         if self.best.is_none()
             && tuning.uses(Technique::DeadEnds)
             && self
@@ -153,24 +153,28 @@ impl<'a> Planner<'a> {
         {
             return First::Proved(proof);
         }
-        let first_size = entrants[0].search.as_ref().map_or(0, Search::size);
-        let mut budget = self.first_budget(first_size);
-        let mut turn = 0;
-        while self.stopped.is_none() && self.best.is_none() {
-            if turn == entrants.len() {
-                turn = 0;
-                budget = budget.saturating_mul(2);
-            }
-            if !entrants[turn].is_over {
-                self.take_turn(&mut entrants[turn], |search| {
-                    share(search, budget, compiled)
-                });
-            }
+        let search = entrants[0].search.as_ref();
+        let mut budget = self.first_budget(search.map_or(0, Search::size));
+        let turns = search.map_or(0, |search| share(search, budget, compiled));
+        let (mut turn, mut left) = (0, None);
+        if self.is_looking() && !entrants[0].is_over {
+            // Most problems are solved by then.
+            let allowance = Allowance {
+                turns,
+                work: tuning.second_strand_after,
+            };
+            let (outcome, spent) = self.begin(&mut entrants[0], allowance);
+            left = Some(turns.saturating_sub(spent).max(1 + tuning.root_check_after));
+            turn = usize::from(outcome != Outcome::WorkDone && outcome != Outcome::Better);
+        }
+        while self.is_looking() {
+            turn = self.round(entrants, turn, (budget, left.filter(|_| turn == 0)));
             if entrants.iter().all(|entrant| entrant.is_over) {
                 self.stopped = self.stopped.or(Some(Stopped::Exhausted));
             }
-            if self.best.is_none() {
-                turn += 1;
+            if self.is_looking() {
+                budget = budget.saturating_mul(2);
+                (turn, left) = (0, None);
             }
         }
         if self.stopped.is_some() {
@@ -180,6 +184,10 @@ impl<'a> Planner<'a> {
             budget = budget.min(tuning.improving_round);
         }
         First::Found { turn, budget }
+    }
+
+    fn is_looking(&self) -> bool {
+        self.stopped.is_none() && self.best.is_none()
     }
 
     /// How many states each search looks at in the first round. `size`: the operators of an estimate.
@@ -200,37 +208,98 @@ impl<'a> Planner<'a> {
         budget.min(most.max(tuning.root_check_after))
     }
 
-    /// Lets a search for a first plan have its turn.
-    fn take_turn(&mut self, entrant: &mut Entrant<'a>, turns: impl FnOnce(&Search<'_>) -> u64) {
-        let (frame, symmetry) = (self.frame, self.symmetry);
-        let (best, unreported) = (self.best.clone(), self.unreported);
-        let strategy = entrant.strategy;
-        let search = entrant
-            .search
-            .get_or_insert_with(|| Search::new(frame.compiled, symmetry, strategy));
-        let turns = turns(search);
+    /// Lets the first search look for a first plan alone. Why it ended, and how many turns that counts
+    /// for.
+    fn begin(&mut self, entrant: &mut Entrant<'a>, allowance: Allowance) -> (Outcome, u64) {
+        let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
+        let search = entrant.search(frame.compiled, symmetry);
         let mut base = self.progress.counts;
-        let outcome = {
-            let mut hear = |report| self.hear(&mut base, report);
-            let mut strand = Strand::new(frame, best, unreported, &mut hear);
-            let (outcome, _, _) = strand.work(search, Allowance::turns(turns));
-            let unreported = strand.end();
-            (outcome, unreported)
-        };
-        self.unreported = outcome.1;
-        if outcome.0 == Outcome::Over {
-            entrant.is_over = search.is_incomplete();
-            if !entrant.is_over {
-                self.stopped = self.stopped.or(Some(Stopped::Exhausted));
+        let mut hear = |report| self.hear(&mut base, report);
+        let mut strand = Strand::new(frame, None, unreported, &mut hear);
+        let (outcome, spent, _) = strand.work(search, allowance);
+        let is_over = outcome == Outcome::Over;
+        self.unreported = strand.end(is_over && !search.is_incomplete());
+        entrant.is_over = is_over;
+        (outcome, spent)
+    }
+
+    /// A round of the searches for a first plan, from that one on: side by side, as long as there is none.
+    /// Whose turn it was at the end. `left`: what the first one has left.
+    fn round(
+        &mut self,
+        entrants: &mut [Entrant<'a>],
+        from: usize,
+        (budget, left): (u64, Option<u64>),
+    ) -> usize {
+        let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
+        let compiled = frame.compiled;
+        // What they mention first gets other numbers there than here, in no fixed order.
+        let own_task = self
+            .own_task
+            .take()
+            .unwrap_or_else(|| frame.task.with_own_table());
+        let kept = |entrant: &Entrant<'_>| entrant.search.as_ref().map_or(0, |s| s.counts().memory);
+        let memory: Vec<usize> = entrants.iter().map(kept).collect();
+        let mut numbers = Vec::new();
+        let mut jobs: Vec<Job<'_, (u64, bool)>> = Vec::new();
+        for (number, entrant) in entrants.iter_mut().enumerate().skip(from) {
+            if entrant.is_over {
+                continue;
             }
+            numbers.push(number);
+            let left = left.filter(|_| number == from);
+            let unreported = if jobs.is_empty() { unreported } else { 0 };
+            let own_task = (number > 0).then_some(&own_task);
+            jobs.push(Box::new(move |tell: Tell<'_>| {
+                let own_task = own_task.map(Task::with_own_table);
+                let task = own_task.as_ref().unwrap_or(frame.task);
+                let search = entrant.search(compiled, symmetry);
+                let turns = left.unwrap_or_else(|| share(search, budget, compiled));
+                let mut strand = Strand::new(Frame { task, ..frame }, None, unreported, tell);
+                let (outcome, _, _) = strand.work(search, Allowance::turns(turns));
+                let is_over = outcome == Outcome::Over;
+                let unreported = strand.end(is_over && !search.is_incomplete());
+                (unreported, is_over)
+            }));
         }
+        let rest = frame.settings.max_memory;
+        let rest = rest.saturating_sub(self.progress.counts.memory);
+        let ahead = rest / (4 * jobs.len().max(1));
+        let (mut base, mut last) = (self.progress.counts, 0);
+        let ended = side_by_side(
+            jobs,
+            (frame.settings.threads, ahead),
+            &mut |turn, report| {
+                last = turn;
+                self.hear(&mut base, report) && self.is_looking()
+            },
+        );
+        self.own_task = Some(own_task);
+        if !self.is_looking() {
+            // With one thread, those that come later have not begun, and with several nobody knows how
+            // far they are.
+            let later = numbers.iter().skip(last + 1);
+            for &number in later.filter(|_| self.stopped.is_none()) {
+                self.progress.counts.memory -= memory[number];
+                entrants[number] = Entrant::new(entrants[number].strategy);
+            }
+            return numbers.get(last).copied().unwrap_or(from);
+        }
+        self.unreported = 0;
+        for (number, (unreported, is_over)) in numbers.into_iter().zip(ended) {
+            entrants[number].is_over = is_over;
+            self.unreported += unreported;
+        }
+        0
     }
 
     /// Carries strands out, and hears what they report.
     fn hear_all<R: Send>(&mut self, jobs: Vec<Job<'_, R>>) -> Vec<R> {
         let threads = self.frame.settings.threads;
         let mut base = self.progress.counts;
-        side_by_side(jobs, threads, &mut |_, report| self.hear(&mut base, report))
+        side_by_side(jobs, (threads, usize::MAX), &mut |_, report| {
+            self.hear(&mut base, report)
+        })
     }
 
     /// Hears what a strand reports, and passes it on. Whether to go on. `base`: what was counted before
@@ -244,6 +313,9 @@ impl<'a> Planner<'a> {
         counts.memory = before.memory + done.memory;
         if report.is_last {
             *base = self.progress.counts;
+            if report.has_seen_everything {
+                self.stopped = self.stopped.or(Some(Stopped::Exhausted));
+            }
             return self.stopped.is_none();
         }
         self.progress.phase = report.phase;

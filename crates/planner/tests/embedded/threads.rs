@@ -118,7 +118,7 @@ fn our_own_cases_have_the_same_plans() {
                 Source::new(name, text)
             };
             let read = read_problem(&source("domain.pddl"), &source("problem.pddl"));
-            Task::new(read.ok().expect("our own cases can be read").0)
+            Task::new(read.expect("our own cases can be read").0)
         };
         assert!(agree(&make, &|_| {}, 40) > 0, "{}", folder.display());
     }

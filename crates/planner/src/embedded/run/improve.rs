@@ -10,6 +10,7 @@
 //! other one when the leg is over, and of plans that are worth the same, the first strand's counts.
 
 use super::super::answer::Stopped;
+use super::super::compile::Compiled;
 use super::super::search::{Aim, Search, Strategy};
 use super::super::symmetry::Symmetry;
 use super::super::tuning::Technique;
@@ -25,13 +26,24 @@ pub(super) struct Entrant<'a> {
     pub(super) is_over: bool,
 }
 
-impl Entrant<'_> {
+impl<'a> Entrant<'a> {
     pub(super) fn new(strategy: Strategy) -> Self {
         Self {
             strategy,
             search: None,
             is_over: false,
         }
+    }
+
+    /// The search.
+    pub(super) fn search(
+        &mut self,
+        compiled: &'a Compiled,
+        symmetry: &'a Symmetry,
+    ) -> &mut Search<'a> {
+        let strategy = self.strategy;
+        self.search
+            .get_or_insert_with(|| Search::new(compiled, symmetry, strategy))
     }
 }
 
@@ -84,10 +96,7 @@ impl<'a> Contest<'a> {
                 self.current += 1;
                 continue;
             }
-            let strategy = entrant.strategy;
-            let search = entrant
-                .search
-                .get_or_insert_with(|| Search::new(compiled, self.symmetry, strategy));
+            let search = entrant.search(compiled, self.symmetry);
             let turns = share(search, self.budget, compiled);
             let left = self.left.take().unwrap_or(turns);
             let allowance = Allowance {
@@ -209,7 +218,7 @@ impl<'a> Planner<'a> {
                 let mut strand = Strand::new(frame, best, unreported, tell);
                 let (_, rest) = contest.go_on(&mut strand, u64::MAX);
                 Ended {
-                    unreported: strand.end(),
+                    unreported: strand.end(false),
                     rest,
                 }
             })]);
@@ -247,7 +256,7 @@ impl<'a> Planner<'a> {
                 strand.refine(first, newest, length.saturating_sub(work));
             }
             Ended {
-                unreported: strand.end(),
+                unreported: strand.end(false),
                 rest,
             }
         })];
@@ -258,7 +267,7 @@ impl<'a> Planner<'a> {
                 let mut strand = Strand::new(frame, best, 0, tell);
                 strand.refine(second, newest, length);
                 Ended {
-                    unreported: strand.end(),
+                    unreported: strand.end(false),
                     rest: Rest::Something,
                 }
             }));

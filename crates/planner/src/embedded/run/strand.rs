@@ -63,6 +63,8 @@ pub(super) struct Report {
     pub(super) pending: Option<Arc<Best>>,
     /// Whether the strand has ended; that is no question whether to go on.
     pub(super) is_last: bool,
+    /// Whether it has seen everything, so that there is no need of others.
+    pub(super) has_seen_everything: bool,
 }
 
 /// See the module.
@@ -137,11 +139,12 @@ impl<'a, 't> Strand<'a, 't> {
     }
 
     /// Tells what it has done, for the last time. The work since the last question.
-    pub(super) fn end(self) -> u64 {
+    pub(super) fn end(self, has_seen_everything: bool) -> u64 {
         (self.tell)(Report {
             phase: self.phase,
             counts: self.counts,
             is_last: true,
+            has_seen_everything,
             ..Report::default()
         });
         self.unreported
@@ -159,7 +162,7 @@ impl<'a, 't> Strand<'a, 't> {
             counts: self.counts,
             found,
             pending,
-            is_last: false,
+            ..Report::default()
         });
         self.is_stopped |= !goes_on;
         !self.is_stopped
