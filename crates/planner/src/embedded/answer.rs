@@ -23,7 +23,7 @@ pub struct Settings {
     /// proved then is proved of plans without them.
     pub without: BTreeSet<String>,
     /// How many threads may work at the same time. The answer and what is reported are the same
-    /// whatever their number; more than two have nothing to do. WebAssembly has one.
+    /// whatever their number. More than two are of use before the first plan only. WebAssembly has one.
     pub threads: usize,
     /// The constants of the search.
     pub tuning: Tuning,

@@ -60,6 +60,9 @@ struct Contest<'a> {
     left: Option<u64>,
     /// How much work searches may still do, or have done too much.
     credit: i64,
+    /// Whether the current one has found a plan of a better metric in this turn: then it may go on, and
+    /// that does not count.
+    is_finding: bool,
 }
 
 /// What comes out of a strand: the work since its last question, and what is left to search.
@@ -105,6 +108,8 @@ impl<'a> Contest<'a> {
             };
             let (outcome, spent, work) = strand.work(search, allowance);
             done += work.max(1);
+            let finds = outcome == Outcome::Better && compiled.metric.is_some();
+            self.is_finding = finds || self.is_finding && outcome == Outcome::WorkDone;
             match outcome {
                 Outcome::Stopped => return (done, Rest::Something),
                 // Who finds better plans may go on.
@@ -170,6 +175,7 @@ impl<'a> Planner<'a> {
             budget,
             left: None,
             credit: 0,
+            is_finding: false,
         };
         loop {
             let rest = self.leg(&mut contest);
@@ -246,7 +252,9 @@ impl<'a> Planner<'a> {
         let mut jobs: Vec<Job<'_, Ended>> = vec![Box::new(move |tell: Tell<'_>| {
             let mut strand = Strand::new(frame, best, unreported, tell);
             let (mut work, mut rest) = (0, Rest::Something);
-            if let Ok(most) = u64::try_from(contest.credit)
+            if contest.is_finding {
+                (work, rest) = contest.go_on(&mut strand, length);
+            } else if let Ok(most) = u64::try_from(contest.credit)
                 && most > 0
             {
                 (work, rest) = contest.go_on(&mut strand, most);
