@@ -249,7 +249,8 @@ constants! {
     /// How much work each strand does between two exchanges, in operators of estimates: 10 to 100
     /// milliseconds. With ten times as much, what one strand finds is news to the other one too late: after
     /// 15 s on two threads, plans were better on 8 and worse on 8 of 25 instances than after 15 s of one.
-    /// With this, better on all of nine; with 5 million, on seven of nine, and worse on one.
+    /// With this, better on all of nine tried
+    /// in twice the processor time; with 5 million, on seven of nine, and worse on one.
     leg: u64 = 2_000_000;
     /// The same at the beginning; each time as much as so far. About a millisecond.
     first_leg: u64 = 200_000;
