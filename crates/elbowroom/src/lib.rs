@@ -29,7 +29,7 @@
 //! let (problem, _warnings) = pddl::read_problem(&domain, &problem)?;
 //! let task = Task::new(problem);
 //!
-//! let mut request = PlanRequest { task: &task, first_plan_only: true, most_memory: None };
+//! let mut request = PlanRequest { task: &task, first_plan_only: true, most_memory: None, threads: 1 };
 //! let plan = plan(&mut request, &mut Unwatched)?.plan.expect("there is a plan");
 //! assert_eq!(plan.steps.len(), 1);
 //! # Ok(())

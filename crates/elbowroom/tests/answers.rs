@@ -158,6 +158,7 @@ fn planned(task: &Task, watcher: &mut dyn Watcher) -> PlanOutcome {
         task,
         first_plan_only: true,
         most_memory: None,
+        threads: 1,
     };
     planning::plan(&mut request, watcher).expect("supported")
 }

@@ -56,7 +56,7 @@ pub use tuning::{Member, Technique, Tuning, TuningError};
 
 use compile::{Failure, Wanted};
 use reasons::Names;
-use run::{Planner, none_found};
+use run::{Frame, Planner, none_found};
 use symmetry::Symmetry;
 
 /// Finds a plan from `situation`.
@@ -163,24 +163,13 @@ fn search_for_plans(
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }
-    Planner {
-        names: &names,
-        symmetry: &symmetry,
+    let frame = Frame {
         task,
         situation,
         settings,
-        observe,
         compiled: &compiled,
-        progress,
-        best: None,
-        best_steps: Vec::new(),
-        is_fresh: false,
-        unreported: 0,
-        refiner: None,
-        has_reservoirs: tuning.uses(Technique::Reservoirs)
-            && !relaxed::floors(&compiled).is_empty(),
-    }
-    .run()
+    };
+    Planner::new(frame, (&names, &symmetry), progress, observe).run()
 }
 
 fn unreachable(task: &Task, grounding: &Grounding) -> Option<Proof> {

@@ -191,6 +191,7 @@ impl Task {
                 task: &self.task,
                 first_plan_only: first,
                 most_memory: memory,
+                threads: std::thread::available_parallelism().map_or(1, usize::from),
             };
             let outcome = if planner.eq_ignore_ascii_case(plan::EMBEDDED) {
                 plan::plan(&mut request, &mut watch)?

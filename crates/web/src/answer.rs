@@ -144,6 +144,7 @@ fn planned(
         task: &read.task,
         first_plan_only: question.first || limit.is_none(),
         most_memory: None,
+        threads: 1,
     };
     let outcome = plan(&mut request, &mut Watch::start(clock, limit)).map_err(Failure::new)?;
     Ok(Reply {

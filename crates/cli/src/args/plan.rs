@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
-use super::number::positive;
+use super::number::{count, positive};
 
 #[derive(Args, Debug)]
 #[command(after_long_help = PLANNER_HELP)]
@@ -37,6 +37,11 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
     #[arg(allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,
+    /// Number of threads of the embedded planner; 0, the default, for one per processor. The plans are
+    /// the same, but come sooner
+    #[arg(long, value_name = "N", value_parser = count, conflicts_with = "objective")]
+    #[arg(allow_negative_numbers = true)]
+    pub(crate) jobs: Option<usize>,
     /// Write the plan to this file instead of standard output
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,

@@ -33,6 +33,9 @@ pub struct PlanRequest<'a> {
     pub first_plan_only: bool,
     /// About how much memory the search may use, in bytes.
     pub most_memory: Option<u64>,
+    /// How many threads the embedded planner may use. The answer is the same whatever their number, but
+    /// for what a time limit allows.
+    pub threads: usize,
 }
 
 /// The answer, and the plan.
@@ -207,6 +210,7 @@ pub fn plan(
     let situation = Situation::initial(request.task);
     let mut settings = Settings {
         first_plan_only: request.first_plan_only,
+        threads: request.threads,
         ..Settings::default()
     };
     if let Some(bytes) = request.most_memory {

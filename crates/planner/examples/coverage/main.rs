@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! coverage [--limit SECONDS] [--processor-time] [--memory MEGABYTES] [--first] [--only TEXT]…
-//!          [--plans]
+//!          [--plans] [--threads N]
 //!          [--set NAME=VALUE]… [--without TECHNIQUE]… [--search NAME] FOLDER|DOMAIN PROBLEM…
 //! ```
 //!
@@ -12,7 +12,8 @@
 //! `--plans`, plans are printed to standard error. `--set` changes a constant of the search
 //! (`embedded/tuning.rs`), `--without` switches a technique off, and `--search` runs one search of
 //! the portfolio alone. With `--processor-time`, limits and times are those of the processor, as
-//! far as the system tells (Linux): what else the machine does changes them little.
+//! far as the system tells (Linux): what else the machine does changes them little. That is told of
+//! one thread only, so `--threads` is refused with it.
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,
@@ -92,6 +93,10 @@ fn options() -> Result<Options, String> {
                 let megabytes = megabytes.map_err(|_| "--memory takes megabytes")?;
                 options.settings.max_memory = megabytes << 20;
             }
+            "--threads" => {
+                let threads: Result<usize, _> = value()?.parse();
+                options.settings.threads = threads.map_err(|_| "--threads takes a number")?;
+            }
             "--set" => {
                 let value = value()?;
                 let (name, value) = value.split_once('=').ok_or("--set takes NAME=VALUE")?;
@@ -105,6 +110,9 @@ fn options() -> Result<Options, String> {
             "--processor-time" => options.counts_processor_time = true,
             _ => options.files.push(PathBuf::from(argument)),
         }
+    }
+    if options.counts_processor_time && options.settings.threads > 1 {
+        return Err("--processor-time is that of one thread: leave out --threads".to_owned());
     }
     Ok(options)
 }

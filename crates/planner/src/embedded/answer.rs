@@ -22,6 +22,9 @@ pub struct Settings {
     /// The names of ground actions, `(drive rover depot shelf)`, that plans must do without. What is
     /// proved then is proved of plans without them.
     pub without: BTreeSet<String>,
+    /// How many threads may work at the same time. The answer and what is reported are the same
+    /// whatever their number. More than two are of use before the first plan only. WebAssembly has one.
+    pub threads: usize,
     /// The constants of the search.
     pub tuning: Tuning,
 }
@@ -38,13 +41,14 @@ pub enum Objective {
 }
 
 impl Default for Settings {
-    /// Memory 2 GiB, any number of plans with any action, the problem's own metric.
+    /// Memory 2 GiB, any number of plans with any action, the problem's own metric, one thread.
     fn default() -> Self {
         Self {
             max_memory: 2 << 30,
             first_plan_only: false,
             objective: Objective::Metric,
             without: BTreeSet::new(),
+            threads: 1,
             tuning: Tuning::default(),
         }
     }

@@ -14,7 +14,7 @@
 mod model;
 mod operators;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 use super::compile::{Compiled, NONE};
 use super::formula::Literal;

@@ -106,7 +106,12 @@ struct Spent {
 }
 
 impl<'a> Refiner<'a> {
-    pub(crate) fn new(compiled: &'a Compiled, compresses: Option<Compressibility>) -> Self {
+    /// `seed`: which numbers it draws.
+    pub(crate) fn new(
+        compiled: &'a Compiled,
+        compresses: Option<Compressibility>,
+        seed: u64,
+    ) -> Self {
         let mut relaxed = Relaxed::new(compiled, compresses);
         relaxed.serves_repairs = true;
         if let Some(metric) = &compiled.metric {
@@ -130,7 +135,7 @@ impl<'a> Refiner<'a> {
             compiled,
             stepper: Stepper::new(compiled),
             relaxed,
-            random: Random::new(1),
+            random: Random::new(seed),
             compresses,
             incumbent: None,
             best: None,
@@ -159,6 +164,11 @@ impl<'a> Refiner<'a> {
             self.leave_out_needless(ticker);
             self.keep_best();
         }
+    }
+
+    /// Whether there is a plan that it can change.
+    pub(crate) fn has_plan(&self) -> bool {
+        self.incumbent.is_some() && self.best.is_some()
     }
 
     /// The judge does not accept the plan: goes on from another one.

@@ -2,153 +2,129 @@
 
 mod improve;
 mod refining;
+mod side_by_side;
+mod strand;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
-use elbowroom_model::validate::Report;
-use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_model::Task;
 
-use super::answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Settings, Stopped};
-use super::apply::Step;
-use super::bound::MetricBound;
+use super::answer::{Answer, Counts, Progress, Proof, Stopped};
 use super::compile::{self, Compiled, Compressibility};
-use super::extract;
 use super::formula::Literal;
-use super::needless::without_needless;
 use super::reasons::{self, Names};
-use super::refine::Refiner;
 use super::relaxed;
-use super::search::{Aim, Search, Strategy, Turn};
+use super::search::{Search, Strategy};
 use super::symmetry::Symmetry;
 use super::tuning::{Member, Technique};
-
-/// How much work lies between two reports, in operators of estimates and what they change: about ten
-/// milliseconds.
-const REPORT_WORK: u64 = 2_000_000;
-
-/// The number of looked-up pairs that lie between two reports at most: some milliseconds.
-const REPORT_LOOKUPS: u64 = 4_000_000;
-
-/// What turns count for between two reports, at most, where each state is a linear program.
-const REPORT_SYMBOLIC_TURNS: u64 = 8;
-
-/// What turns count for between two reports, at most: one each, more where much is unsettled.
-const REPORT_TURNS: u64 = 256;
+use improve::Entrant;
+use refining::Nearby;
+use side_by_side::{Job, Tell, side_by_side};
+pub(super) use strand::Frame;
+use strand::{Allowance, Best, Outcome, Report, Strand};
 
 pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
     Answer::NoneFound { stopped, counts }
 }
 
+/// How the search for a first plan ended.
+enum First {
+    /// There is none.
+    Proved(Proof),
+    /// The run is over, whether there is a plan or not.
+    Over,
+    /// There is one. Whose turn it was, and what each is given in this round.
+    Found { turn: usize, budget: u64 },
+}
+
 /// One run.
 pub(super) struct Planner<'a> {
-    pub(super) task: &'a Task,
-    pub(super) situation: &'a Situation,
-    pub(super) settings: &'a Settings,
+    pub(super) frame: Frame<'a>,
     pub(super) observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
-    pub(super) compiled: &'a Compiled,
     pub(super) symmetry: &'a Symmetry,
     pub(super) names: &'a Names,
     pub(super) progress: Progress,
-    pub(super) best: Option<Found>,
     /// Whether something is used up and filled up.
     pub(super) has_reservoirs: bool,
-    /// The choices of the best plan.
-    pub(super) best_steps: Vec<Step>,
-    /// Whether no better plan has been looked for near it.
-    pub(super) is_fresh: bool,
-    /// The work near the best plan since the last report.
-    pub(super) unreported: u64,
+    best: Option<Arc<Best>>,
+    /// How many plans have been the best one.
+    finds: u64,
+    /// The reason why it does not go on.
+    stopped: Option<Stopped>,
+    /// The work since somebody was asked whether to go on.
+    unreported: u64,
+    /// How much work each strand has had for better plans.
+    improved_for: u64,
     /// What makes better plans of the best one.
-    pub(super) refiner: Option<Refiner<'a>>,
+    refiners: Vec<Nearby<'a>>,
+    /// The task of the second strand.
+    own_task: Option<Task>,
 }
 
-impl Planner<'_> {
+impl<'a> Planner<'a> {
+    pub(super) fn new(
+        frame: Frame<'a>,
+        (names, symmetry): (&'a Names, &'a Symmetry),
+        progress: Progress,
+        observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Self {
+        let compiled = frame.compiled;
+        Self {
+            frame,
+            observe,
+            symmetry,
+            names,
+            progress,
+            has_reservoirs: compiled.tuning.uses(Technique::Reservoirs)
+                && !relaxed::floors(compiled).is_empty(),
+            best: None,
+            finds: 0,
+            stopped: None,
+            unreported: 0,
+            improved_for: 0,
+            refiners: Vec::new(),
+            own_task: None,
+        }
+    }
+
     pub(super) fn run(mut self) -> Answer {
-        let compiled = self.compiled;
         let strategies = self.strategies();
-        let mut is_over = vec![false; strategies.len()];
         // The others are made when their first turn comes: that takes its time where actions are many.
-        let mut searches = vec![Search::new(compiled, self.symmetry, strategies[0])];
-        let mut stopped = match self.work(&mut searches[0], compiled.tuning.root_check_after) {
-            Outcome::Stop(stopped) => Some(stopped),
-            Outcome::Better | Outcome::BudgetSpent => None,
-            Outcome::Over => {
-                is_over[0] = searches[0].is_incomplete();
-                (!is_over[0]).then_some(Stopped::Exhausted)
+        let mut entrants: Vec<Entrant<'_>> = strategies.into_iter().map(Entrant::new).collect();
+        let (turn, budget) = match self.first_plan(&mut entrants) {
+            First::Proved(proof) => {
+                let counts = self.progress.counts;
+                return Answer::Unsolvable { proof, counts };
             }
+            First::Over => (0, 0),
+            First::Found { turn, budget } => (turn, budget),
         };
-        if self.best.is_none()
-            && compiled.tuning.uses(Technique::DeadEnds)
-            && stopped.is_none_or(|stopped| stopped == Stopped::Exhausted)
-            && compiled.is_relaxation_exact()
-            && let Some(proof) = self.pairs_proof()
-        {
-            let counts = self.progress.counts;
-            return Answer::Unsolvable { proof, counts };
-        }
-        let tuning = &compiled.tuning;
-        let mut budget = if self.is_refining() {
-            tuning.improving_round
-        } else if self.needs_concurrency() {
-            tuning.first_round_with_concurrency
-        } else if self.has_reservoirs {
-            tuning.first_round_with_reservoirs
-        } else {
-            tuning.first_round
-        };
-        // Where there are reservoirs, the first search fills them up, and has by far the best chance.
-        if !self.has_reservoirs {
-            let most = tuning.first_round_work / (1 + searches[0].size());
-            budget = budget.min(most.max(tuning.root_check_after));
-        }
-        while stopped.is_none() && !self.is_first_plan_enough() {
-            let was_refining = self.is_refining();
-            for (number, is_over) in is_over.iter_mut().enumerate() {
-                if *is_over {
-                    continue;
-                }
-                if number == searches.len() {
-                    let strategy = strategies[number];
-                    searches.push(Search::new(compiled, self.symmetry, strategy));
-                }
-                let search = &mut searches[number];
-                if self.is_refining() && !was_refining {
-                    budget = budget.min(tuning.improving_round);
-                }
-                let share = share(search, budget, compiled);
-                match self.work(search, share) {
-                    Outcome::Stop(reason) => stopped = Some(reason),
-                    Outcome::Better | Outcome::BudgetSpent => {}
-                    Outcome::Over if search.is_incomplete() => *is_over = true,
-                    Outcome::Over => stopped = Some(Stopped::Exhausted),
-                }
-                if stopped.is_some() || self.is_first_plan_enough() {
-                    break;
-                }
-                stopped = self.refine(share);
-                if stopped.is_some() {
-                    break;
-                }
-            }
-            if !is_over.contains(&false) {
-                stopped = stopped.or(Some(Stopped::Exhausted));
-            }
-            budget = budget.saturating_mul(2);
-        }
-        let is_proof = stopped == Some(Stopped::Exhausted)
+        let compiled = self.frame.compiled;
+        let mut searches = entrants
+            .iter()
+            .filter_map(|entrant| entrant.search.as_ref());
+        let is_proof = self.stopped == Some(Stopped::Exhausted)
             && compiled.is_exact
             && compiled.incomplete_because.is_none()
-            && searches.iter().any(|search| !search.is_incomplete());
-        let freed: usize = searches.iter().map(|search| search.counts().memory).sum();
-        drop(searches);
-        let stopped = stopped.unwrap_or_else(|| {
-            self.progress.counts.memory -= freed;
-            self.improve()
-        });
+            && searches.any(|search| !search.is_incomplete());
+        let stopped = match self.stopped {
+            Some(stopped) => stopped,
+            None if compiled.metric.is_some() => {
+                let searches = entrants
+                    .iter()
+                    .filter_map(|entrant| entrant.search.as_ref());
+                let freed: usize = searches.map(|search| search.counts().memory).sum();
+                drop(entrants);
+                self.progress.counts.memory -= freed;
+                self.improve()
+            }
+            None => self.compete(entrants, (turn, budget)),
+        };
         let counts = self.progress.counts;
         match self.best {
-            Some(found) => Answer::Plan {
-                found,
+            Some(best) => Answer::Plan {
+                found: best.found.clone(),
                 stopped,
                 counts,
             },
@@ -162,23 +138,236 @@ impl Planner<'_> {
         }
     }
 
-    /// Whether these searches have done their part: better plans are looked for by others.
-    fn is_first_plan_enough(&self) -> bool {
-        self.best.is_some() && self.compiled.metric.is_some()
+    /// Looks for a first plan.
+    fn first_plan(&mut self, entrants: &mut [Entrant<'a>]) -> First {
+        let compiled = self.frame.compiled;
+        let tuning = &compiled.tuning;
+        self.begin(&mut entrants[0], Allowance::turns(tuning.root_check_after));
+        if self.best.is_none()
+            && tuning.uses(Technique::DeadEnds)
+            && self
+                .stopped
+                .is_none_or(|stopped| stopped == Stopped::Exhausted)
+            && compiled.is_relaxation_exact()
+            && let Some(proof) = self.pairs_proof()
+        {
+            return First::Proved(proof);
+        }
+        let search = entrants[0].search.as_ref();
+        let mut budget = self.first_budget(search.map_or(0, Search::size));
+        let turns = search.map_or(0, |search| share(search, budget, compiled));
+        let (mut turn, mut left) = (0, None);
+        if self.is_looking() && !entrants[0].is_over {
+            // Most problems are solved by then.
+            let allowance = Allowance {
+                turns,
+                work: tuning.second_strand_after,
+            };
+            let (outcome, spent) = self.begin(&mut entrants[0], allowance);
+            left = Some(turns.saturating_sub(spent).max(1 + tuning.root_check_after));
+            turn = usize::from(outcome != Outcome::WorkDone && outcome != Outcome::Better);
+        }
+        while self.is_looking() {
+            turn = self.round(entrants, turn, (budget, left.filter(|_| turn == 0)));
+            if entrants.iter().all(|entrant| entrant.is_over) {
+                self.stopped = self.stopped.or(Some(Stopped::Exhausted));
+            }
+            if self.is_looking() {
+                budget = budget.saturating_mul(2);
+                (turn, left) = (0, None);
+            }
+        }
+        if self.stopped.is_some() {
+            return First::Over;
+        }
+        if self.is_refining() {
+            budget = budget.min(tuning.improving_round);
+        }
+        First::Found { turn, budget }
+    }
+
+    fn is_looking(&self) -> bool {
+        self.stopped.is_none() && self.best.is_none()
+    }
+
+    /// How many states each search looks at in the first round. `size`: the operators of an estimate.
+    fn first_budget(&self, size: u64) -> u64 {
+        let tuning = &self.frame.compiled.tuning;
+        let budget = if self.needs_concurrency() {
+            tuning.first_round_with_concurrency
+        } else if self.has_reservoirs {
+            tuning.first_round_with_reservoirs
+        } else {
+            tuning.first_round
+        };
+        // Where there are reservoirs, the first search fills them up, and has by far the best chance.
+        if self.has_reservoirs {
+            return budget;
+        }
+        let most = tuning.first_round_work / (1 + size);
+        budget.min(most.max(tuning.root_check_after))
+    }
+
+    /// Lets the first search look for a first plan alone. Why it ended, and how many turns that counts
+    /// for.
+    fn begin(&mut self, entrant: &mut Entrant<'a>, allowance: Allowance) -> (Outcome, u64) {
+        let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
+        let search = entrant.search(frame.compiled, symmetry);
+        let mut base = self.progress.counts;
+        let mut hear = |report| self.hear(&mut base, report);
+        let mut strand = Strand::new(frame, None, unreported, &mut hear);
+        let (outcome, spent, _) = strand.work(search, allowance);
+        let is_over = outcome == Outcome::Over;
+        self.unreported = strand.end(is_over && !search.is_incomplete());
+        entrant.is_over = is_over;
+        (outcome, spent)
+    }
+
+    /// A round of the searches for a first plan, from that one on: side by side, as long as there is none.
+    /// Whose turn it was at the end. `left`: what the first one has left.
+    fn round(
+        &mut self,
+        entrants: &mut [Entrant<'a>],
+        from: usize,
+        (budget, left): (u64, Option<u64>),
+    ) -> usize {
+        let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
+        let compiled = frame.compiled;
+        // What they mention first gets other numbers there than here, in no fixed order.
+        let own_task = self
+            .own_task
+            .take()
+            .unwrap_or_else(|| frame.task.with_own_table());
+        let kept = |entrant: &Entrant<'_>| entrant.search.as_ref().map_or(0, |s| s.counts().memory);
+        let memory: Vec<usize> = entrants.iter().map(kept).collect();
+        let mut numbers = Vec::new();
+        let mut jobs: Vec<Job<'_, (u64, bool)>> = Vec::new();
+        for (number, entrant) in entrants.iter_mut().enumerate().skip(from) {
+            if entrant.is_over {
+                continue;
+            }
+            numbers.push(number);
+            let left = left.filter(|_| number == from);
+            let unreported = if jobs.is_empty() { unreported } else { 0 };
+            let own_task = (number > 0).then_some(&own_task);
+            jobs.push(Box::new(move |tell: Tell<'_>| {
+                let own_task = own_task.map(Task::with_own_table);
+                let task = own_task.as_ref().unwrap_or(frame.task);
+                let search = entrant.search(compiled, symmetry);
+                let turns = left.unwrap_or_else(|| share(search, budget, compiled));
+                let mut strand = Strand::new(Frame { task, ..frame }, None, unreported, tell);
+                let (outcome, _, _) = strand.work(search, Allowance::turns(turns));
+                let is_over = outcome == Outcome::Over;
+                let unreported = strand.end(is_over && !search.is_incomplete());
+                (unreported, is_over)
+            }));
+        }
+        let rest = frame.settings.max_memory;
+        let rest = rest.saturating_sub(self.progress.counts.memory);
+        let ahead = rest / (4 * jobs.len().max(1));
+        let (mut base, mut last) = (self.progress.counts, 0);
+        let ended = side_by_side(
+            jobs,
+            (frame.settings.threads, ahead),
+            &mut |turn, report| {
+                last = turn;
+                self.hear(&mut base, report) && self.is_looking()
+            },
+        );
+        self.own_task = Some(own_task);
+        if !self.is_looking() {
+            // With one thread, those that come later have not begun, and with several nobody knows how
+            // far they are.
+            let later = numbers.iter().skip(last + 1);
+            for &number in later.filter(|_| self.stopped.is_none()) {
+                self.progress.counts.memory -= memory[number];
+                entrants[number] = Entrant::new(entrants[number].strategy);
+            }
+            return numbers.get(last).copied().unwrap_or(from);
+        }
+        self.unreported = 0;
+        for (number, (unreported, is_over)) in numbers.into_iter().zip(ended) {
+            entrants[number].is_over = is_over;
+            self.unreported += unreported;
+        }
+        0
+    }
+
+    /// Carries strands out, and hears what they report.
+    fn hear_all<R: Send>(&mut self, jobs: Vec<Job<'_, R>>) -> Vec<R> {
+        let threads = self.frame.settings.threads;
+        let mut base = self.progress.counts;
+        side_by_side(jobs, (threads, usize::MAX), &mut |_, report| {
+            self.hear(&mut base, report)
+        })
+    }
+
+    /// Hears what a strand reports, and passes it on. Whether to go on. `base`: what was counted before
+    /// the strand began.
+    fn hear(&mut self, base: &mut Counts, report: Report) -> bool {
+        let (before, done) = (*base, report.counts);
+        let counts = &mut self.progress.counts;
+        counts.expanded = before.expanded + done.expanded;
+        counts.generated = before.generated + done.generated;
+        counts.evaluated = before.evaluated + done.evaluated;
+        counts.memory = before.memory + done.memory;
+        if report.is_last {
+            *base = self.progress.counts;
+            if report.has_seen_everything {
+                self.stopped = self.stopped.or(Some(Stopped::Exhausted));
+            }
+            return self.stopped.is_none();
+        }
+        self.progress.phase = report.phase;
+        let is_better = |found: &Arc<Best>, own: Option<&Best>| found.is_better_than(own);
+        let found = report
+            .found
+            .filter(|found| is_better(found, self.best.as_deref()));
+        let is_found = found.is_some();
+        let mut goes_on = self.tell(found);
+        if !goes_on
+            && let Some(pending) = report.pending
+            && is_better(&pending, self.best.as_deref())
+        {
+            self.tell(Some(pending));
+        }
+        if !goes_on {
+            self.stopped = Some(Stopped::Interrupted);
+        } else if is_found && self.frame.settings.first_plan_only {
+            self.stopped = Some(Stopped::FirstPlan);
+            goes_on = false;
+        } else if self.progress.counts.memory > self.frame.settings.max_memory {
+            self.stopped = Some(Stopped::OutOfMemory);
+            goes_on = false;
+        }
+        goes_on
+    }
+
+    /// Tells the caller how it goes, and of a new best plan. Whether to go on.
+    fn tell(&mut self, found: Option<Arc<Best>>) -> bool {
+        if let Some(found) = found {
+            self.progress.best = Some(found.found.value.clone());
+            self.progress.plan = Some(found.found.clone());
+            self.best = Some(found);
+            self.finds += 1;
+        }
+        let flow = (self.observe)(&self.progress);
+        self.progress.plan = None;
+        flow.is_continue()
     }
 
     /// The searches that take turns, the complete one last. Where something is used up and filled
     /// up, estimates that count it find most plans sooner, but not all. Where actions offer
     /// something while they run, some searches choose happenings in the order of time.
     fn strategies(&self) -> Vec<Strategy> {
-        let tuning = &self.compiled.tuning;
+        let tuning = &self.frame.compiled.tuning;
         if let Some(member) = tuning.only {
             return vec![Strategy::of(member, tuning)];
         }
         let mut compressing = vec![Member::Compressing];
         let holds =
             |action: &compile::Action| action.compressibility == Compressibility::HoldsResource;
-        if self.compiled.actions.iter().any(holds) {
+        if self.frame.compiled.actions.iter().any(holds) {
             compressing.push(Member::CompressingSafe);
         }
         let mut strategies = Vec::new();
@@ -193,12 +382,12 @@ impl Planner<'_> {
         if self.needs_concurrency() {
             add(Member::Chronological);
             if tuning.uses(Technique::Consumables)
-                && !relaxed::consumables(self.compiled).is_empty()
+                && !relaxed::consumables(self.frame.compiled).is_empty()
             {
                 add(Member::Saving);
             }
         }
-        if !self.compiled.is_symbolic {
+        if !self.frame.compiled.is_symbolic {
             if tuning.uses(Technique::Width) {
                 add(Member::Width);
             }
@@ -213,7 +402,7 @@ impl Planner<'_> {
     /// Whether things may have to happen at the same time: some action offers to others what they
     /// need only while it runs, or waits for others before it can end.
     fn needs_concurrency(&self) -> bool {
-        let compiled = self.compiled;
+        let compiled = self.frame.compiled;
         let needs = |action: &compile::Action| {
             if action.start == compile::NONE || action.end == compile::NONE {
                 return false;
@@ -247,197 +436,11 @@ impl Planner<'_> {
             observe,
             progress,
             names,
-            compiled,
+            frame,
             ..
         } = self;
         let mut goes_on = || observe(progress).is_continue();
-        reasons::pairs_proof(names, compiled, &mut goes_on)
-    }
-
-    /// Lets a search evaluate `budget` states.
-    fn work(&mut self, search: &mut Search<'_>, budget: u64) -> Outcome {
-        self.progress.phase = if self.best.is_some() {
-            Phase::Improving
-        } else if search.prunes_unsafely() {
-            Phase::Incomplete
-        } else {
-            Phase::Complete
-        };
-        self.demand_better(search);
-        let before = (self.progress.counts, search.counts());
-        let most_turns = if self.compiled.is_symbolic {
-            REPORT_SYMBOLIC_TURNS
-        } else {
-            REPORT_TURNS
-        };
-        let report_every = (REPORT_WORK / (1 + search.weight())).clamp(1, most_turns);
-        let mut reported = (search.labour(), search.lookups());
-        let mut spent = 0;
-        while spent < budget || self.keeps_its_turn(search, budget, spent) {
-            let result = search.turn();
-            spent += search.price();
-            // To schedule and to judge a candidate takes longer than many turns, and one that is no
-            // better than the best plan may be followed by any number of others.
-            let mut is_report_due = false;
-            match result {
-                Turn::Over => {
-                    self.count(&before, search);
-                    return Outcome::Over;
-                }
-                Turn::Nothing => {}
-                Turn::Goal(steps) => {
-                    self.count(&before, search);
-                    if let Some(outcome) = self.consider(&steps, search) {
-                        return outcome;
-                    }
-                    spent += steps.len() as u64;
-                    is_report_due = true;
-                }
-            }
-            let lookups = search.lookups() - reported.1;
-            is_report_due |=
-                search.labour() - reported.0 >= report_every || lookups >= REPORT_LOOKUPS;
-            if is_report_due {
-                reported = (search.labour(), search.lookups());
-                self.count(&before, search);
-                if (self.observe)(&self.progress).is_break() {
-                    return Outcome::Stop(Stopped::Interrupted);
-                }
-                if self.progress.counts.memory > self.settings.max_memory {
-                    return Outcome::Stop(Stopped::OutOfMemory);
-                }
-            }
-        }
-        self.count(&before, search);
-        Outcome::BudgetSpent
-    }
-
-    /// Whether a search goes on though its turns are used up: it still comes nearer to a first plan.
-    /// One that does not compress works no more than a first round may come to.
-    fn keeps_its_turn(&self, search: &Search<'_>, budget: u64, spent: u64) -> bool {
-        let tuning = &self.compiled.tuning;
-        self.best.is_none()
-            && budget > tuning.root_check_after
-            && (search.compresses() || spent < tuning.first_round_work / (1 + search.size()))
-            && search.has_come_nearer()
-    }
-
-    fn count(&mut self, before: &(Counts, Counts), search: &Search<'_>) {
-        let (counts, start, now) = (&mut self.progress.counts, before.1, search.counts());
-        counts.expanded = before.0.expanded + now.expanded - start.expanded;
-        counts.generated = before.0.generated + now.generated - start.generated;
-        counts.evaluated = before.0.evaluated + now.evaluated - start.evaluated;
-        counts.memory = before.0.memory + now.memory - start.memory;
-    }
-
-    /// Looks at the choices that a search takes for a plan.
-    fn consider(&mut self, steps: &[Step], search: &mut Search<'_>) -> Option<Outcome> {
-        match self.judge(steps) {
-            Judged::Refused => search.has_lost = true,
-            Judged::NoBetter => {}
-            Judged::Stop(stopped) => return Some(Outcome::Stop(stopped)),
-            Judged::Better if self.compiled.metric.is_some() || self.is_refining() => {
-                return Some(Outcome::Better);
-            }
-            Judged::Better => self.demand_better(search),
-        }
-        None
-    }
-
-    /// Asks the judge about the plan of these choices, and reports it if it is better than the best.
-    fn judge(&mut self, steps: &[Step]) -> Judged {
-        let (task, situation) = (self.task, self.situation);
-        let mut is_interrupted = false;
-        let mut goes_on = || {
-            is_interrupted = (self.observe)(&self.progress).is_break();
-            !is_interrupted
-        };
-        let judged = extract::plan_of(task, situation, self.compiled, steps, &mut goes_on);
-        if is_interrupted {
-            return Judged::Stop(Stopped::Interrupted);
-        }
-        let Some((plan, report)) = judged else {
-            return Judged::Refused;
-        };
-        let worth = |found: &Found| (found.value.clone(), found.makespan.clone());
-        let whole = self.value(plan.clone(), &report);
-        let mut goes_on = || {
-            is_interrupted = (self.observe)(&self.progress).is_break();
-            !is_interrupted
-        };
-        let (plan, report) = without_needless(task, situation, plan, report, &mut goes_on);
-        // A metric can prefer what nothing needs, such as one that rewards time.
-        let fewer = self.value(plan, &report);
-        let found = if worth(&fewer) <= worth(&whole) {
-            fewer
-        } else {
-            whole
-        };
-        if self
-            .best
-            .as_ref()
-            .is_some_and(|best| worth(best) <= worth(&found))
-        {
-            return if is_interrupted {
-                Judged::Stop(Stopped::Interrupted)
-            } else {
-                Judged::NoBetter
-            };
-        }
-        self.progress.best = Some(found.value.clone());
-        self.progress.plan = Some(found.clone());
-        self.best = Some(found);
-        self.best_steps = steps.to_vec();
-        self.is_fresh = true;
-        let flow = (self.observe)(&self.progress);
-        self.progress.plan = None;
-        if flow.is_break() || is_interrupted {
-            return Judged::Stop(Stopped::Interrupted);
-        }
-        if self.settings.first_plan_only {
-            return Judged::Stop(Stopped::FirstPlan);
-        }
-        Judged::Better
-    }
-
-    /// From now on only plans count that are better than the best one.
-    fn demand_better(&self, search: &mut Search<'_>) {
-        let Some(best) = &self.best else { return };
-        let (end, _) = self.compiled.scale.floor(&best.makespan);
-        if self.compiled.metric.is_none() {
-            search.set_horizon(end - 1);
-            return;
-        }
-        let may_equal = search.aim() == Aim::Shortest;
-        if may_equal {
-            search.set_horizon(end - 1);
-        }
-        search.set_limit(MetricBound {
-            value: best.value.clone(),
-            may_equal,
-        });
-    }
-
-    fn value(&self, plan: TimeTriggeredPlan, report: &Report) -> Found {
-        let makespan = report.makespan.clone();
-        let metric = report.metric(self.task);
-        let is_maximized = self
-            .task
-            .problem()
-            .metric
-            .as_ref()
-            .is_some_and(|m| m.maximize);
-        let value = match (&metric, self.settings.objective) {
-            (Some(metric), Objective::Metric) if is_maximized => -metric,
-            (Some(metric), Objective::Metric) => metric.clone(),
-            _ => makespan.clone(),
-        };
-        Found {
-            plan,
-            makespan,
-            metric,
-            value,
-        }
+        reasons::pairs_proof(names, frame.compiled, &mut goes_on)
     }
 }
 
@@ -448,21 +451,4 @@ fn share(search: &Search<'_>, budget: u64, compiled: &Compiled) -> u64 {
     } else {
         budget / compiled.tuning.incomplete_share.max(1)
     }
-}
-
-/// The reason why a share of a search ended.
-enum Outcome {
-    Stop(Stopped),
-    /// With a better plan, where the metric decides.
-    Better,
-    Over,
-    BudgetSpent,
-}
-
-/// What became of choices that were taken for a plan.
-enum Judged {
-    Refused,
-    NoBetter,
-    Better,
-    Stop(Stopped),
 }

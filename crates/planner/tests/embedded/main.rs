@@ -17,5 +17,6 @@ mod portfolio;
 mod refinement;
 mod resources;
 mod situations;
+mod threads;
 mod twin;
 mod world;

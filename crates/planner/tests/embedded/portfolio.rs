@@ -9,7 +9,7 @@ use crate::world::{describe, task};
 
 /// A shelf is one cell wide and `depth` deep; a crane stands before it. Boxes have to fill it, so
 /// the deepest cell comes first: what stands in a cell keeps the crane from those behind.
-fn shelf(depth: usize) -> (String, String) {
+pub(crate) fn shelf(depth: usize) -> (String, String) {
     let domain = "
         (:requirements :typing :durative-actions)
         (:types place box) (:predicates (crane ?p - place) (next ?p ?q - place) (free ?p - place)

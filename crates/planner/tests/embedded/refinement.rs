@@ -13,9 +13,9 @@ use crate::world::{describe, task};
 /// the machines in its own order, and each machine does one at a time. With `takes_hands`, each
 /// operation takes one of many hands: a search that compresses actions lets one wait for the other
 /// because of that.
-type Shop = Vec<Vec<(usize, i64)>>;
+pub(crate) type Shop = Vec<Vec<(usize, i64)>>;
 
-fn shop(jobs: &Shop, takes_hands: bool) -> Task {
+pub(crate) fn shop(jobs: &Shop, takes_hands: bool) -> Task {
     let mut domain =
         String::from("(:requirements :durative-actions :numeric-fluents) (:predicates");
     let (condition, effects) = if takes_hands {
@@ -117,7 +117,7 @@ fn settings(is_refining: bool) -> Settings {
 }
 
 /// Shops made up by a counter.
-fn made_up(seed: usize, jobs: usize, machines: usize) -> Shop {
+pub(crate) fn made_up(seed: usize, jobs: usize, machines: usize) -> Shop {
     let job = |job: usize| {
         let operation = |number: usize| {
             let mixed = (seed * 31 + job * 17 + number * 7 + 3) * 2_654_435_761;

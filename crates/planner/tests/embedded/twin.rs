@@ -1,7 +1,7 @@
 //! A slow search over all sequences of happenings, each scheduled by Bellman and Ford and shown to
 //! the judge, finds a plan exactly when the planner does, and the same metric at best.
 
-mod drafts;
+pub(crate) mod drafts;
 mod walk;
 
 use std::ops::ControlFlow;

@@ -31,14 +31,14 @@ struct DraftAction {
 }
 
 #[derive(Clone, Debug)]
-struct Draft {
+pub(crate) struct Draft {
     actions: Vec<DraftAction>,
     initial: u8,
     goal: Vec<(u8, bool)>,
     timed: Vec<(u8, u8, bool)>,
 }
 
-fn drafts() -> impl Strategy<Value = Draft> {
+pub(crate) fn drafts() -> impl Strategy<Value = Draft> {
     let literal = || (0..5_u8, prop::bool::weighted(0.7));
     let few = |most| prop::collection::vec(literal(), 0..most);
     let action = (
@@ -94,7 +94,7 @@ fn written(literals: &[(u8, bool)], when: &str) -> String {
 }
 
 impl Draft {
-    fn task(&self) -> Task {
+    pub(crate) fn task(&self) -> Task {
         let mut domain = "(define (domain d) (:requirements :durative-actions :adl
             :timed-initial-literals) (:predicates (f0) (f1) (f2) (f3) (f4))"
             .to_owned();

@@ -1,21 +1,133 @@
-//! Plans of a better metric, once there is one.
+//! Better plans, once there is one.
 //!
-//! A portfolio of searches that weigh costs takes turns. Some go for what costs least to finish,
-//! which finds a plan soon; others give what was spent its weight too, which finds cheaper ones.
-//! All are bounded by the best plan so far, whoever found it.
+//! Searches take turns. Where the metric decides, these are others than those for a first plan: some
+//! go for what costs least to finish, which finds a plan soon; others give what was spent its weight
+//! too, which finds cheaper ones. All are bounded by the best plan so far, whoever found it.
+//!
+//! Beside them better plans are looked for near the best one. All that goes in *legs* of counted
+//! work. In each there is one strand at first, a search and then the refiner, and a second one when
+//! that has gone on for a while, in which another refiner works. What a strand finds is told to the
+//! other one when the leg is over, and of plans that are worth the same, the first strand's counts.
 
 use super::super::answer::Stopped;
+use super::super::compile::Compiled;
 use super::super::search::{Aim, Search, Strategy};
-use super::{Outcome, Planner, share};
+use super::super::symmetry::Symmetry;
+use super::super::tuning::Technique;
+use super::refining::Nearby;
+use super::side_by_side::{Job, Tell};
+use super::strand::{Allowance, Frame, Outcome, Strand};
+use super::{Planner, share};
 
 /// A search and its strategy; it is made when its first turn comes.
-struct Entrant<'a> {
-    strategy: Strategy,
-    search: Option<Search<'a>>,
-    is_over: bool,
+pub(super) struct Entrant<'a> {
+    pub(super) strategy: Strategy,
+    pub(super) search: Option<Search<'a>>,
+    pub(super) is_over: bool,
 }
 
-impl Planner<'_> {
+impl<'a> Entrant<'a> {
+    pub(super) fn new(strategy: Strategy) -> Self {
+        Self {
+            strategy,
+            search: None,
+            is_over: false,
+        }
+    }
+
+    /// The search.
+    pub(super) fn search(
+        &mut self,
+        compiled: &'a Compiled,
+        symmetry: &'a Symmetry,
+    ) -> &mut Search<'a> {
+        let strategy = self.strategy;
+        self.search
+            .get_or_insert_with(|| Search::new(compiled, symmetry, strategy))
+    }
+}
+
+/// Searches that take turns.
+struct Contest<'a> {
+    frame: Frame<'a>,
+    symmetry: &'a Symmetry,
+    entrants: Vec<Entrant<'a>>,
+    /// Whose turn it is.
+    current: usize,
+    /// What each is given in this round.
+    budget: u64,
+    /// What the current one has left of it, once that is known.
+    left: Option<u64>,
+    /// How much work searches may still do, or have done too much.
+    credit: i64,
+    /// Whether the current one has found a plan of a better metric in this turn: then it may go on, and
+    /// that does not count.
+    is_finding: bool,
+}
+
+/// What comes out of a strand: the work since its last question, and what is left to search.
+struct Ended {
+    unreported: u64,
+    rest: Rest,
+}
+
+/// What searches have left to look at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Rest {
+    Something,
+    /// Nothing, but some plans are out of their reach.
+    OutOfReach,
+    /// Nothing.
+    Nothing,
+}
+
+impl<'a> Contest<'a> {
+    /// Lets searches take turns for so much work. The work done, and what is left.
+    fn go_on(&mut self, strand: &mut Strand<'a, '_>, most: u64) -> (u64, Rest) {
+        let compiled = self.frame.compiled;
+        let mut done = 0;
+        while done < most {
+            if self.entrants.iter().all(|entrant| entrant.is_over) {
+                return (done, Rest::OutOfReach);
+            }
+            if self.current == self.entrants.len() {
+                self.current = 0;
+                self.budget = self.budget.saturating_mul(2);
+            }
+            let entrant = &mut self.entrants[self.current];
+            if entrant.is_over {
+                self.current += 1;
+                continue;
+            }
+            let search = entrant.search(compiled, self.symmetry);
+            let turns = share(search, self.budget, compiled);
+            let left = self.left.take().unwrap_or(turns);
+            let allowance = Allowance {
+                turns: left,
+                work: most - done,
+            };
+            let (outcome, spent, work) = strand.work(search, allowance);
+            done += work.max(1);
+            let finds = outcome == Outcome::Better && compiled.metric.is_some();
+            self.is_finding = finds || self.is_finding && outcome == Outcome::WorkDone;
+            match outcome {
+                Outcome::Stopped => return (done, Rest::Something),
+                // Who finds better plans may go on.
+                Outcome::Better => self.left = Some(turns),
+                Outcome::WorkDone => self.left = Some(left - spent.min(left)),
+                Outcome::TurnsSpent => self.current += 1,
+                Outcome::Over if search.is_incomplete() => {
+                    entrant.is_over = true;
+                    self.current += 1;
+                }
+                Outcome::Over => return (done, Rest::Nothing),
+            }
+        }
+        (done, Rest::Something)
+    }
+}
+
+impl<'a> Planner<'a> {
     /// Looks for plans of a better metric until there is none, and then for shorter ones that are
     /// as good. Says why it ended.
     pub(super) fn improve(&mut self) -> Stopped {
@@ -29,59 +141,150 @@ impl Planner<'_> {
             entrants.extend(compressing.map(|strategy| strategy.towards(aim)));
         }
         entrants.push(Strategy::COMPLETE.towards(Aim::WeightedAStar(1)));
-        let stopped = self.compete(entrants);
-        let only_grows = self.compiled.metric.as_ref().is_some_and(|m| m.only_grows);
-        if stopped != Stopped::Exhausted || !only_grows {
+        let stopped = self.begin_to_compete(entrants);
+        let metric = self.frame.compiled.metric.as_ref();
+        if stopped != Stopped::Exhausted || !metric.is_some_and(|metric| metric.only_grows) {
             return stopped;
         }
-        let ties = strategies
-            .iter()
-            .map(|strategy| strategy.towards(Aim::Shortest));
-        self.compete(ties.collect())
+        let ties = strategies.iter().map(|one| one.towards(Aim::Shortest));
+        self.begin_to_compete(ties.collect())
     }
 
-    /// Lets searches take turns until one that loses nothing has seen everything.
-    fn compete(&mut self, strategies: Vec<Strategy>) -> Stopped {
-        let (compiled, symmetry) = (self.compiled, self.symmetry);
+    fn begin_to_compete(&mut self, strategies: Vec<Strategy>) -> Stopped {
+        let entrants = strategies.into_iter().map(Entrant::new).collect();
         let before = self.progress.counts.memory;
-        let entrant = |strategy| Entrant {
-            strategy,
-            search: None,
-            is_over: false,
-        };
-        let mut entrants: Vec<Entrant<'_>> = strategies.into_iter().map(entrant).collect();
-        let mut budget = compiled.tuning.improving_round;
-        while entrants.iter().any(|entrant| !entrant.is_over) {
-            for entrant in entrants.iter_mut().filter(|entrant| !entrant.is_over) {
-                let strategy = entrant.strategy;
-                let search = entrant
-                    .search
-                    .get_or_insert_with(|| Search::new(compiled, symmetry, strategy));
-                let states = share(search, budget, compiled);
-                let mut left = states;
-                // Who finds better plans may go on.
-                loop {
-                    match self.work(search, left) {
-                        Outcome::Stop(reason) => return reason,
-                        Outcome::Better => left = states,
-                        Outcome::BudgetSpent => break,
-                        Outcome::Over if search.is_incomplete() => {
-                            entrant.is_over = true;
-                            break;
-                        }
-                        Outcome::Over => {
-                            self.progress.counts.memory = before;
-                            return Stopped::Exhausted;
-                        }
-                    }
-                }
-                if let Some(stopped) = self.refine(states) {
-                    return stopped;
-                }
-            }
-            budget = budget.saturating_mul(2);
+        let stopped = self.compete(entrants, (0, self.frame.compiled.tuning.improving_round));
+        if stopped == Stopped::Exhausted {
+            self.progress.counts.memory = before;
         }
-        self.progress.counts.memory = before;
-        Stopped::Exhausted
+        stopped
+    }
+
+    /// Lets searches take turns until one that loses nothing has seen everything, and looks for
+    /// better plans near the best one meanwhile. It begins with the turn of the `first` one.
+    pub(super) fn compete(
+        &mut self,
+        entrants: Vec<Entrant<'a>>,
+        (first, budget): (usize, u64),
+    ) -> Stopped {
+        let mut contest = Contest {
+            frame: self.frame,
+            symmetry: self.symmetry,
+            entrants,
+            current: first,
+            budget,
+            left: None,
+            credit: 0,
+            is_finding: false,
+        };
+        loop {
+            let rest = self.leg(&mut contest);
+            if let Some(stopped) = self.stopped {
+                return stopped;
+            }
+            let is_over = match rest {
+                Rest::Something => false,
+                // What the searches lose may be found near the best plan.
+                Rest::OutOfReach => !self.is_refining() || self.improved_for >= self.least(),
+                Rest::Nothing => true,
+            };
+            if is_over {
+                return Stopped::Exhausted;
+            }
+        }
+    }
+
+    /// How much work a strand has for better plans at least, if no search has seen everything.
+    fn least(&self) -> u64 {
+        let tuning = &self.frame.compiled.tuning;
+        let weight = self.refiners.first().map_or(0, Nearby::weight);
+        tuning
+            .improving_round
+            .saturating_mul(tuning.refining_share_later)
+            .saturating_mul(weight)
+    }
+
+    /// Whether better plans are looked for near the best one.
+    pub(super) fn is_refining(&self) -> bool {
+        let tuning = &self.frame.compiled.tuning;
+        self.best.is_some()
+            && !self.frame.settings.first_plan_only
+            && !self.frame.compiled.is_symbolic
+            && (tuning.uses(Technique::Rescheduling) || tuning.uses(Technique::Repair))
+    }
+
+    /// One leg. What is left to search.
+    fn leg(&mut self, contest: &mut Contest<'a>) -> Rest {
+        let compiled = self.frame.compiled;
+        let tuning = &compiled.tuning;
+        let (frame, newest, unreported) = (self.frame, self.finds, self.unreported);
+        if !self.is_refining() {
+            let best = self.best.clone();
+            let mut ended = self.hear_all(vec![Box::new(move |tell: Tell<'_>| {
+                let mut strand = Strand::new(frame, best, unreported, tell);
+                let (_, rest) = contest.go_on(&mut strand, u64::MAX);
+                Ended {
+                    unreported: strand.end(false),
+                    rest,
+                }
+            })]);
+            return ended.pop().map_or(Rest::Something, |ended| ended.rest);
+        }
+        let mut refiners = std::mem::take(&mut self.refiners);
+        let own_task = self.own_task.take();
+        if refiners.is_empty() {
+            refiners.push(Nearby::new(compiled, 1));
+        }
+        let has_second = self.improved_for >= tuning.second_strand_after;
+        if has_second && refiners.len() == 1 {
+            refiners.push(Nearby::new(compiled, 2));
+        }
+        let doubled = tuning.first_leg.saturating_add(self.improved_for);
+        let length = doubled.min(tuning.leg);
+        let strands = 1 + u64::from(has_second);
+        let own = strands * length / (1 + refiners[0].share());
+        contest.credit = contest.credit.saturating_add_unsigned(own);
+        // What it mentions first gets other numbers there than here, in no fixed order.
+        let own_task = has_second.then(|| own_task.unwrap_or_else(|| frame.task.with_own_table()));
+        let (first, others) = refiners.split_at_mut(1);
+        let first = &mut first[0];
+        let best = self.best.clone();
+        let mut jobs: Vec<Job<'_, Ended>> = vec![Box::new(move |tell: Tell<'_>| {
+            let mut strand = Strand::new(frame, best, unreported, tell);
+            let (mut work, mut rest) = (0, Rest::Something);
+            if contest.is_finding {
+                (work, rest) = contest.go_on(&mut strand, length);
+            } else if let Ok(most) = u64::try_from(contest.credit)
+                && most > 0
+            {
+                (work, rest) = contest.go_on(&mut strand, most);
+                contest.credit = contest.credit.saturating_sub_unsigned(work);
+            }
+            if !strand.is_stopped && rest != Rest::Nothing {
+                strand.refine(first, newest, length.saturating_sub(work));
+            }
+            Ended {
+                unreported: strand.end(false),
+                rest,
+            }
+        })];
+        if let (Some(second), Some(task)) = (others.first_mut(), &own_task) {
+            let frame = Frame { task, ..frame };
+            let best = self.best.clone();
+            jobs.push(Box::new(move |tell: Tell<'_>| {
+                let mut strand = Strand::new(frame, best, 0, tell);
+                strand.refine(second, newest, length);
+                Ended {
+                    unreported: strand.end(false),
+                    rest: Rest::Something,
+                }
+            }));
+        }
+        let ended = self.hear_all(jobs);
+        self.unreported = ended.iter().map(|ended| ended.unreported).sum();
+        self.improved_for = self.improved_for.saturating_add(length);
+        self.refiners = refiners;
+        self.own_task = own_task;
+        ended.first().map_or(Rest::Something, |ended| ended.rest)
     }
 }

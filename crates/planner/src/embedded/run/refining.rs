@@ -1,101 +1,106 @@
 //! Turns of the search near the best plan.
 
-use super::super::answer::{Phase, Stopped};
+use super::super::answer::Phase;
 use super::super::apply::Step;
+use super::super::compile::Compiled;
 use super::super::refine::{Refiner, Ticker};
 use super::super::search::Strategy;
-use super::super::tuning::{Member, Technique};
-use super::{Judged, Planner, REPORT_WORK};
+use super::super::tuning::Member;
+use super::strand::{Judged, Strand};
+
+/// What makes better plans of the best one, and which best plan it has seen.
+pub(super) struct Nearby<'a> {
+    refiner: Refiner<'a>,
+    /// The number of the best plan that it goes on from; zero for none.
+    pub(super) known: u64,
+}
+
+impl<'a> Nearby<'a> {
+    /// The first one, or the second: they draw other numbers.
+    pub(super) fn new(compiled: &'a Compiled, number: u64) -> Self {
+        let compresses = Strategy::of(Member::Compressing, &compiled.tuning).compresses;
+        Self {
+            refiner: Refiner::new(compiled, compresses, number),
+            known: 0,
+        }
+    }
+
+    /// What one estimate comes to.
+    pub(super) fn weight(&self) -> u64 {
+        1 + self.refiner.weight()
+    }
+
+    /// How long it should take for each unit of time of a search.
+    pub(super) fn share(&self) -> u64 {
+        // Before it has seen a plan, it cannot know that it does not understand it.
+        if self.known == 0 || self.refiner.has_plan() {
+            self.refiner.share()
+        } else {
+            0
+        }
+    }
+}
 
 /// What became of a piece of work near the best plan.
 struct Piece {
     found: Option<Vec<Step>>,
     work: u64,
-    is_stopped: bool,
 }
 
-impl<'a> Planner<'a> {
-    /// Whether better plans are looked for near the best one.
-    pub(super) fn is_refining(&self) -> bool {
-        let tuning = &self.compiled.tuning;
-        self.best.is_some()
-            && !self.settings.first_plan_only
-            && !self.compiled.is_symbolic
-            && (tuning.uses(Technique::Rescheduling) || tuning.uses(Technique::Repair))
-    }
-
-    /// Looks for better plans near the best one for as long as a search of so many states takes.
-    /// Says why it ended, unless it goes on.
-    pub(super) fn refine(&mut self, states: u64) -> Option<Stopped> {
-        if !self.is_refining() {
-            return None;
-        }
-        let compiled = self.compiled;
-        let mut refiner = self.refiner.take().unwrap_or_else(|| {
-            let compresses = Strategy::of(Member::Compressing, &compiled.tuning).compresses;
-            Refiner::new(compiled, compresses)
-        });
-        let most = states
-            .saturating_mul(refiner.share())
-            .saturating_mul(1 + refiner.weight());
+impl Strand<'_, '_> {
+    /// Looks for better plans near the best one, for so much work. `newest` is its number.
+    pub(super) fn refine(&mut self, nearby: &mut Nearby<'_>, newest: u64, most: u64) {
+        let mut is_fresh = nearby.known != newest;
+        nearby.known = newest;
+        let refiner = &mut nearby.refiner;
         let mut work = 0;
         while work < most {
-            if std::mem::take(&mut self.is_fresh) {
-                let steps = self.best_steps.clone();
-                let piece = self.piece(&mut refiner, |refiner, ticker| {
-                    refiner.take(&steps, ticker);
+            if std::mem::take(&mut is_fresh)
+                && let Some(best) = self.best.clone()
+            {
+                let piece = self.piece(refiner, |refiner, ticker| {
+                    refiner.take(&best.steps, ticker);
                     None
                 });
                 work += piece.work;
-                if piece.is_stopped {
-                    return Some(Stopped::Interrupted);
+                if self.is_stopped {
+                    return;
                 }
             }
-            let piece = self.piece(&mut refiner, Refiner::turn);
+            if !refiner.has_plan() {
+                return;
+            }
+            let piece = self.piece(refiner, Refiner::turn);
             work += piece.work + 1;
-            if piece.is_stopped {
-                return Some(Stopped::Interrupted);
+            if self.is_stopped {
+                return;
             }
             let Some(steps) = piece.found else { continue };
             match self.judge(&steps) {
-                Judged::Stop(stopped) => return Some(stopped),
+                Judged::Stopped => return,
                 // The choices are its own.
-                Judged::Better => self.is_fresh = false,
-                Judged::NoBetter => {}
+                Judged::Better | Judged::NoBetter => {}
                 Judged::Refused => {
                     refiner.forget();
-                    self.is_fresh = true;
+                    is_fresh = true;
                 }
             }
         }
-        self.refiner = Some(refiner);
-        None
     }
 
     /// Lets the refiner do something, and asks now and then whether to go on.
-    fn piece(
+    fn piece<'r>(
         &mut self,
-        refiner: &mut Refiner<'a>,
-        work: impl FnOnce(&mut Refiner<'a>, &mut Ticker<'_>) -> Option<Vec<Step>>,
+        refiner: &mut Refiner<'r>,
+        work: impl FnOnce(&mut Refiner<'r>, &mut Ticker<'_>) -> Option<Vec<Step>>,
     ) -> Piece {
-        let Self {
-            observe,
-            progress,
-            unreported,
-            ..
-        } = self;
-        progress.phase = Phase::Improving;
-        let before = progress.counts.evaluated;
+        self.phase = Phase::Improving;
+        let before = self.counts.evaluated;
         let mut known = 0;
         let mut goes_on = |work: u64, evaluated: u64| {
-            progress.counts.evaluated = before + evaluated;
-            *unreported += work - known;
+            let more = work - known;
             known = work;
-            if *unreported < REPORT_WORK {
-                return true;
-            }
-            *unreported = 0;
-            observe(progress).is_continue()
+            self.counted(before, evaluated, more)
         };
         let mut ticker = Ticker {
             weight: 1 + refiner.weight(),
@@ -108,7 +113,6 @@ impl<'a> Planner<'a> {
         Piece {
             found,
             work: ticker.work,
-            is_stopped: ticker.is_stopped,
         }
     }
 }
