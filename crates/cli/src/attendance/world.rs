@@ -10,12 +10,12 @@ use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 
 use super::Attendance;
-use crate::bell::Bell;
+use crate::bell::{Bell, Ring};
 use crate::clock::Clock;
 use crate::desk::Desk;
 use crate::interrupt::Interrupt;
 
-/// How often it is looked whether a plan is there, in a second on the wall clock.
+/// How often it is looked whether a plan is there, or ready, in a second on the wall clock.
 const PER_SECOND: i64 = 50;
 
 /// The time on the wall clock after which a wait looks for requests.
@@ -90,6 +90,15 @@ impl<'a, W: World> Attended<'a, W> {
         self.inner
     }
 
+    fn observed(&self, ring: Ring) -> Observation {
+        let event = match ring {
+            Ring::PlanMade => Event::PlanMade,
+            Ring::PlanReady => Event::PlanReady,
+        };
+        let time = self.now.clone();
+        Observation { time, event }
+    }
+
     fn note(&mut self, passage: &Passage) {
         self.now.clone_from(&passage.now);
         for observation in &passage.observations {
@@ -102,6 +111,7 @@ impl<'a, W: World> Attended<'a, W> {
 
 impl<W: World> World for Attended<'_, W> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.now = std::mem::take(&mut self.now).max(now.clone());
         if let Command::Start {
             ticket,
             duration: Some(_),
@@ -123,6 +133,12 @@ impl<W: World> World for Attended<'_, W> {
             let passage = self.inner.wait(until)?;
             self.note(&passage);
             return Ok(passage);
+        }
+        if let Some(ring) = self.bell.heard_soon() {
+            return Ok(Passage {
+                now: self.now.clone(),
+                observations: vec![self.observed(ring)],
+            });
         }
         loop {
             let clock = Clock::start();
@@ -146,9 +162,8 @@ impl<W: World> World for Attended<'_, W> {
                 let mut asked = desk.fetch(&self.now, &self.task);
                 passage.observations.append(&mut asked);
             }
-            if self.bell.is_heard() {
-                let (time, event) = (self.now.clone(), Event::PlanMade);
-                passage.observations.push(Observation { time, event });
+            if let Some(ring) = self.bell.heard() {
+                passage.observations.push(self.observed(ring));
             }
             // Whether a clock that stands still is broken, the run decides.
             let is_over = !passage.observations.is_empty() || passage.now >= *until || !has_passed;

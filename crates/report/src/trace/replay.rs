@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom_execution::{
-    Command, Entry, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder, World,
-    WorldError,
+    Command, Entry, Need, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, PrepareError,
+    Prepared, Preparer, Recorder, Wanted, World, WorldError,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
@@ -289,6 +289,26 @@ impl Planner for ReplayPlanner {
             seconds: Some(planned.took.0),
             remark: planned.remark,
         }
+    }
+}
+
+/// A preparer of a run that is played back: where plans were made ready beside the run, the trace says
+/// when they were ready.
+#[derive(Clone, Debug)]
+pub struct ReplayPreparer<P>(pub P);
+
+impl<P: Preparer> Preparer for ReplayPreparer<P> {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, PrepareError> {
+        self.0.prepare(task, plan, need)
+    }
+
+    fn begin(&mut self, _wanted: &Wanted<'_>) -> bool {
+        true
     }
 }
 
