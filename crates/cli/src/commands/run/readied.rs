@@ -54,9 +54,12 @@ impl Readied {
         let made = thread::Builder::new().name("preparer".to_owned());
         let made = made.spawn(move || {
             let _rings = clapper;
-            let mut analyst = analyst.until(move || match stop.load(Ordering::SeqCst) {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
+            let mut analyst = analyst.until(move || {
+                if stop.load(Ordering::SeqCst) {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
             });
             let before = size(&own);
             let mission = Wanted {
