@@ -214,10 +214,12 @@ def main():
     parser.add_argument("program")
     parser.add_argument("executors", nargs="*", default=["stn", "guarded", "live"])
     parser.add_argument("--load", type=int, default=0)
-    parser.add_argument("--pace", type=int, default=10)
+    parser.add_argument("--pace", type=int)
     parser.add_argument("--actions", type=int, default=10_000)
     parser.add_argument("--replan", action="store_true")
     chosen = parser.parse_intermixed_args()
+    # While a plan is made, an executive lets no world run ahead of the clock on the wall.
+    chosen.pace = chosen.pace or (1 if chosen.replan else 10)
     if chosen.program == "world":
         return world(chosen.pace, chosen.executors[0])
     load = [multiprocessing.Process(target=calculate, daemon=True) for _ in range(chosen.load)]
