@@ -104,6 +104,7 @@ impl<'a, W: World> Attended<'a, W> {
 
     fn note(&mut self, passage: &Passage) {
         self.now.clone_from(&passage.now);
+        self.since = Clock::start();
         for observation in &passage.observations {
             if let Event::Ended { ticket, .. } = &observation.event {
                 self.open.remove(&ticket.0);
