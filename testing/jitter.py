@@ -7,6 +7,13 @@ Durations deviate. The world is a process, this file once more, whose clock runs
 the wall; meanwhile N other processes do nothing but calculate. How late a start is, is the time on the wall from
 the earliest moment at which it could be, as the trace has it, to the one at which the world has read that it is
 to start. Standard library only.
+
+    python3 testing/jitter.py target/release/elbowroom --replan [--load N] [--robots 100] [EXECUTOR…]
+
+The same with an executive that is given two goals while the robots are under way: one that the rest of the
+running plan reaches, if it can be kept, and one for which a plan is made. How late starts and answers are is printed
+for the time before, from the one goal until its plan is taken up, from the other goal until the planner has answered
+and until its plan is taken up, and after that.
 """
 
 import argparse
@@ -25,7 +32,7 @@ import time
 
 import rounds
 
-ROBOTS, DOCKS = 100, 20
+DOCKS = 20
 
 
 def world(pace, log):
@@ -149,7 +156,7 @@ class Executive:
         self.until(lambda: self.plans() > plans)
 
 
-PHASES = ["before", "the rest made ready", "planning", "the plan made ready", "after"]
+PHASES = ["before", "first goal", "second goal: planning", "second goal: made ready", "after"]
 
 
 def phases_of(trace):
@@ -161,9 +168,9 @@ def phases_of(trace):
         event = line["event"]
         if event == "observed" and line["observation"]["type"] == "goal":
             goals += 1
-            bounds[PHASES[2 * goals - 1]] = [line["observation"]["time"]["decimal"], None]
-        elif event == "planned" and goals == 2 and "planning" in bounds and bounds["planning"][1] is None:
-            bounds["planning"][1] = now
+            bounds[PHASES[goals]] = [line["observation"]["time"]["decimal"], None]
+        elif event == "planned" and goals == 2 and bounds[PHASES[2]][1] is None:
+            bounds[PHASES[2]][1] = now
             bounds[PHASES[3]] = [now, None]
         elif event == "plan" and goals:
             for bound in bounds.values():
@@ -216,6 +223,7 @@ def main():
     parser.add_argument("--load", type=int, default=0)
     parser.add_argument("--pace", type=int)
     parser.add_argument("--actions", type=int, default=10_000)
+    parser.add_argument("--robots", type=int, default=100)
     parser.add_argument("--replan", action="store_true")
     chosen = parser.parse_intermixed_args()
     # While a plan is made, an executive lets no world run ahead of the clock on the wall.
@@ -233,8 +241,8 @@ def main():
         print("|---|---:|---:|---:|---:|---:|", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        texts = {"d.pddl": rounds.DOMAIN, "p.pddl": rounds.problem(ROBOTS, DOCKS)}
-        texts["plan"] = rounds.plan(ROBOTS, DOCKS, chosen.actions)
+        texts = {"d.pddl": rounds.DOMAIN, "p.pddl": rounds.problem(chosen.robots, DOCKS)}
+        texts["plan"] = rounds.plan(chosen.robots, DOCKS, chosen.actions)
         for name, text in texts.items():
             (folder / name).write_text(text)
         for executor in chosen.executors:
