@@ -93,6 +93,8 @@ pub enum Event {
     Asked(Request),
     /// The plan that was begun beside the run is there, or it is certain that there will be none.
     PlanMade,
+    /// The plan that was being made ready beside the run is ready, or it is certain that it cannot be.
+    PlanReady,
     /// The world has said something that cannot be understood.
     Unintelligible {
         /// The message, or its beginning.

@@ -97,6 +97,9 @@ pub struct Mission {
     pub order: Option<PartialOrderPlan>,
     /// The actions under way, which go on in the plan: see [`StepId`].
     pub running: BTreeMap<StepId, Ticket>,
+    /// Other steps of the plan that have begun since the time from which it is, before it is taken up.
+    /// That they have, and what has ended, is told as news.
+    pub begun: BTreeMap<StepId, Ticket>,
 }
 
 /// A moment at which to decide.

@@ -50,7 +50,7 @@ pub use forms::Forms;
 pub use odds::{Compared, Odds, Remainder};
 pub use outlook::{Move, Outlook, Standing, Weighed};
 pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
-pub use preparation::{Need, PrepareError, Prepared, Preparer, Region};
+pub use preparation::{Need, PrepareError, Prepared, Preparer, Region, Wanted};
 pub use progression::{Guards, Parts, Progression, Underway, UnderwayParts, Unreadable};
 pub use reason::{About, Behind, Cause, Changed, Promise, Reason};
 pub use record::{Entry, NoRecord, Recorder};

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use elbowroom_model::validate::Violation;
-use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder::DeorderError;
 use elbowroom_plan::parametrize::ParametrizeError;
@@ -14,7 +14,10 @@ use elbowroom_plan::{
     Valuation,
 };
 
+use crate::event::Ticket;
+use crate::executor::Mission;
 use crate::forms::Forms;
+use crate::run::here;
 
 /// The form of a plan that an executor requires, from the least to the most preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +89,53 @@ pub trait Preparer: Send {
         plan: &TimeTriggeredPlan,
         need: Need,
     ) -> Result<Prepared, PrepareError>;
+
+    /// Begins to make a plan ready, beside whoever asks, in place of what was begun before; whether it
+    /// can do that. When it is ready, whoever drives the run tells it so
+    /// ([`Event::PlanReady`](crate::Event::PlanReady)), and it is [collected](Preparer::collect).
+    fn begin(&mut self, _wanted: &Wanted<'_>) -> bool {
+        false
+    }
+
+    /// What was begun, which is waited for if it is not ready. The answer is the same as if it had not
+    /// been begun beside.
+    ///
+    /// # Errors
+    /// When the plan does not work.
+    fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
+        wanted.mission(self)
+    }
+
+    /// What was begun is not needed any more.
+    fn give_up(&mut self) {}
+}
+
+/// A plan that is to be made ready, and where it begins.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted<'a> {
+    /// The task, with the goals of the plan.
+    pub task: &'a Task,
+    /// The plan, on the world's clock.
+    pub plan: &'a TimeTriggeredPlan,
+    /// From where.
+    pub situation: &'a Situation,
+    /// The tickets of what is under way there, in its order.
+    pub running: &'a [Ticket],
+    /// The present time: it is not begun earlier.
+    pub now: &'a Rational,
+    /// The form that is asked for.
+    pub need: Need,
+}
+
+impl Wanted<'_> {
+    /// What is wanted, made ready by this preparer at once.
+    ///
+    /// # Errors
+    /// When the plan does not work.
+    pub fn mission<P: Preparer + ?Sized>(&self, preparer: &mut P) -> Result<Mission, PrepareError> {
+        let here = (self.task, self.situation, self.running);
+        here::mission(here, self.plan, self.now, preparer, self.need)
+    }
 }
 
 impl<P: Preparer + ?Sized> Preparer for &mut P {
@@ -96,6 +146,18 @@ impl<P: Preparer + ?Sized> Preparer for &mut P {
         need: Need,
     ) -> Result<Prepared, PrepareError> {
         (**self).prepare(task, plan, need)
+    }
+
+    fn begin(&mut self, wanted: &Wanted<'_>) -> bool {
+        (**self).begin(wanted)
+    }
+
+    fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
+        (**self).collect(wanted)
+    }
+
+    fn give_up(&mut self) {
+        (**self).give_up();
     }
 }
 
@@ -131,5 +193,28 @@ pub trait Region: Send {
     /// One more of it; `None` if it cannot be had.
     fn fork(&self) -> Option<Box<dyn Region>> {
         None
+    }
+}
+
+impl<P: Preparer + ?Sized> Preparer for Box<P> {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, PrepareError> {
+        (**self).prepare(task, plan, need)
+    }
+
+    fn begin(&mut self, wanted: &Wanted<'_>) -> bool {
+        (**self).begin(wanted)
+    }
+
+    fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
+        (**self).collect(wanted)
+    }
+
+    fn give_up(&mut self) {
+        (**self).give_up();
     }
 }

@@ -42,6 +42,19 @@
 //! ([`RunSettings::most_replans`]). Goals that are given during a search wait for its end; one that is
 //! abandoned ends it, at most three times in a row.
 //!
+//! Plans can also be made ready beside the run ([`RunSettings::readies_aside`]). Then a new plan is
+//! made to fit as soon as it is there, with what was committed and has not begun in it, and is made
+//! ready from there. It takes over as soon as it is ready, and its executor is told what has begun and
+//! ended since:
+//!
+//! | until it is ready | |
+//! | --- | --- |
+//! | the present plan begins something that the new one has, too, after nothing that disturbs it | it is part of the new plan |
+//! | it would begin anything else | nothing is started any more |
+//! | something unexpected is reported: a failure, silence, another fact or value, an amount | the plan is made to fit again from there, twice at most, and nothing is started any more; after that the executor is told, and finds whether the plan can bear it |
+//!
+//! The rest of the running plan for goals that were added is made ready in the same way.
+//!
 //! However a run ends, nothing is left running: what has not ended is cancelled, and has
 //! [`FAREWELL`] to stop. Only a world that has failed is told nothing more.
 //!
@@ -52,6 +65,7 @@
 mod account;
 mod agenda;
 mod amid;
+mod beginning;
 mod dead_end;
 mod drive;
 mod farewell;
@@ -68,7 +82,6 @@ mod search;
 mod settings;
 mod stand;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
@@ -86,9 +99,9 @@ pub use settings::{
 pub use stand::{Doing, Goals, Stand, TakesUp};
 
 use crate::event::{Command, Ticket};
-use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned};
+use crate::executor::{Decided, Decision, Executor, Moment, News, Order, Planned};
 use crate::planning::Planner;
-use crate::preparation::{PrepareError, Preparer};
+use crate::preparation::Preparer;
 use crate::progression::{Outlook, Progression};
 use crate::reason::{About, Cause, Reason};
 use crate::record::{Entry, Recorder};
@@ -277,6 +290,8 @@ impl<'a> Run<'a> {
         }
         let decided = self.decide();
         match decided.decision {
+            // What is begun now, the plan that is being made ready could not go on with.
+            Decision::Start(orders) if !self.may_start(&orders) => self.let_go_of_plan(),
             Decision::Start(orders) => {
                 // What starts at once is told at once, and must be known before anything else is
                 // decided.
@@ -402,93 +417,5 @@ impl<'a> Run<'a> {
         self.agenda.push(Todo::Plan(reason.clone()));
         self.settle();
         Ok(())
-    }
-
-    /// Makes a plan ready and begins with it. `running` are the tickets of what the situation has
-    /// running.
-    fn take_up(
-        &mut self,
-        plan: &TimeTriggeredPlan,
-        situation: &Situation,
-        running: &[Ticket],
-    ) -> Result<(), Stop> {
-        let (task, goals) = (Arc::clone(&self.task), self.goals());
-        self.take_up_for(&task, &goals, (plan, situation, running))
-    }
-
-    /// The same with a plan for these goals, which this task has.
-    fn take_up_for(
-        &mut self,
-        task: &Task,
-        goals: &Goals,
-        (plan, situation, running): (&TimeTriggeredPlan, &Situation, &[Ticket]),
-    ) -> Result<(), Stop> {
-        match self.prepare(task, plan, situation, running) {
-            Ok(mission) => self.begin_with((plan, situation, running), goals, &mission),
-            Err(error) => {
-                let why = error.to_string();
-                Err(Stop::Over(Verdict::NoPlan { why }))
-            }
-        }
-    }
-
-    /// Begins with a plan for these goals that is ready.
-    fn begin_with(
-        &mut self,
-        (plan, situation, running): (&TimeTriggeredPlan, &Situation, &[Ticket]),
-        goals: &Goals,
-        mission: &Mission,
-    ) -> Result<(), Stop> {
-        self.note_plan(plan);
-        self.begin_anew_with((plan, situation, running), goals);
-        self.begin_mission(mission)
-    }
-
-    /// Begins with a plan that is ready.
-    fn begin_mission(&mut self, mission: &Mission) -> Result<(), Stop> {
-        self.lost = Lost::default();
-        self.account.begin_plan(&mission.running);
-        if self.settings.plans_aside {
-            self.account.note_steps(mission);
-        }
-        self.steps = mission.time_triggered.steps.len();
-        self.progress.begin_plan();
-        self.news.clear();
-        self.ports.recorder.record(&Entry::Mission(mission));
-        if let Err(reason) = self.ports.executor.adopt(mission) {
-            self.account.begin_plan(&BTreeMap::new());
-            return self.replan(&reason);
-        }
-        // What has ended while the plan was made, the plan still waits for.
-        for (step, ticket) in &mission.running {
-            let ended = self
-                .account
-                .get(*ticket)
-                .and_then(|entry| entry.ended.clone());
-            if let Some((time, ending)) = ended {
-                self.news.push(News::Ended {
-                    step: *step,
-                    time,
-                    ending,
-                    measured: Vec::new(),
-                });
-            }
-        }
-        Ok(())
-    }
-
-    fn prepare(
-        &mut self,
-        task: &Task,
-        plan: &TimeTriggeredPlan,
-        situation: &Situation,
-        running: &[Ticket],
-    ) -> Result<Mission, PrepareError> {
-        if self.settings.plans_aside {
-            self.plan_task = Some(Arc::new(task.clone()));
-        }
-        let (preparer, need) = (&mut self.ports.preparer, self.ports.executor.need());
-        let here = (task, situation, running);
-        here::mission(here, plan, &self.now, &mut **preparer, need)
     }
 }

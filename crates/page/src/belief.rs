@@ -149,6 +149,7 @@ impl<'t> Belief<'t> {
             | ObservationLine::Pause { .. }
             | ObservationLine::Resume { .. }
             | ObservationLine::PlanMade { .. }
+            | ObservationLine::PlanReady { .. }
             | ObservationLine::Unintelligible { .. } => {}
         }
         self.note(texts);

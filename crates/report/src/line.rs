@@ -375,6 +375,11 @@ pub enum ObservationLine {
         /// The time.
         time: Exact,
     },
+    /// The plan that was made ready beside the run is ready.
+    PlanReady {
+        /// The time.
+        time: Exact,
+    },
     /// Something that cannot be understood.
     Unintelligible {
         /// The message.

@@ -16,7 +16,9 @@ use elbowroom_model::Task;
 use serde::Serialize;
 
 pub use crate::line::{self, Line};
-pub use replay::{Difference, Replay, ReplayPlanner, ReplayWorld, Stored, TraceError};
+pub use replay::{
+    Difference, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored, TraceError,
+};
 pub use snapshot::{
     GoalLine, NewsLine, SituatedLine, SnapshotLine, StartLine, TakenUpLine, TurnLine, UnderWayLine,
 };

@@ -176,6 +176,7 @@ fn opposite(event: &Event) -> Event {
         Event::Feedback { .. }
         | Event::Asked(_)
         | Event::PlanMade
+        | Event::PlanReady
         | Event::Unintelligible { .. } => event.clone(),
         Event::Fact { fact, truth } => Event::Fact {
             fact: *fact,

@@ -10,12 +10,12 @@ use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 
 use super::Attendance;
-use crate::bell::Bell;
+use crate::bell::{Bell, Ring};
 use crate::clock::Clock;
 use crate::desk::Desk;
 use crate::interrupt::Interrupt;
 
-/// How often it is looked whether a plan is there, in a second on the wall clock.
+/// How often it is looked whether a plan is there, or ready, in a second on the wall clock.
 const PER_SECOND: i64 = 50;
 
 /// The time on the wall clock after which a wait looks for requests.
@@ -39,6 +39,8 @@ pub(crate) struct Attended<'a, W> {
     /// How much of the world's time passes in a piece.
     piece: Rational,
     now: Rational,
+    /// Measures the time on the wall clock since then.
+    since: Clock,
     /// What was told to start and has not ended.
     open: BTreeSet<u64>,
 }
@@ -63,6 +65,7 @@ impl<'a, W: World> Attended<'a, W> {
             is_live: Box::new(|| true),
             piece: Rational::new(millis, 1000) * factor,
             now: Rational::ZERO,
+            since: Clock::start(),
             open: BTreeSet::new(),
         }
     }
@@ -90,8 +93,18 @@ impl<'a, W: World> Attended<'a, W> {
         self.inner
     }
 
+    fn observed(&self, ring: Ring) -> Observation {
+        let event = match ring {
+            Ring::PlanMade => Event::PlanMade,
+            Ring::PlanReady => Event::PlanReady,
+        };
+        let time = self.now.clone();
+        Observation { time, event }
+    }
+
     fn note(&mut self, passage: &Passage) {
         self.now.clone_from(&passage.now);
+        self.since = Clock::start();
         for observation in &passage.observations {
             if let Event::Ended { ticket, .. } = &observation.event {
                 self.open.remove(&ticket.0);
@@ -100,8 +113,17 @@ impl<'a, W: World> Attended<'a, W> {
     }
 }
 
+/// How far a world is ahead of the wall clock, if so much has passed there since it was last asked, and so
+/// much here: at most what it was asked to wait for. A world with a clock of its own cannot be held
+/// back, and what it has done while the run was busy is not waited for once more.
+fn ahead(passed: Duration, elapsed: Duration) -> Duration {
+    let piece = Duration::from_secs(1) / u32::try_from(PER_SECOND).unwrap_or(1);
+    passed.saturating_sub(elapsed).min(piece)
+}
+
 impl<W: World> World for Attended<'_, W> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.now = std::mem::take(&mut self.now).max(now.clone());
         if let Command::Start {
             ticket,
             duration: Some(_),
@@ -124,6 +146,12 @@ impl<W: World> World for Attended<'_, W> {
             self.note(&passage);
             return Ok(passage);
         }
+        if let Some(ring) = self.bell.heard_soon() {
+            return Ok(Passage {
+                now: self.now.clone(),
+                observations: vec![self.observed(ring)],
+            });
+        }
         loop {
             let clock = Clock::start();
             let is_planning = self.bell.is_awaited();
@@ -136,19 +164,20 @@ impl<W: World> World for Attended<'_, W> {
             let before = self.now.clone();
             let mut passage = self.inner.wait(until.min(&piece))?;
             let has_passed = passage.now > self.now;
+            let elapsed = self.since.elapsed();
             self.note(&passage);
             if is_planning {
                 let passed = (&self.now - &before).to_f64() / self.factor.to_f64();
                 let passed = Duration::try_from_secs_f64(passed).unwrap_or_default();
-                self.bell.wait(passed.saturating_sub(clock.elapsed()));
+                self.bell.wait(ahead(passed, elapsed));
             }
+            self.since = Clock::start();
             if let Some(desk) = self.desk.as_ref().filter(|desk| !desk.is_empty()) {
                 let mut asked = desk.fetch(&self.now, &self.task);
                 passage.observations.append(&mut asked);
             }
-            if self.bell.is_heard() {
-                let (time, event) = (self.now.clone(), Event::PlanMade);
-                passage.observations.push(Observation { time, event });
+            if let Some(ring) = self.bell.heard() {
+                passage.observations.push(self.observed(ring));
             }
             // Whether a clock that stands still is broken, the run decides.
             let is_over = !passage.observations.is_empty() || passage.now >= *until || !has_passed;
@@ -167,5 +196,24 @@ impl<W: World> World for Attended<'_, W> {
         fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
         self.inner.look(facts, fluents)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::ahead;
+
+    #[test]
+    fn only_a_world_that_is_ahead_of_the_wall_clock_is_held_back() {
+        let millis = Duration::from_millis;
+        // A simulation, whose time passes at once.
+        assert_eq!(ahead(millis(20), millis(1)), millis(19));
+        // A robot, while the run was busy with something else for a while.
+        assert_eq!(ahead(millis(500), millis(500)), millis(0));
+        assert_eq!(ahead(millis(500), millis(501)), millis(0));
+        // A clock that cannot be held back.
+        assert_eq!(ahead(millis(5000), millis(500)), millis(20));
     }
 }

@@ -5,6 +5,7 @@ mod believed;
 mod journaled;
 pub(super) mod live;
 pub(super) mod process;
+mod readied;
 mod realtime;
 mod replay;
 pub(super) mod resume;
@@ -44,6 +45,7 @@ use crate::words::tame;
 use ahead::{Ahead, Aside};
 use believed::Believed;
 use journaled::{Careful, JournalWriter, Kept};
+use readied::Readied;
 use realtime::{Pace, PacedPlanner, Realtime};
 use shown::Views;
 use spec::contradiction;
@@ -254,6 +256,7 @@ impl Job<'_> {
         let request = RunRequest::new(self.spec, self.task)
             .beginning_with(self.first)
             .planned_by(Ahead::new(planner, self.spec, &self.aside))
+            .prepared_by(Readied::new(self.spec, self.task, &self.aside.bell)?)
             .told_to(both(self.attendance.listener(), &mut believes))
             .recorded_by(recorder);
         execute(request, world, &mut Stopwatch::start(self.interrupt))
@@ -309,9 +312,12 @@ impl Job<'_> {
             let goes_on = || !interrupt.is_requested();
             let planner = self.spec.planner_for(self.task, None, &clock, &goes_on);
             let planner = planner.map_err(contradiction)?;
+            let readied = Readied::new(self.spec, self.task, &self.aside.bell);
+            let readied = readied.map_err(contradiction)?;
             let request = RunRequest::new(self.spec, self.task)
                 .beginning_with(self.first)
                 .planned_by(Ahead::new(planner, self.spec, &self.aside))
+                .prepared_by(readied)
                 .told_to(both(self.attendance.listener(), believed.listener()))
                 .recorded_by(live::Live::new(&mut writer));
             let mut watch = Attentive {
@@ -350,6 +356,7 @@ impl Job<'_> {
         let request = RunRequest::new(spec, task)
             .beginning_with(self.first)
             .told_to(self.attendance.listener())
+            .prepared_by(Readied::new(spec, task, &self.aside.bell)?)
             .planned_by(PacedPlanner {
                 inner: planner,
                 pace: &pace,

@@ -98,6 +98,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         ));
     }
     spec.plans_aside = spec.can_plan_aside();
+    spec.readies_aside = spec.plans_aside;
     let (task, first) = checked(&arguments.run, &spec, world.as_ref(), output)?;
     let front = match front {
         Some(front) => front,

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::run::{Report, Stand, Verdict};
-use elbowroom_execution::{Entry, NoRecord, Planner, Progression, Recorder, World};
+use elbowroom_execution::{Entry, NoRecord, Planner, Preparer, Progression, Recorder, World};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_report::trace::line::ReportLine;
@@ -28,6 +28,8 @@ pub struct RunRequest<'a> {
     /// Who makes plans, if it is not whom the specification names: a replay, or a planner on
     /// another clock than the watcher's.
     pub planner: Option<Box<dyn Planner + 'a>>,
+    /// Who makes plans ready, if it is not an [`Analyst`](crate::execute::Analyst) that is waited for.
+    pub preparer: Option<Box<dyn Preparer + 'a>>,
     /// The recorder.
     pub recorder: Box<dyn Recorder + 'a>,
     /// Told what the run believes, whenever that may have changed.
@@ -86,6 +88,7 @@ impl<'a> RunRequest<'a> {
             stand: None,
             reopened: 0,
             planner: None,
+            preparer: None,
             recorder: Box::new(NoRecord),
             listener: None,
         }
@@ -121,6 +124,13 @@ impl<'a> RunRequest<'a> {
         Self { planner, ..self }
     }
 
+    /// Has plans made ready like that.
+    #[must_use]
+    pub fn prepared_by(self, preparer: impl Preparer + 'a) -> Self {
+        let preparer: Option<Box<dyn Preparer + 'a>> = Some(Box::new(preparer));
+        Self { preparer, ..self }
+    }
+
     /// Tells what the run believes, as [`Execution::told_to`](crate::execute::Execution::told_to).
     #[must_use]
     pub fn told_to(self, listener: impl FnMut(&Progression) + Send + 'a) -> Self {
@@ -151,7 +161,10 @@ pub fn run(
     watcher: &mut (dyn Watcher + Send),
 ) -> Result<RunOutcome, SpecError> {
     let spec = request.spec;
-    let execution = spec.execution(request.task)?;
+    let mut execution = spec.execution(request.task)?;
+    if let Some(preparer) = request.preparer {
+        execution = execution.prepared_by(preparer);
+    }
     let model = spec.model(request.task.problem());
     let model = model.map_err(SpecError::World)?;
     let shared = Watched(Mutex::new(watcher));

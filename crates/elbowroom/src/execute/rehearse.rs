@@ -234,6 +234,7 @@ impl Rehearse {
         rollouts.settings.planning_time = PlanningTime::Seconds(planning_time.clone());
         rollouts.settings.watches_room = false;
         rollouts.settings.plans_aside = false;
+        rollouts.settings.readies_aside = false;
         if let Some(replanning) = &mut rollouts.replanning {
             replanning.improve_states = 0;
             replanning.all_states = SAMPLE_STATES;

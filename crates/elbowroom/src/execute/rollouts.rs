@@ -95,6 +95,7 @@ impl<'a> Tryout<'a> {
         }
         rollouts.settings.watches_room = false;
         rollouts.settings.plans_aside = false;
+        rollouts.settings.readies_aside = false;
         let planner: Box<dyn Planner + 'a> = match &rollouts.replanning {
             None => Box::new(NoPlanner),
             Some(replanning) => {

@@ -119,6 +119,10 @@ pub struct RunSpec {
     /// ([`RunSettings::plans_aside`]); left out where they are not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub plans_aside: bool,
+    /// Whether they are made ready beside it, too ([`RunSettings::readies_aside`]); left out where they
+    /// are not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub readies_aside: bool,
     /// How many seconds of the world pass in one second on the wall clock; without one, there is no
     /// wall clock.
     #[serde(with = "positive::nullable")]
@@ -198,6 +202,7 @@ impl RunSpec {
             running: settings.running,
             planning_time: PlanningTime::Seconds(Rational::ZERO),
             plans_aside: false,
+            readies_aside: false,
             realtime: None,
             max_replans: settings.most_replans,
             time_limit: settings.time_limit,
@@ -214,6 +219,7 @@ impl RunSpec {
             time_limit: self.time_limit.clone(),
             // In a simulation without a clock nobody can be warned.
             plans_aside: self.plans_aside,
+            readies_aside: self.readies_aside,
             watches_room: self.world_process.is_some() || self.realtime.is_some(),
             ..RunSettings::default()
         }

@@ -169,6 +169,7 @@ const BEFORE: &str = "why stands in an earlier segment of the journal";
 const NO_GOAL: &str = "there is no goal";
 const TO_COME: &str = "to-come";
 const RUNNING: &str = "running";
+const SUCCEEDED: &str = "succeeded";
 
 /// The goal of a problem, in PDDL, as it stands behind `:goal`.
 pub fn goal_text(task: &Task) -> String {
@@ -311,12 +312,20 @@ impl Known {
         let numbered = mission.time_triggered.steps.iter().zip(&mission.instances);
         let mut steps: Vec<StepNow> = numbered
             .map(|(step, instance)| {
-                let ticket = mission.running.get(&StepId::from(*instance)).map(|it| it.0);
+                let id = StepId::from(*instance);
+                let ticket = mission.running.get(&id).or_else(|| mission.begun.get(&id));
+                let ticket = ticket.map(|it| it.0);
+                let state = match ticket {
+                    None => TO_COME,
+                    Some(ticket) if self.running.contains_key(&ticket) => RUNNING,
+                    Some(_) if mission.running.contains_key(&id) => RUNNING,
+                    Some(_) => SUCCEEDED,
+                };
                 StepNow {
                     action: step.action.name.clone(),
                     start: Exact(&mission.origin + &step.start),
                     duration: step.duration.clone().map(Exact),
-                    state: if ticket.is_some() { RUNNING } else { TO_COME }.to_owned(),
+                    state: state.to_owned(),
                     ticket,
                 }
             })
@@ -414,7 +423,7 @@ impl Known {
                     .get(&ticket.0)
                     .is_some_and(|running| running.planned.is_none());
                 if is_instantaneous {
-                    self.end(ticket.0, "succeeded");
+                    self.end(ticket.0, SUCCEEDED);
                 }
             }
             Event::Ended { ticket, ending, .. } => self.end(ticket.0, ending.name()),
@@ -434,6 +443,7 @@ impl Known {
             | Event::Fact { .. }
             | Event::Value { .. }
             | Event::PlanMade
+            | Event::PlanReady
             | Event::Unintelligible { .. } => {}
         }
     }

@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom::execute::{Embedded, Execution};
+use elbowroom::execute::{Analyst, Embedded, Execution};
 use elbowroom::execution::run::{Report, RunSettings, Verdict};
 use elbowroom::execution::{
-    Command, Entry, Event, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder,
-    Request, World, WorldError,
+    Command, Entry, Event, Need, Observation, Passage, PlanAnswer, Planner, PlannerAnswer,
+    PrepareError, Prepared, Preparer, Recorder, Request, Wanted, World, WorldError,
 };
+use elbowroom::flow;
 use elbowroom::model::validate::{Settings, validate};
 use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan, problem};
 use elbowroom::num::Rational;
@@ -29,7 +30,11 @@ pub(crate) struct Desk {
     seconds: Vec<Rational>,
     /// When the plan is there, until that was said.
     due: Option<Rational>,
-    begun: usize,
+    /// How long making it ready takes, likewise.
+    readying: Vec<Rational>,
+    ready: Option<Rational>,
+    pub(crate) readied: usize,
+    pub(crate) begun: usize,
     given_up: usize,
     waited_for: usize,
     /// Whether there is never a plan.
@@ -45,7 +50,13 @@ impl Beside {
         Self(Arc::new(Mutex::new(desk)))
     }
 
-    fn desk(&self) -> MutexGuard<'_, Desk> {
+    /// With plans that take so long to be made ready; without any times, that is done at once.
+    pub(crate) fn readying(self, seconds: &[Rational]) -> Self {
+        self.desk().readying = seconds.to_vec();
+        self
+    }
+
+    pub(crate) fn desk(&self) -> MutexGuard<'_, Desk> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -79,6 +90,35 @@ impl Planner for Beside {
     }
 }
 
+/// A preparer that works beside the run, and takes its time; or, without any time to take, at once.
+pub(crate) struct Readier(pub(crate) Beside);
+
+impl Preparer for Readier {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, PrepareError> {
+        Analyst::new(flow::Settings::default()).prepare(task, plan, need)
+    }
+
+    fn begin(&mut self, _wanted: &Wanted<'_>) -> bool {
+        let mut desk = self.0.desk();
+        desk.readied += 1;
+        let Some(most) = desk.readying.len().checked_sub(1) else {
+            return false;
+        };
+        let ready = &desk.now + &desk.readying[most.min(desk.readied - 1)];
+        desk.ready = Some(ready);
+        true
+    }
+
+    fn give_up(&mut self) {
+        self.0.desk().ready = None;
+    }
+}
+
 /// That world, which says when a plan is there, and in which actions take longer or less long than planned.
 pub(crate) struct Telling {
     pub(crate) inner: Scripted,
@@ -105,8 +145,22 @@ impl World for Telling {
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        let due = self.planner.desk().due.clone();
-        let soonest = due.iter().chain([until]).min().cloned().unwrap_or_default();
+        let mut desk = self.planner.desk();
+        if desk.ready.as_ref().is_some_and(|ready| *ready <= desk.now) {
+            // Without anything else that happens at that time.
+            desk.ready = None;
+            return Ok(Passage {
+                now: desk.now.clone(),
+                observations: vec![Observation {
+                    time: desk.now.clone(),
+                    event: Event::PlanReady,
+                }],
+            });
+        }
+        let (due, ready) = (desk.due.clone(), desk.ready.clone());
+        drop(desk);
+        let soonest = due.iter().chain(&ready).chain([until]).min();
+        let soonest = soonest.cloned().unwrap_or_default();
         let mut passage = self.inner.wait(&soonest)?;
         let mut desk = self.planner.desk();
         desk.now.clone_from(&passage.now);
@@ -115,6 +169,13 @@ impl World for Telling {
             passage.observations.push(Observation {
                 time: passage.now.clone(),
                 event: Event::PlanMade,
+            });
+        }
+        if ready.is_some_and(|ready| ready <= passage.now) {
+            desk.ready = None;
+            passage.observations.push(Observation {
+                time: passage.now.clone(),
+                event: Event::PlanReady,
             });
         }
         Ok(passage)
@@ -142,13 +203,13 @@ impl Recorder for Tape {
     }
 }
 
-struct Told {
-    notes: Vec<String>,
-    lines: Vec<String>,
-    report: Report,
+pub(crate) struct Told {
+    pub(crate) notes: Vec<String>,
+    pub(crate) lines: Vec<String>,
+    pub(crate) report: Report,
 }
 
-fn settings() -> RunSettings {
+pub(crate) fn settings() -> RunSettings {
     RunSettings {
         plans_aside: true,
         watches_room: true,
@@ -187,7 +248,7 @@ pub(crate) fn telling(
     (world, is_to_end)
 }
 
-fn told(
+pub(crate) fn told(
     execution: Execution<'_>,
     task: &Arc<Task>,
     script: (i64, Vec<(Rational, Event)>),
@@ -214,7 +275,7 @@ fn told(
     }
 }
 
-fn seconds(seconds: i64) -> Rational {
+pub(crate) fn seconds(seconds: i64) -> Rational {
     Rational::from(seconds)
 }
 
@@ -229,7 +290,7 @@ fn lasting(task: &Arc<Task>, end: i64, script: Vec<(i64, Event)>, planner: &Besi
 }
 
 #[track_caller]
-fn assert_has(told: &Told, notes: &[&str]) {
+pub(crate) fn assert_has(told: &Told, notes: &[&str]) {
     let mut left = told.notes.iter();
     for note in notes {
         let found = left.any(|it| it.contains(note));

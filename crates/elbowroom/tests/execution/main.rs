@@ -16,6 +16,7 @@ mod nothing_left;
 mod one_time;
 mod openings;
 mod others;
+mod readying;
 mod reasons;
 mod refusals;
 mod reports;

@@ -3,6 +3,8 @@
 use std::sync::Arc;
 
 use elbowroom::execute::Analyst;
+use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
+use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, TraceWriter};
 use elbowroom::sim::SimWorld;
@@ -83,4 +85,67 @@ fn times_with_seventeen_digits_are_played_back_without_differences() {
         longest = longest.max(digits.max().unwrap_or(0));
     }
     assert!(longest >= 17, "the floats are awkward: {longest}");
+}
+
+/// A world that fails when it is asked for the nth time, counting commands.
+struct Mortal<W> {
+    inner: W,
+    left: usize,
+}
+
+impl<W> Mortal<W> {
+    fn lives(&mut self) -> Result<(), WorldError> {
+        self.left = self
+            .left
+            .checked_sub(1)
+            .ok_or_else(|| WorldError::new("it has fallen off the table"))?;
+        Ok(())
+    }
+}
+
+impl<W: World> World for Mortal<W> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.lives()?;
+        self.inner.command(now, command)
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        self.lives()?;
+        self.inner.wait(until)
+    }
+
+    fn look(
+        &mut self,
+        facts: &[FactId],
+        fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        self.lives()?;
+        self.inner.look(facts, fluents)
+    }
+}
+
+/// Wherever a world fails, the trace plays back to that end, in the same words.
+#[test]
+fn a_run_whose_world_failed_plays_back_to_the_same_end() {
+    for scene in [Scene::case("delivery"), Scene::case("match")] {
+        let mut failed = 0;
+        for lives in 0..60 {
+            let model = scene.world("");
+            let mut text = String::new();
+            let mut sink = |line: &str| text.push_str(line);
+            let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
+            writer.header(&json!({})).expect("an object");
+            let mut world = Mortal {
+                inner: SimWorld::new(Arc::clone(&scene.task), &model, 1),
+                left: lives,
+            };
+            let mut analyst = Analyst::new(scene.flow.clone());
+            scene.run_in("guarded", &mut world, &mut analyst, &mut writer);
+            let last = text.lines().last().expect("it is over");
+            failed += usize::from(last.contains("it has fallen off the table"));
+            let agreed = replayed(&scene, "guarded", &text);
+            assert_eq!(agreed + 1, text.lines().count(), "{lives}: {last}");
+        }
+        assert!(failed > 5, "{failed}");
+    }
 }

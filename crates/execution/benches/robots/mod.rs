@@ -179,6 +179,7 @@ pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
     let envelope = DecoupledEnvelope::new(&plan, intervals);
     Mission {
         origin: Rational::ZERO,
+        begun: std::collections::BTreeMap::new(),
         now: Rational::ZERO,
         time_triggered: TimeTriggeredPlan::default(),
         plan,

@@ -66,6 +66,9 @@ impl Dispatch {
         self.told.remove(&id);
         if start == end {
             self.finish(id);
+        } else if self.happened(end).is_none() {
+            // Also what began before the plan was taken up.
+            self.progress.running.insert(id);
         }
         let missed = fixed.err()?;
         let name = self.action(id).name.clone();

@@ -309,6 +309,11 @@ impl Account {
         tickets.filter_map(|ticket| Some((*ticket, self.get(*ticket)?)))
     }
 
+    /// The steps of the present plan that were started, or went on when it began.
+    pub(super) fn steps(&self) -> &BTreeMap<StepId, Ticket> {
+        &self.steps
+    }
+
     pub(super) fn ticket(&self, step: StepId) -> Option<Ticket> {
         self.steps.get(&step).copied()
     }

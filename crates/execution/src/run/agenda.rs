@@ -5,6 +5,7 @@ use std::sync::Arc;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
+use super::beginning::Course;
 use super::stand::TakesUp;
 use super::{Next, Run, Stop};
 use crate::event::{Command, Ticket};
@@ -65,7 +66,7 @@ impl Run<'_> {
         match todo {
             Todo::Begin(Some(plan)) => {
                 let situation = Situation::initial(&self.task);
-                self.take_up(&plan, &situation, &[])?;
+                self.take_up(Course::of(&plan, &situation, &[]))?;
             }
             Todo::Begin(None) => self.replan(&Reason::new(Cause::NewPlan))?,
             Todo::Decide => self.decide_and_follow()?,
@@ -87,8 +88,14 @@ impl Run<'_> {
             Todo::Adopt(made) => self.adopt(made)?,
             Todo::TakeUp(mission) => self.begin_mission(&mission)?,
             Todo::TakeUpAgain(task, it) => {
-                self.agenda.push(Todo::Tell(it.news));
-                self.take_up_for(&task, &it.goals, (&it.plan, &it.situation, &it.running))?;
+                self.agenda.push(Todo::Tell(it.news.clone()));
+                let course = Course {
+                    plan: &it.plan,
+                    situation: &it.situation,
+                    running: &it.running,
+                    begun: &it.begun,
+                };
+                self.take_up_for(&task, &it.goals, course)?;
             }
             Todo::Tell(news) => {
                 self.news.splice(0..0, news);

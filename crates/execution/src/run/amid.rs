@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::agenda::Todo;
-use super::{Account, Mission, News, Ports, Progression, Run, RunSettings, Ticket};
+use super::{Account, News, Ports, Progression, Run, RunSettings, Ticket};
+use crate::executor::Mission;
 use crate::executor::StepId;
 use crate::reason::Reason;
 

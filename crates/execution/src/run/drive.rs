@@ -68,7 +68,8 @@ impl Run<'_> {
 
     /// What the run needs of the world next. As long as a question is open, it is asked again.
     ///
-    /// Plans are made and made ready in here, so that this can take as long as the planner.
+    /// Plans are made and made ready in here, so that this can take as long as the planner, but for those
+    /// that are made beside the run ([`RunSettings::plans_aside`](super::RunSettings::plans_aside)).
     #[expect(
         clippy::should_implement_trait,
         reason = "a run is no iterator: what comes next depends on the answers"

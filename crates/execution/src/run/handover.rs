@@ -6,6 +6,7 @@ use elbowroom_model::Situation;
 use elbowroom_num::Rational;
 
 use super::agenda::{Made, Todo};
+use super::beginning::Course;
 use super::here::{Guess, situation_at};
 use super::{PlanningTime, Run, RunningRule, Stop, Verdict};
 use crate::event::Ticket;
@@ -184,7 +185,7 @@ impl Run<'_> {
         }
         let surprises = std::mem::take(&mut self.news);
         self.agenda.push(Todo::Tell(surprises));
-        self.take_up(&made.plan, &made.situation, &made.running)
+        self.take_up(Course::of(&made.plan, &made.situation, &made.running))
     }
 
     /// Where things will stand when the new plan can begin: after the time that planning is

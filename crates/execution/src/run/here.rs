@@ -1,6 +1,7 @@
 //! Where a run stands: the situation for a plan from here, what is left of the present plan, and a
 //! plan made ready.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_model::validate::{Settings, validate_from};
@@ -91,11 +92,11 @@ pub fn rest_of(
 ///
 /// # Errors
 /// When the plan does not work.
-pub fn mission(
+pub fn mission<P: Preparer + ?Sized>(
     (task, situation, running): (&Task, &Situation, &[Ticket]),
     plan: &TimeTriggeredPlan,
     now: &Rational,
-    preparer: &mut dyn Preparer,
+    preparer: &mut P,
     need: Need,
 ) -> Result<Mission, PrepareError> {
     let task = Arc::new(situation.rest_of_task(task));
@@ -105,6 +106,7 @@ pub fn mission(
     let steps = ready.instances.iter().copied().map(StepId::from);
     Ok(Mission {
         running: steps.zip(running.iter().copied()).collect(),
+        begun: BTreeMap::new(),
         task,
         origin: situation.time.clone(),
         now: now.clone(),

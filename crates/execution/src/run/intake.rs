@@ -48,6 +48,7 @@ impl Run<'_> {
             | Event::Value { .. }
             | Event::Asked(_)
             | Event::PlanMade
+            | Event::PlanReady
             | Event::Unintelligible { .. } => return Planned::default(),
         };
         let step = self.account.get(ticket).and_then(|entry| entry.step);
@@ -89,6 +90,7 @@ impl Run<'_> {
             }
             Event::Asked(request) => return self.asked_for(request),
             Event::PlanMade => return self.note_plan_made(),
+            Event::PlanReady => return self.note_plan_ready(),
             Event::Unintelligible { said, why } => {
                 self.progress.note_unintelligible(said, why);
                 return Some("cannot be understood; nothing was made of it");
@@ -148,6 +150,7 @@ impl Run<'_> {
         let (action, step) = (entry.action.clone(), entry.step);
         let planned = entry.planned.clone().unwrap_or_default();
         self.believe_until(time);
+        self.note_measured(measured);
         let amounts = self.amounts(&action, false, Some(&planned), measured);
         // An effect that cannot be computed leaves its fluent as it was.
         let _ = self.belief.start(ticket, &action, &planned, measured);
@@ -193,6 +196,7 @@ impl Run<'_> {
         }
         let step = self.account.get(ticket).and_then(|entry| entry.step);
         self.believe_until(&time);
+        self.note_measured(measured);
         let mut amounts = Vec::new();
         if *ending == Ending::Succeeded {
             if let Some(underway) = self.belief.running().get(&ticket) {
@@ -272,13 +276,14 @@ impl Run<'_> {
             Body::Instantaneous(snap) => self.belief.doubt(snap),
             Body::Durative(body) => self.belief.doubt(&body.end),
         }
+        self.note_disagreement();
         self.news.push(News::Contradiction {
             action: action.name.clone(),
         });
     }
 
     /// The present plan does not know of an action of an earlier one, but may read what it wrote.
-    fn tell_effects(&mut self, ticket: Ticket, is_end: bool) {
+    pub(super) fn tell_effects(&mut self, ticket: Ticket, is_end: bool) {
         let Some(entry) = self.account.get(ticket) else {
             return;
         };
@@ -327,6 +332,7 @@ impl Run<'_> {
             return;
         };
         self.belief.stop(ticket);
+        self.note_disagreement();
         let now = self.now.clone();
         self.note(&now, What::Stopped(ticket));
         // Whether its end took place is not known.

@@ -26,6 +26,7 @@ use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan, problem};
 use elbowroom_num::Rational;
 
 use super::agenda::Todo;
+use super::beginning::Course;
 use super::goals::OpenGoal;
 use super::here::{Guess, rest_of};
 use super::intake::Remark;
@@ -223,7 +224,7 @@ impl<'a> Run<'a> {
         {
             lasting.rests_since = None;
             self.replans = 0;
-            self.turn_to(&turn)?;
+            self.turn_to(turn)?;
             return Ok(true);
         }
         if lasting.rests_since.is_none() {
@@ -262,7 +263,7 @@ impl<'a> Run<'a> {
     }
 
     /// Keeps the rest of the plan, or makes another one.
-    fn turn_to(&mut self, turn: &Turn) -> Result<(), Stop> {
+    fn turn_to(&mut self, turn: Turn) -> Result<(), Stop> {
         let has_goals = self.lasting.as_ref().is_some_and(|it| !it.goals.is_empty());
         if !has_goals {
             self.drop_plan();
@@ -274,21 +275,46 @@ impl<'a> Run<'a> {
             }
             return Ok(());
         }
-        if turn.may_keep
-            && let Some((plan, situation, running)) = self.kept()
-            && let Ok(mission) = self.prepare(&Arc::clone(&self.task), &plan, &situation, &running)
-        {
-            self.ports.recorder.record(&Entry::Kept {
-                now: &self.now,
-                reason: &turn.reason,
-            });
-            let goals = self.goals();
-            return self.begin_with((&plan, &situation, &running), &goals, &mission);
+        let rest = if turn.may_keep { self.kept() } else { None };
+        if let Some(rest) = rest {
+            if self.plans_aside() && self.settings.readies_aside {
+                self.make_rest_ready(turn, rest);
+                return Ok(());
+            }
+            let (plan, situation, running) = rest;
+            let course = Course::of(&plan, &situation, &running);
+            if let Ok(mission) = self.prepare(&Arc::clone(&self.task), course) {
+                self.ports.recorder.record(&Entry::Kept {
+                    now: &self.now,
+                    reason: &turn.reason,
+                });
+                let goals = self.goals();
+                return self.begin_with(course, &goals, &mission);
+            }
         }
+        self.plan_for_others(&turn)
+    }
+
+    /// Makes another plan, because the goals have changed.
+    pub(super) fn plan_for_others(&mut self, turn: &Turn) -> Result<(), Stop> {
         if self.search_while_the_plan_goes_on(&turn.reason)? {
             return Ok(());
         }
         self.replan(&turn.reason)
+    }
+
+    /// Turns to goals once more; to those that were given since, if there are any.
+    pub(super) fn turn_back(&mut self, turn: Turn) {
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        lasting.change = Some(match lasting.change.take() {
+            None => turn,
+            Some(later) => Turn {
+                may_keep: later.may_keep && turn.may_keep,
+                ..later
+            },
+        });
     }
 
     /// A plan is taken up.
@@ -328,6 +354,9 @@ impl<'a> Run<'a> {
     /// running as it is expected to go on, and what is to come at the distances that were planned.
     fn kept(&self) -> Option<(TimeTriggeredPlan, Situation, Vec<Ticket>)> {
         let plan = self.lasting.as_ref()?.plan.as_ref()?;
+        if self.settings.readies_aside && self.lost.plan {
+            return None;
+        }
         let is_told = |ticket: &Ticket| self.belief.running().contains_key(ticket);
         if !self.account.open_tickets().all(|ticket| is_told(&ticket)) {
             return None;

@@ -1,6 +1,8 @@
 //! Plans that are made beside the run: what goes on meanwhile, and how they take over.
 
 mod fit;
+mod ready;
+mod takeover;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,15 +13,18 @@ use elbowroom_num::Rational;
 use super::agenda::Todo;
 use super::here::Guess;
 use super::intake::Remark;
+use super::lasting::Turn;
 use super::stand::Goals;
 use super::{Outlook, Run, Stop, Verdict};
 use crate::event::Ticket;
+use crate::executor::StepId;
 use crate::planning::{PlanAnswer, Planned};
 use crate::preparation::Need;
 use crate::progression::Progression;
 use crate::reason::{About, Cause, Reason};
 use crate::record::Entry;
 use fit::{Expected, Fit};
+use ready::Readying;
 
 /// So many searches in a row are ended because goals were abandoned. The next one is not: somebody who
 /// keeps changing goals does not keep the run from acting.
@@ -45,17 +50,25 @@ pub(super) struct Search {
     /// What the present plan is expected to start until then.
     expected: Vec<Expected>,
     begun: Rational,
-    course: Course,
+    course: Goes,
     is_made: bool,
     /// Whether something has happened since that nobody expected.
     is_overtaken: bool,
     /// The plan, and since when it is there.
     plan: Option<(TimeTriggeredPlan, Rational)>,
+    /// The plan as it is made ready.
+    readying: Option<Readying>,
+    /// How often that was begun.
+    tries: usize,
+    /// Steps of the plan before that were started, once that plan is let go of.
+    left_behind: BTreeMap<StepId, Ticket>,
+    /// Which change of the goals the plan is kept for, if none was looked for.
+    kept_for: Option<Turn>,
 }
 
 /// What goes on during a search.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Course {
+enum Goes {
     /// The present plan, until then if there is an end.
     Plan { until: Option<Rational> },
     /// What is under way.
@@ -71,6 +84,9 @@ pub(super) struct Lost {
     outdated: usize,
     /// How many searches in a row were ended because goals were abandoned.
     ended: usize,
+    /// How many times in a row the plan was to be kept for other goals, and was outdated when it was
+    /// ready.
+    kept: usize,
 }
 
 impl Run<'_> {
@@ -106,6 +122,7 @@ impl Run<'_> {
         if let Some(search) = &mut self.search {
             search.is_overtaken = true;
         }
+        self.note_disagreement();
     }
 
     /// A plan is needed, and there is none that could go on.
@@ -113,7 +130,7 @@ impl Run<'_> {
         self.let_go_of_plan();
         self.news.clear();
         if !self.go_without_plan(reason) {
-            self.search(reason.clone(), Guess::AQuarterLonger, Course::UnderWay);
+            self.search(reason.clone(), Guess::AQuarterLonger, Goes::UnderWay);
         }
     }
 
@@ -134,7 +151,7 @@ impl Run<'_> {
         self.search(
             reason.clone(),
             Guess::AQuarterLonger,
-            Course::Plan { until: None },
+            Goes::Plan { until: None },
         );
         Ok(true)
     }
@@ -151,10 +168,10 @@ impl Run<'_> {
     }
 
     /// Begins to look for a plan.
-    fn search(&mut self, reason: Reason, guess: Guess, course: Course) {
+    fn search(&mut self, reason: Reason, guess: Guess, course: Goes) {
         let fit = match &course {
-            Course::Plan { until } => self.where_the_plan_leads(until.as_ref()),
-            Course::UnderWay => {
+            Goes::Plan { until } => self.where_the_plan_leads(until.as_ref()),
+            Goes::UnderWay => {
                 let foreseen = self.as_foreseen(guess);
                 let here = || self.situation(&self.allowance, guess);
                 let (situation, running) = foreseen.unwrap_or_else(here);
@@ -185,12 +202,19 @@ impl Run<'_> {
             is_made,
             is_overtaken: false,
             plan: None,
+            readying: None,
+            tries: 0,
+            left_behind: BTreeMap::new(),
+            kept_for: None,
         });
     }
 
     /// Ends a search whose plan is not needed any more.
     pub(super) fn give_up_search(&mut self) {
-        if self.search.take().is_some() {
+        if let Some(search) = self.search.take() {
+            if search.readying.is_some() {
+                self.ports.preparer.give_up();
+            }
             self.ports.planner.give_up();
         }
     }
@@ -198,15 +222,21 @@ impl Run<'_> {
     /// What the present plan would start is not started any more.
     pub(super) fn let_go_of_plan(&mut self) {
         self.lost.plan = true;
-        self.account.begin_plan(&BTreeMap::new());
         if let Some(search) = &mut self.search {
-            search.course = Course::UnderWay;
+            if search.course != Goes::UnderWay {
+                search.left_behind = self.account.steps().clone();
+            }
+            search.course = Goes::UnderWay;
         }
+        self.forget_steps();
     }
 
     /// When something about a search is to be decided, whatever happens.
     pub(super) fn next_of_search(&self) -> Option<Rational> {
         let search = self.search.as_ref()?;
+        if let Some(readying) = &search.readying {
+            return Some(self.next_of_readying(readying));
+        }
         if let Some((_, since)) = &search.plan {
             let at_least = &self.now + self.task.epsilon();
             let begins = search
@@ -217,7 +247,7 @@ impl Run<'_> {
             return Some(begins.max(at_least));
         }
         match &search.course {
-            Course::Plan { until: Some(until) } => Some(until.clone()),
+            Goes::Plan { until: Some(until) } => Some(until.clone()),
             // Whoever makes the plan says when it is there.
             _ => Some(self.settings.time_limit.clone()),
         }
@@ -248,6 +278,9 @@ impl Run<'_> {
             self.give_up_search();
             return Ok(false);
         }
+        if search.readying.is_some() {
+            return self.tend_readying();
+        }
         if search.plan.is_some() {
             return self.take_over_if_due();
         }
@@ -255,7 +288,7 @@ impl Run<'_> {
             self.collect()?;
             return Ok(true);
         }
-        if let Course::Plan { until: Some(until) } = &search.course
+        if let Goes::Plan { until: Some(until) } = &search.course
             && self.now >= *until
         {
             self.let_go_of_plan();
@@ -266,15 +299,20 @@ impl Run<'_> {
     /// Lets time pass, if nothing goes on but what is under way.
     fn waits_for_plan(&mut self) -> bool {
         let search = self.search.as_ref();
-        let waits = search.is_some_and(|search| search.course == Course::UnderWay);
+        let waits = search.is_some_and(|search| search.course == Goes::UnderWay);
         if waits {
-            let silence = self.next_silence().into_iter();
-            let until = silence.chain(self.next_of_search()).min();
-            let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
-            self.agenda.push(Todo::GiveUpTheSilent);
-            self.agenda.push(Todo::Pass(until.max(self.now.clone())));
+            self.wait_for_search();
         }
         waits
+    }
+
+    /// Lets time pass, until something about the search is to be decided.
+    fn wait_for_search(&mut self) {
+        let silence = self.next_silence().into_iter();
+        let until = silence.chain(self.next_of_search()).min();
+        let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
+        self.agenda.push(Todo::GiveUpTheSilent);
+        self.agenda.push(Todo::Pass(until.max(self.now.clone())));
     }
 
     /// Takes in the planner's answer.
@@ -301,8 +339,9 @@ impl Run<'_> {
         });
         self.heed()?;
         match answer {
-            PlanAnswer::Plan(plan) if search.course == Course::UnderWay => {
-                self.take_over_from_nothing(&search, &plan)
+            PlanAnswer::Plan(plan) if search.course == Goes::UnderWay => {
+                search.plan = Some((plan.clone(), self.now.clone()));
+                self.take_over_from_nothing(search, &plan, true)
             }
             PlanAnswer::Plan(plan) => {
                 search.plan = Some((plan, self.now.clone()));
@@ -314,7 +353,7 @@ impl Run<'_> {
             // There was none from there; from here, there may be.
             _ if search.is_overtaken => self.search_again(&search.reason),
             // What the present plan leads to was only expected.
-            _ if !search.expected.is_empty() || search.course != Course::UnderWay => {
+            _ if !search.expected.is_empty() || search.course != Goes::UnderWay => {
                 self.search_from_here(&search.reason);
                 Ok(())
             }
@@ -329,7 +368,7 @@ impl Run<'_> {
             let reason = search.reason.clone();
             if search.guess == Guess::AQuarterLonger {
                 // What is overdue may still end in time.
-                self.search(reason, Guess::AnyMoment, Course::UnderWay);
+                self.search(reason, Guess::AnyMoment, Goes::UnderWay);
                 return Ok(());
             }
             // No plan can bear that it goes on: it has failed, and the next one does without.
@@ -343,65 +382,6 @@ impl Run<'_> {
             PlanAnswer::NotFound { why } => Verdict::NoPlan { why },
             _ => Verdict::Unsolvable,
         }))
-    }
-
-    /// A plan takes over where nothing was started since it was asked for. Where things stand otherwise
-    /// than expected, it begins from here if it works from here; else what has happened is told to the
-    /// executor, which finds whether it can bear that.
-    fn take_over_from_nothing(
-        &mut self,
-        search: &Search,
-        plan: &TimeTriggeredPlan,
-    ) -> Result<(), Stop> {
-        let time = search.situation.time.clone();
-        let (situation, running) = self.situation_at(time, search.guess);
-        let is_as_expected = situation == search.situation && running == search.running;
-        if !is_as_expected
-            && let Some((plan, situation, running)) = self.fitted(search, plan)
-            && let Ok(mission) = self.prepare(&search.task, &plan, &situation, &running)
-        {
-            return self.begin_with((&plan, &situation, &running), &search.goals, &mission);
-        }
-        if !is_as_expected && !search.expected.is_empty() {
-            // It continues what was never started.
-            return self.search_again(&search.reason);
-        }
-        let surprises = std::mem::take(&mut self.news);
-        self.agenda.push(Todo::Tell(surprises));
-        let begun = (plan, &search.situation, &search.running[..]);
-        self.take_up_for(&search.task, &search.goals, begun)
-    }
-
-    /// A plan that is there takes over from the present one when it is time for that; whether the
-    /// executor is not to be asked.
-    fn take_over_if_due(&mut self) -> Result<bool, Stop> {
-        let Some(search) = &self.search else {
-            return Ok(false);
-        };
-        let Some((plan, since)) = &search.plan else {
-            return Ok(false);
-        };
-        let is_begun = |it: &Expected| self.account.ticket(it.step).is_some();
-        let is_due = self.now >= search.situation.time || search.expected.iter().all(is_begun);
-        // What was told to start and has not said that it has, cannot be planned with.
-        let is_told = |ticket: Ticket| self.belief.running().contains_key(&ticket);
-        let waits_for_word =
-            !self.account.open_tickets().all(is_told) && self.now < since + Rational::from(WORD);
-        if search.course != Course::UnderWay && (!is_due || waits_for_word) {
-            return Ok(false);
-        }
-        let fit = self.fitted(search, plan);
-        let Some(search) = self.search.take() else {
-            return Ok(false);
-        };
-        if let Some((plan, situation, running)) = fit
-            && let Ok(mission) = self.prepare(&search.task, &plan, &situation, &running)
-        {
-            self.begin_with((&plan, &situation, &running), &search.goals, &mission)?;
-            return Ok(true);
-        }
-        self.search_again(&search.reason)?;
-        Ok(true)
     }
 
     /// The plan that was made is outdated.
@@ -420,11 +400,7 @@ impl Run<'_> {
         // It will take about as long again.
         let ahead = &self.allowance * &Rational::new(3, 2);
         let until = Some(&self.now + ahead + self.task.epsilon());
-        self.search(
-            reason.clone(),
-            Guess::AQuarterLonger,
-            Course::Plan { until },
-        );
+        self.search(reason.clone(), Guess::AQuarterLonger, Goes::Plan { until });
         Ok(())
     }
 }

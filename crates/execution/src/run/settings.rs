@@ -28,6 +28,10 @@ pub struct RunSettings {
     /// goes on: [`Run`](super::Run) has the rules. The first plan of a run that ends with its goal is
     /// waited for.
     pub plans_aside: bool,
+    /// Whether such plans are made ready beside the run, too
+    /// ([`Preparer::begin`](crate::Preparer::begin)). Then a plan takes over as soon as it is ready,
+    /// and what the present one begins until then is part of it.
+    pub readies_aside: bool,
     /// The time limit of the run, by the world's clock.
     pub time_limit: Rational,
 }
@@ -43,6 +47,7 @@ impl Default for RunSettings {
             patience: Patience::default(),
             watches_room: false,
             plans_aside: false,
+            readies_aside: false,
             time_limit: Rational::from(1_000_000),
         }
     }

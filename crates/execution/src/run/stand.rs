@@ -16,6 +16,7 @@ use elbowroom_num::Rational;
 
 use super::account::KnownStart;
 use super::agenda::Todo;
+use super::beginning::Course;
 use super::{Refusals, Run, Verdict};
 use crate::event::Ticket;
 use crate::executor::News;
@@ -66,6 +67,8 @@ pub struct TakesUp {
     pub situation: Situation,
     /// The tickets of what is under way there, in its order.
     pub running: Vec<Ticket>,
+    /// What of the plan has begun since.
+    pub begun: Vec<Ticket>,
     /// The goals that it is for.
     pub goals: Goals,
     /// What it does not know of.
@@ -87,16 +90,18 @@ pub struct Goals {
 impl Run<'_> {
     /// A plan is about to be taken up: forgets what is long past, and has the recorder begin anew if it
     /// wants to.
-    pub(super) fn begin_anew_with(
-        &mut self,
-        (plan, situation, running): (&TimeTriggeredPlan, &Situation, &[Ticket]),
-        goals: &Goals,
-    ) {
+    pub(super) fn begin_anew_with(&mut self, course: Course<'_>, goals: &Goals) {
         if !self.goes_on_after(&Verdict::GoalReached) {
             return;
         }
         self.foreseen = None;
-        self.account.leave_behind(running);
+        let Course {
+            plan,
+            situation,
+            running,
+            begun,
+        } = course;
+        self.account.leave_behind(&[running, begun].concat());
         // What was said last is told first, and goes before it.
         let news = self.agenda.iter().map(|todo| match todo {
             Todo::Tell(news) => Some(news.as_slice()),
@@ -124,6 +129,7 @@ impl Run<'_> {
             plan: plan.clone(),
             situation: situation.clone(),
             running: running.to_vec(),
+            begun: begun.to_vec(),
             goals: goals.clone(),
             news: news.clone(),
             turn: turn.clone(),

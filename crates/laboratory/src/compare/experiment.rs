@@ -167,6 +167,7 @@ impl Experiment {
             // Worlds of experiments have no clock.
             watches_room: _,
             plans_aside: _,
+            readies_aside: _,
             time_limit,
         } = settings;
         let texts = |texts: &mut dyn Iterator<Item = String>| texts.collect::<Vec<_>>();

@@ -255,6 +255,7 @@ fn observation<'a>(observation: &'a ObservationLine, bars: &Bars) -> (&'a Ration
         ObservationLine::Pause { time } => (&time.0, "asked to pause".to_owned()),
         ObservationLine::Resume { time } => (&time.0, "asked to go on".to_owned()),
         ObservationLine::PlanMade { time } => (&time.0, "the plan is there".to_owned()),
+        ObservationLine::PlanReady { time } => (&time.0, "the plan is ready".to_owned()),
         ObservationLine::Unintelligible { said, why, time } => {
             (&time.0, format!("cannot be understood ({why}): {said}"))
         }

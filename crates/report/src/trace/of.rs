@@ -227,6 +227,7 @@ impl ObservationLine {
             },
             Event::Asked(request) => Self::asked(request, time),
             Event::PlanMade => Self::PlanMade { time },
+            Event::PlanReady => Self::PlanReady { time },
             Event::Unintelligible { said, why } => Self::Unintelligible {
                 said: said.clone(),
                 why: why.clone(),
@@ -254,10 +255,13 @@ impl ObservationLine {
     }
 
     /// What no world could report, and when, if it is that: what was asked of the run, or that a
-    /// plan is there.
+    /// plan is there or ready.
     pub fn of_the_run(&self) -> Option<(Event, &Rational)> {
         if let Self::PlanMade { time } = self {
             return Some((Event::PlanMade, &time.0));
+        }
+        if let Self::PlanReady { time } = self {
+            return Some((Event::PlanReady, &time.0));
         }
         let (request, time) = match self {
             Self::Goal { name, goal, time } => {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom_execution::{
-    Command, Entry, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder, World,
-    WorldError,
+    Command, Entry, Need, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, PrepareError,
+    Prepared, Preparer, Recorder, Wanted, World, WorldError,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
@@ -179,9 +179,16 @@ impl Stored {
 }
 
 /// A world that reports what a trace says it reported.
+///
+/// A world that failed fails again, with the same words.
 pub struct ReplayWorld {
     task: Arc<Task>,
     passages: VecDeque<(usize, Rational, Vec<ObservationLine>)>,
+    /// How the world failed at the end of the trace, if it did.
+    failure: Option<String>,
+    /// How many commands it is given after its last answer, the last of which it fails to carry out;
+    /// 0 if it carries out all of them.
+    commands: usize,
 }
 
 impl ReplayWorld {
@@ -196,17 +203,29 @@ impl ReplayWorld {
             }
             _ => None,
         });
+        let failure = match stored.lines.last() {
+            Some(Line::Over(report)) if report.verdict == WORLD_FAILED => report.why.clone(),
+            _ => None,
+        };
+        let commands = match &stored.lines[..] {
+            [before @ .., _] if failure.is_some() => failed_command(before),
+            _ => 0,
+        };
         Self {
             passages: passages.collect(),
             task: Arc::clone(task),
+            failure,
+            commands,
         }
     }
 
+    /// What it says when there is nothing more to be played back.
+    fn end(&self) -> WorldError {
+        WorldError::new(self.failure.as_deref().unwrap_or(END))
+    }
+
     fn next(&mut self) -> Result<Passage, WorldError> {
-        let (line, now, reported) = self
-            .passages
-            .pop_front()
-            .ok_or_else(|| WorldError::new(END))?;
+        let (line, now, reported) = self.passages.pop_front().ok_or_else(|| self.end())?;
         let mut observations = Vec::with_capacity(reported.len());
         for observation in &reported {
             if let Some((event, time)) = observation.of_the_run() {
@@ -225,8 +244,30 @@ impl ReplayWorld {
 
 const END: &str = "the trace ends here";
 
+/// The verdict of a run whose world has failed.
+const WORLD_FAILED: &str = "world-failed";
+
+/// The number of commands since the last answer of the world, if these lines end with one: nothing was
+/// decided after it, so that it, or the wait for what it brings, is what failed.
+fn failed_command(lines: &[Line]) -> usize {
+    let Some(Line::Command(_)) = lines.last() else {
+        return 0;
+    };
+    let is_answer = |line: &&Line| matches!(line, Line::Passed(_) | Line::Looked(_));
+    let since = lines.iter().rev().take_while(|line| !is_answer(line));
+    since
+        .filter(|line| matches!(line, Line::Command(_)))
+        .count()
+}
+
 impl World for ReplayWorld {
     fn command(&mut self, _now: &Rational, _command: &Command) -> Result<(), WorldError> {
+        if self.passages.is_empty() && self.commands > 0 {
+            self.commands -= 1;
+            if self.commands == 0 {
+                return Err(self.end());
+            }
+        }
         Ok(())
     }
 
@@ -289,6 +330,26 @@ impl Planner for ReplayPlanner {
             seconds: Some(planned.took.0),
             remark: planned.remark,
         }
+    }
+}
+
+/// A preparer of a run that is played back: where plans were made ready beside the run, the trace says
+/// when they were ready.
+#[derive(Clone, Debug)]
+pub struct ReplayPreparer<P>(pub P);
+
+impl<P: Preparer> Preparer for ReplayPreparer<P> {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, PrepareError> {
+        self.0.prepare(task, plan, need)
+    }
+
+    fn begin(&mut self, _wanted: &Wanted<'_>) -> bool {
+        true
     }
 }
 

@@ -10,7 +10,7 @@ use elbowroom::execution::{PlanAnswer, Planner, PlannerAnswer};
 use elbowroom::model::problem::Condition;
 use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan};
 
-use crate::bell::Bell;
+use crate::bell::{Bell, Ring};
 use crate::clock::Clock;
 use crate::interrupt::Interrupt;
 use crate::memory::MemoryLimit;
@@ -172,7 +172,9 @@ impl Planner for Ahead<'_> {
         let foreseen = self.foreseen(task, situation);
         self.search = foreseen.or_else(|| self.set_out(task, situation));
         if let Some(work) = &self.search {
-            self.aside.bell.follow(Arc::clone(&work.is_done));
+            self.aside
+                .bell
+                .follow(Arc::clone(&work.is_done), Ring::PlanMade);
         }
         self.search.is_some()
     }
@@ -225,4 +227,4 @@ fn renumbered(
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

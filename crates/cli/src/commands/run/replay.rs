@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use elbowroom::answers::run::run as execute;
 use elbowroom::answers::{Halt, RunRequest, Watcher};
 use elbowroom::execute::RunSpec;
-use elbowroom::report::trace::{Line, Replay, ReplayPlanner, ReplayWorld, Stored};
+use elbowroom::report::trace::{Line, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored};
 use serde_json::{Value, json};
 
 use crate::exit::{Answer, Exit, Failure};
@@ -37,11 +37,14 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
         None
     };
     let mut replay = Replay::new(&stored, Arc::clone(&task));
+    let analyst = spec.analyst(task.problem());
+    let analyst = analyst.map_err(|error| unreadable(format!("line 1: {error}")))?;
     let request = RunRequest::new(&spec, &task)
         .beginning_with(first)
         .standing(stand)
         .reopened(stored.reopened())
-        .planned_by(ReplayPlanner::new(&stored));
+        .planned_by(ReplayPlanner::new(&stored))
+        .prepared_by(ReplayPreparer(analyst));
     let mut watch = AsStored(replay.interruption());
     execute(
         request.recorded_by(&mut replay),

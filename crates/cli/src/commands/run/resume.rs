@@ -26,6 +26,7 @@ use super::ahead::Ahead;
 use super::believed::Believed;
 use super::journaled::{Careful, JournalWriter, Kept};
 use super::process::{Manners, ProcessWorld};
+use super::readied::Readied;
 use super::shown::Views;
 use super::spec::contradiction;
 use crate::args::RunArgs;
@@ -214,6 +215,7 @@ pub(in crate::commands) fn run(
                 &stored,
                 Box::new(Ahead::new(planner, &spec, &aside)),
             ))
+            .prepared_by(Readied::new(&spec, &task, &aside.bell).map_err(contradiction)?)
             .told_to(super::both(attendance.listener(), believed.listener()))
             .recorded_by(views.shown(attendance.witnessed(recorder, &task, true), &task));
         let world = Careful {

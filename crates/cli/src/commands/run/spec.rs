@@ -83,6 +83,7 @@ pub(in crate::commands) fn of(
         None => spec.usual_first_plan(),
     };
     spec.plans_aside = spec.can_plan_aside();
+    spec.readies_aside = spec.plans_aside;
     Ok((spec, world))
 }
 

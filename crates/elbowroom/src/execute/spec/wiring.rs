@@ -8,6 +8,7 @@ use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::PlanningTime;
 use elbowroom_execution::{Need, NoPlanner, Odds, Outlook, Planner, PrepareError, Preparer, World};
 use elbowroom_external::{self as external, PlannerError};
+use elbowroom_model::problem::Problem;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_probability::Likelihoods;
@@ -20,7 +21,7 @@ use crate::execute::{
     Rehearse, Replanning, Rollouts, SharedRehearse, Spoiling,
 };
 use crate::timed::{Policy, Settings};
-use crate::{BoxTextError, ChanceError, parse_box};
+use crate::{BoxTextError, ChanceError, flow, parse_box};
 
 /// The time limit of another planner for its first plan.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -342,6 +343,23 @@ impl RunSpec {
         }
     }
 
+    /// Who makes plans of this problem ready.
+    ///
+    /// # Errors
+    /// When the world file cannot be read.
+    pub fn analyst(&self, problem: &Problem) -> Result<Analyst, SpecError> {
+        let model = self.model(problem).map_err(SpecError::World)?;
+        Ok(Analyst::new(self.envelopes_in(model.as_ref())))
+    }
+
+    fn envelopes_in(&self, model: Option<&WorldModel>) -> flow::Settings {
+        let mut envelopes = self.envelopes();
+        if self.world.is_some() {
+            envelopes.world = model.cloned().map(Arc::new);
+        }
+        envelopes
+    }
+
     /// The execution that the specification is of; who plans, the plan to begin with, and the world
     /// are still to be said. What executors take to be likely is found out within limits that do
     /// not depend on the machine.
@@ -354,10 +372,7 @@ impl RunSpec {
             return Err(SpecError::Unheeded(feature));
         }
         let model = self.model(task.problem()).map_err(SpecError::World)?;
-        let mut envelopes = self.envelopes();
-        if self.world.is_some() {
-            envelopes.world = model.clone().map(Arc::new);
-        }
+        let envelopes = self.envelopes_in(model.as_ref());
         let model = model.filter(|_| self.executor.asks_odds());
         let outlook = model.as_ref().filter(|_| self.executor.asks_outlook());
         let outlook = outlook.and_then(|model| {

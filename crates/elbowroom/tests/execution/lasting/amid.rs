@@ -4,18 +4,19 @@
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-use elbowroom::execute::Execution;
+use elbowroom::execute::{Analyst, Execution};
 use elbowroom::execution::run::{Doing, RunSettings, Stand};
 use elbowroom::execution::{Ending, Entry, Event, Recorder, Request, Ticket};
+use elbowroom::flow;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use elbowroom::report::trace::{
-    Line, Replay, ReplayPlanner, ReplayWorld, SnapshotLine, Stored, snapshot_text,
+    Line, Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, SnapshotLine, Stored, snapshot_text,
 };
 
 use super::scripted::{Dice, Slow, abandon, fact, pursue};
-use crate::aside::{Beside, telling};
+use crate::aside::{Beside, Readier, telling};
 
 const HEADER: &str = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
 
@@ -137,6 +138,8 @@ struct Case {
     executor: &'static str,
     seed: u64,
     is_aside: bool,
+    /// Whether plans are made ready beside the run, too.
+    readies: bool,
 }
 
 impl Case {
@@ -155,6 +158,7 @@ impl Case {
             .by(self.executor.parse().expect("a registered one"))
             .with_settings(RunSettings {
                 plans_aside: self.is_aside,
+                readies_aside: self.readies,
                 watches_room: self.is_aside,
                 ..RunSettings::default()
             })
@@ -169,7 +173,12 @@ impl Case {
         let script = script(&task, dice);
         let lengths: Vec<Rational> = (0..12).map(|_| Rational::new(dice.small(60), 10)).collect();
         let quarters: Vec<i64> = (0..7).map(|_| dice.small(3) - 1).collect();
-        let planner = Beside::taking(&lengths);
+        let readying = lengths
+            .iter()
+            .rev()
+            .map(|length| length / &Rational::from(2));
+        let readying: Vec<Rational> = readying.collect();
+        let planner = Beside::taking(&lengths).readying(&readying);
         let (mut world, is_to_end) = telling((300, script), &planner, &quarters);
         let segments = Arc::new(Mutex::new(vec![Segment::default()]));
         let recorder = Rotating {
@@ -180,7 +189,9 @@ impl Case {
         };
         let execution = self.execution(&task);
         let execution = if self.is_aside {
-            execution.planned_by(planner)
+            execution
+                .prepared_by(Readier(planner.clone()))
+                .planned_by(planner)
         } else {
             execution.planned_by(Slow(self.seed))
         };
@@ -208,6 +219,7 @@ impl Case {
         self.execution(&task)
             .standing(stand)
             .planned_by(ReplayPlanner::new(&stored))
+            .prepared_by(ReplayPreparer(Analyst::new(flow::Settings::default())))
             .recorded_by(&mut replay)
             .ending_when(move || interruption.load(Ordering::SeqCst))
             .run_in(&mut ReplayWorld::new(&stored, &task));
@@ -240,10 +252,11 @@ fn cases() -> impl Iterator<Item = Case> {
         "adaptable",
         "esterel",
     ];
-    (0..36).map(move |seed| Case {
+    (0..60).map(move |seed| Case {
         executor: executors[usize::try_from(seed % 6).expect("small")],
         seed,
         is_aside: seed % 4 != 0,
+        readies: seed % 4 > 1,
     })
 }
 
@@ -252,6 +265,7 @@ fn cases() -> impl Iterator<Item = Case> {
 #[test]
 fn a_record_that_begins_anew_in_the_middle_of_a_run_leads_to_the_same_decisions() {
     let (mut taken_up, mut resting, mut under_way, mut with_news, mut turning) = (0, 0, 0, 0, 0);
+    let mut begun = 0;
     for case in cases() {
         let whole = case.recorded(0);
         assert_eq!(whole.len(), 1);
@@ -286,12 +300,18 @@ fn a_record_that_begins_anew_in_the_middle_of_a_run_leads_to_the_same_decisions(
                 under_way += usize::from(snapshot.contains("\"under_way\":["));
                 with_news += usize::from(snapshot.contains("\"news\":["));
                 turning += usize::from(snapshot.contains("\"turn\":{"));
+                begun += usize::from(snapshot.contains("\"begun\":["));
             }
         }
     }
-    let counts = (taken_up, resting, under_way, with_news, turning);
+    let counts = (taken_up, resting, under_way, with_news, turning, begun);
     assert!(
-        taken_up > 300 && resting > 100 && under_way > 60 && with_news > 2 && turning > 5,
+        taken_up > 300
+            && resting > 100
+            && under_way > 60
+            && with_news > 2
+            && turning > 5
+            && begun > 5,
         "{counts:?}"
     );
 }
@@ -303,6 +323,7 @@ fn a_snapshot_that_does_not_fit_is_refused() {
         executor: "stn",
         seed: 2,
         is_aside: true,
+        readies: false,
     };
     let segments = case.recorded(100);
     let mut snapshots = segments.iter().filter_map(|it| it.snapshot.as_ref());
@@ -336,6 +357,7 @@ fn what_a_busy_run_knows_stands_in_its_snapshot() {
         executor: "stn",
         seed: 2,
         is_aside: true,
+        readies: false,
     };
     let segments = case.recorded(100);
     let snapshots = segments.iter().filter_map(|it| it.snapshot.as_ref());

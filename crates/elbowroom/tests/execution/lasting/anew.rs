@@ -172,6 +172,83 @@ fn a_run_goes_on_from_where_it_rested_as_if_all_before_were_known() {
     );
 }
 
+/// The members of snapshots as they were when records began anew only at rests without goals.
+const EARLIER: [&str; 15] = [
+    "event",
+    "now",
+    "since",
+    "started",
+    "allowance",
+    "answers",
+    "answers_since",
+    "timed",
+    "group",
+    "facts",
+    "numbers",
+    "facts_before",
+    "numbers_before",
+    "doubtful_facts",
+    "doubtful_numbers",
+];
+
+/// Journals with snapshots of the earlier form are gone on with: the run rests without goals, and takes
+/// the next one.
+#[test]
+fn a_snapshot_of_the_earlier_form_is_gone_on_from() {
+    let header = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
+    let (_, beginnings) = taped("guarded", 1);
+    let (_, snapshot) = beginnings.last().expect("it rested");
+    let mut members: serde_json::Map<String, serde_json::Value> =
+        serde_json::from_str(snapshot).expect("JSON");
+    members.retain(|name, _| EARLIER.contains(&name.as_str()));
+    assert_eq!(members.len(), EARLIER.len());
+    let earlier = serde_json::to_string(&members).expect("JSON");
+    let stored = Stored::read(&format!("{header}\n{earlier}\n")).expect("whole");
+    let task = day();
+    let line = stored.snapshot().expect("of the form").expect("there");
+    let stand = line.stand(&task).expect("of this task");
+    assert!(matches!(stand.doing, Doing::Rests(_)) && stand.goals.open.is_empty());
+    assert!(stand.starts.is_empty() && stand.started > 0 && !stand.is_paused);
+    let (now, first) = (stand.belief.time().clone(), stand.started as u64);
+    let is_to_end = Arc::new(AtomicBool::new(false));
+    let at = |seconds: i64| &now + Rational::from(seconds);
+    let there = |fact: &str| crate::lasting::scripted::fact(&task, fact, true);
+    let event = |seconds: i64, event: Event| Observation {
+        time: at(seconds),
+        event,
+    };
+    let mut world = Scripted {
+        now: now.clone(),
+        coming: vec![
+            event(1, there("(power)")),
+            event(1, there("(here key)")),
+            event(1, fact(&task, "(have key)", false)),
+            event(2, pursue("key", "(have key)")),
+        ],
+        end: at(100),
+        is_to_end: Arc::clone(&is_to_end),
+        slow: None,
+        on_cancel: None,
+    };
+    let (mut lines, mut again) = (Vec::new(), Vec::new());
+    let tape = Tape {
+        task: Arc::clone(&task),
+        lines: &mut lines,
+        beginnings: &mut again,
+    };
+    execution(&task, "guarded")
+        .standing(stand)
+        .recorded_by(tape)
+        .ending_when(move || is_to_end.load(Ordering::SeqCst))
+        .run_in(&mut world);
+    let start = lines.iter().find(|it| it.contains("\"event\":\"command\""));
+    let start = start.expect("it acts");
+    assert!(start.contains("(fetch r key)"), "{start}");
+    assert!(start.contains(&format!("\"ticket\":{first}")), "{start}");
+    let is_reached = |it: &String| it.contains("\"resting\"") && it.contains("goal-reached");
+    assert!(lines.iter().any(is_reached), "{lines:#?}");
+}
+
 /// A snapshot of another problem is refused, in words.
 #[test]
 fn a_snapshot_of_another_problem_is_refused() {

@@ -33,7 +33,7 @@ pub(super) struct Fit {
 }
 
 /// A plan, from where it begins, with the tickets of what is running there.
-type Begun = (TimeTriggeredPlan, Situation, Vec<Ticket>);
+pub(in crate::run) type Begun = (TimeTriggeredPlan, Situation, Vec<Ticket>);
 
 /// What is expected to happen.
 enum Happening {
@@ -107,6 +107,12 @@ impl Run<'_> {
         .collect()
     }
 
+    /// Which start the step of the plan before was.
+    fn start_of(&self, search: &Search, step: StepId) -> Option<Ticket> {
+        let left_behind = search.left_behind.get(&step).copied();
+        left_behind.or_else(|| self.account.ticket(step))
+    }
+
     /// The plan from here: without what has been done of it, and as much later as it is late.
     pub(super) fn fitted(&self, search: &Search, plan: &TimeTriggeredPlan) -> Option<Begun> {
         let first = search.expected.first().map(|it| it.ticket);
@@ -117,7 +123,7 @@ impl Run<'_> {
             let is_expected = first.is_some_and(|first| *ticket >= first);
             let expected = search.expected.iter().find(|it| it.ticket == *ticket);
             match (is_expected, expected) {
-                (true, Some(it)) => match self.account.ticket(it.step) {
+                (true, Some(it)) => match self.start_of(search, it.step) {
                     Some(real) => {
                         done.insert(real);
                     }
@@ -131,7 +137,7 @@ impl Run<'_> {
         // What was expected to be over.
         let is_over = |it: &&Expected| !search.running.contains(&it.ticket);
         for it in search.expected.iter().filter(is_over) {
-            match self.account.ticket(it.step) {
+            match self.start_of(search, it.step) {
                 Some(real) => {
                     done.insert(real);
                 }
@@ -139,7 +145,9 @@ impl Run<'_> {
             }
         }
         // What was begun besides may be what the plan has, too.
-        let besides = self.account.of_plan();
+        let before = search.left_behind.values();
+        let before = before.filter_map(|it| Some((*it, self.account.get(*it)?)));
+        let besides = self.account.of_plan().chain(before);
         let mut besides: Vec<(Ticket, String)> = besides
             .filter(|(ticket, it)| it.ordered >= search.begun && !done.contains(ticket))
             .map(|(ticket, it)| (ticket, it.action.name.clone()))

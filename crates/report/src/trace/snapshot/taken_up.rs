@@ -29,6 +29,9 @@ pub struct TakenUpLine {
     /// What is under way there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub under_way: Vec<SituatedLine>,
+    /// Which starts of the plan have been made since.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub begun: Vec<u64>,
     /// The goals that it is for.
     pub goals: Vec<GoalLine>,
     /// Whether these are those of the problem.
@@ -121,6 +124,7 @@ impl TakenUpLine {
             under_way: under_way
                 .map(|(running, ticket)| SituatedLine::of(running, *ticket, starts))
                 .collect::<Option<_>>()?,
+            begun: it.begun.iter().map(|it| it.0).collect(),
             goals: goal_lines(&it.goals),
             problem_goals: !it.goals.are_others,
             news: it
@@ -154,6 +158,7 @@ impl TakenUpLine {
             plan: plan.map_err(|error| error.message)?,
             situation,
             running: self.under_way.iter().map(|it| Ticket(it.ticket)).collect(),
+            begun: self.begun.iter().copied().map(Ticket).collect(),
             goals: Goals {
                 open: goals_of(&self.goals),
                 are_others: !self.problem_goals,

@@ -8,7 +8,7 @@ use elbowroom::num::Rational;
 use elbowroom::pddl::{Source, read_problem};
 
 use super::{Ahead, Aside};
-use crate::bell::Bell;
+use crate::bell::{Bell, Ring};
 use crate::interrupt::Interrupt;
 
 /// The planner that is asked where nothing was made ahead; it counts how often.
@@ -21,7 +21,8 @@ impl Planner for Asked<'_> {
     }
 }
 
-fn delivery() -> (RunSpec, Task) {
+/// A case.
+pub(crate) fn delivery() -> (RunSpec, Task) {
     let text = |name: &str| {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/delivery");
         NamedText {
@@ -111,7 +112,7 @@ fn the_bell_rings_for_what_was_begun() {
         // The first time it is the one that was begun ahead.
         assert!(ahead.begin(&task, &situation));
         aside.bell.wait(long);
-        assert!(aside.bell.is_heard());
+        assert_eq!(aside.bell.heard(), Some(Ring::PlanMade));
         let made = steps(ahead.collect(&task, &situation).answer);
         assert_eq!(
             made,
@@ -120,7 +121,7 @@ fn the_bell_rings_for_what_was_begun() {
     }
     assert!(ahead.begin(&task, &situation));
     ahead.give_up();
-    assert!(!aside.bell.is_awaited() && !aside.bell.is_heard());
+    assert!(!aside.bell.is_awaited() && aside.bell.heard().is_none());
     assert_eq!(asked.load(Ordering::SeqCst), 0);
 }
 

@@ -1,0 +1,279 @@
+//! Plans that are made ready while the run goes on: by a preparer that takes as long as it is told to, by
+//! the world's time.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use elbowroom::execute::{Analyst, Execution};
+use elbowroom::execution::run::RunSettings;
+use elbowroom::execution::{Event, Request};
+use elbowroom::flow;
+use elbowroom::model::validate::{Settings, validate};
+use elbowroom::model::{Step, Task, TimeTriggeredPlan, problem};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored};
+
+use crate::aside::{Beside, Readier, Told, assert_has, seconds, settings, told};
+use crate::lasting::scripted::{Dice, abandon, fact, pursue, task};
+
+const HEADER: &str = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
+
+fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
+    let settings = RunSettings {
+        readies_aside: true,
+        ..settings()
+    };
+    Execution::of(task)
+        .by(executor.parse().expect("a registered one"))
+        .with_settings(settings)
+        .lasting(true)
+}
+
+/// A run by `guarded`.
+fn run(task: &Arc<Task>, end: i64, script: Vec<(i64, Event)>, planner: &Beside) -> Told {
+    let script = script.into_iter();
+    let script = script.map(|(time, event)| (seconds(time), event));
+    let execution = execution(task, "guarded").prepared_by(Readier(planner.clone()));
+    told(execution, task, (end, script.collect()), planner, &[])
+}
+
+/// The running plan begins what was committed while the new one is made ready, and that goes on in it.
+#[test]
+fn what_is_begun_while_a_plan_is_made_ready_is_part_of_it() {
+    let task = task("", "(and (have book) (have cup))");
+    let planner = Beside::taking(&[seconds(0), seconds(4)]);
+    let planner = planner.readying(&[seconds(0), seconds(20)]);
+    let script = vec![(2, pursue("key", "(have key)"))];
+    let told = run(&task, 100, script, &planner);
+    assert_has(
+        &told,
+        &[
+            "0: start",
+            "2: plan",
+            "6: the plan is there",
+            // Its executor is that of the first plan, and the second job is part of both.
+            "10: start",
+            "26: start (fetch r key)",
+            "36: rest: goal-reached",
+        ],
+    );
+    assert_eq!(told.report.starts, 3, "{:#?}", told.notes);
+}
+
+/// What the new plan does not have, the running plan does not begin any more.
+#[test]
+fn what_the_new_plan_does_not_have_is_not_begun_any_more() {
+    let task = task("", "(have book)");
+    let planner = Beside::taking(&[seconds(0), seconds(4)]);
+    let planner = planner.readying(&[seconds(0), seconds(20)]);
+    let script = vec![
+        (1, pursue("cup", "(have cup)")),
+        (2, abandon("problem")),
+        (3, abandon("cup")),
+        (4, pursue("key", "(have key)")),
+    ];
+    let told = run(&task, 100, script, &planner);
+    assert_has(&told, &["0: start (fetch r book)", "rest: goal-reached"]);
+    assert_eq!(told.report.starts, 2, "{:#?}", told.notes);
+}
+
+/// What is asked and reported meanwhile is taken in at once.
+#[test]
+fn what_is_asked_and_reported_while_a_plan_is_made_ready_is_taken_in_at_once() {
+    let task = task("", "(have book)");
+    let planner = Beside::taking(&[seconds(1)]).readying(&[seconds(30)]);
+    let script = vec![
+        (3, pursue("odd", "(have spoon)")),
+        (4, pursue("key", "(have key)")),
+        (5, fact(&task, "(here cup)", false)),
+        (6, Event::Asked(Request::Pause)),
+        (7, Event::Asked(Request::Resume)),
+    ];
+    let told = run(&task, 200, script, &planner);
+    assert_has(&told, &["3: it is no goal", "rest: goal-reached"]);
+    let place = |what: &str| told.lines.iter().position(|it| it.contains(what));
+    let taken_up = place("\"event\":\"plan\"");
+    assert!(taken_up.is_some());
+    for what in ["goal", "fact", "pause", "resume"] {
+        let taken = place(&format!("\"observation\":{{\"type\":\"{what}\""));
+        assert!(taken.is_some() && taken < taken_up, "{what}: {taken:?}");
+    }
+}
+
+/// Something unexpected all the time does not keep the run from acting: after two more attempts, the
+/// executor is told.
+#[test]
+fn what_happens_all_the_time_does_not_starve_the_run() {
+    let task = task("", "(and (have book) (have cup))");
+    let planner = Beside::taking(&[seconds(1)]).readying(&[seconds(5)]);
+    let script = (1..90).map(|second| (second, fact(&task, "(here key)", second % 2 == 0)));
+    let told = run(&task, 200, script.collect(), &planner);
+    assert_has(
+        &told,
+        &["1: the plan is there", "16: start", "26: start", "36: rest"],
+    );
+    assert_eq!(planner.desk().readied, 3, "{:#?}", told.notes);
+}
+
+/// The rest of the running plan for a goal that was added is made ready while it goes on.
+#[test]
+fn a_plan_that_is_kept_goes_on_while_it_is_made_ready() {
+    let task = task("", "(and (have book) (have cup))");
+    let planner = Beside::taking(&[seconds(0)]).readying(&[seconds(0), seconds(15)]);
+    let script = vec![(2, pursue("too", "(have cup)"))];
+    let told = run(&task, 100, script, &planner);
+    assert_has(
+        &told,
+        &[
+            "0: start",
+            "10: start",
+            "17: the plan is kept",
+            "20: rest: goal-reached problem too",
+        ],
+    );
+    assert_eq!(planner.desk().begun, 1);
+}
+
+const ITEMS: [&str; 3] = ["book", "cup", "key"];
+
+/// A random script, how long plans take, and by how many quarters durations differ.
+fn random(task: &Task, seed: u64) -> (Vec<(Rational, Event)>, Vec<Rational>, Vec<i64>, Dice) {
+    let mut dice = Dice(seed);
+    let mut script = Vec::new();
+    for _ in 0..20 {
+        let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
+        let event = match dice.below(10) {
+            0..=5 => pursue(item, &format!("(have {item})")),
+            6..=7 => abandon(item),
+            8 => Event::Asked(Request::Pause),
+            _ => Event::Asked(Request::Resume),
+        };
+        script.push((Rational::new(dice.small(600), 10), event));
+    }
+    // Somebody takes things away, and brings them back: in every other run, as what others do is
+    // nothing that a plan could be judged with.
+    for _ in 0..(seed % 2) * 6 {
+        let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
+        let here = fact(task, &format!("(here {item})"), dice.below(2) == 0);
+        script.push((Rational::new(dice.small(600), 10), here));
+    }
+    for item in ITEMS {
+        script.push((seconds(61), fact(task, &format!("(here {item})"), true)));
+    }
+    script.push((seconds(61), Event::Asked(Request::Resume)));
+    script.push((seconds(62), pursue("last", "(and (have book) (have key))")));
+    let lengths = (0..12).map(|_| Rational::new(dice.small(150), 10));
+    let lengths = lengths.collect();
+    let quarters = (0..7).map(|_| dice.small(3) - 1).collect();
+    (script, lengths, quarters, dice)
+}
+
+const EXECUTORS: [&str; 6] = [
+    "guarded",
+    "live",
+    "stn",
+    "adaptable",
+    "esterel",
+    "fixed(50)",
+];
+
+fn executor(seed: u64) -> &'static str {
+    EXECUTORS[usize::try_from(seed % 6).expect("small")]
+}
+
+/// A run with plans that take so long to be made ready.
+fn random_run(
+    task: &Arc<Task>,
+    seed: u64,
+    readying: &dyn Fn(&mut Dice) -> Vec<Rational>,
+) -> (Told, Beside) {
+    let (script, lengths, quarters, mut dice) = random(task, seed);
+    let planner = Beside::taking(&lengths).readying(&readying(&mut dice));
+    let execution = execution(task, executor(seed)).prepared_by(Readier(planner.clone()));
+    let told = told(execution, task, (500, script), &planner, &quarters);
+    (told, planner)
+}
+
+/// Made ready beside the run without taking any time, a plan leads to what it leads to when it is waited
+/// for: all that differs is that it is said to be ready.
+#[test]
+fn plans_that_are_ready_at_once_lead_to_the_same_as_plans_that_are_waited_for() {
+    let mut ready = 0;
+    for seed in 0..120 {
+        let task = || task("(free s)", "(have book)");
+        let (waited_for, _) = random_run(&task(), seed, &|_| Vec::new());
+        let (beside, _) = random_run(&task(), seed, &|_| vec![seconds(0)]);
+        let is_said = |line: &&String| line.contains("\"plan-ready\"");
+        ready += beside.lines.iter().filter(is_said).count();
+        let plain = |told: &Told| -> Vec<String> {
+            let lines = told.lines.iter().filter(|it| !is_said(it));
+            lines.cloned().collect()
+        };
+        assert_eq!(plain(&beside), plain(&waited_for), "{seed}");
+    }
+    assert!(ready > 500, "{ready}");
+}
+
+/// Whatever is asked and happens, however long plans take to be made and made ready: what is executed is a
+/// plan by the judge's rules, nothing is started in a pause, the goals are reached in the end, and the
+/// record plays back to the same decisions.
+#[test]
+fn whatever_happens_while_plans_are_made_ready_what_is_done_is_valid_and_plays_back() {
+    let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+    for seed in 0..240 {
+        let slowly = |dice: &mut Dice| -> Vec<Rational> {
+            (0..16)
+                .map(|_| Rational::new(dice.small(160), 10))
+                .collect()
+        };
+        let (task, executor) = (task("(free s)", "(have book)"), executor(seed));
+        let (told, planner) = random_run(&task, seed, &slowly);
+        let is_last = |it: &String| it.contains("rest: goal-reached") && it.contains("last");
+        let notes = &told.notes;
+        assert!(notes.iter().any(is_last), "{executor}, {seed}: {notes:#?}");
+        let executed = told.report.executed.iter();
+        let steps: Vec<Step> = executed.map(|it| it.step.clone()).collect();
+        let free = task.with_goal(problem::Condition::TRUE);
+        let verdict = validate(&free, &TimeTriggeredPlan { steps }, &Settings::default());
+        assert!(
+            verdict.is_valid() || seed % 2 == 1,
+            "{executor}, {seed}: {verdict:?} {notes:#?}"
+        );
+        let (mut is_paused, mut is_ready) = (false, true);
+        for line in &told.lines {
+            if line.contains("\"event\":\"observed\"") {
+                is_paused |= line.contains("\"type\":\"pause\"");
+                is_paused &= !line.contains("\"type\":\"resume\"");
+            }
+            is_ready &= !line.contains("\"event\":\"planned\"");
+            is_ready |= line.contains("\"event\":\"plan\"");
+            let starts =
+                line.contains("\"event\":\"command\"") && line.contains("\"type\":\"start\"");
+            assert!(!(starts && is_paused), "{executor}, {seed}: {line}");
+            *seen.entry("begun meanwhile").or_default() += usize::from(starts && !is_ready);
+        }
+        for (what, note) in [("kept", "is kept"), ("outdated", "while the plan was made")] {
+            let notes = notes.iter().filter(|it| it.contains(note));
+            *seen.entry(what).or_default() += notes.count();
+        }
+        *seen.entry("readied").or_default() += planner.desk().readied;
+
+        let text = format!("{HEADER}\n{}\n", told.lines.join("\n"));
+        let stored = Stored::read(&text).expect("whole");
+        let mut replay = Replay::new(&stored, Arc::clone(&task));
+        let interruption = replay.interruption();
+        execution(&task, executor)
+            .planned_by(ReplayPlanner::new(&stored))
+            .prepared_by(ReplayPreparer(Analyst::new(flow::Settings::default())))
+            .recorded_by(&mut replay)
+            .ending_when(move || interruption.load(Ordering::SeqCst))
+            .run_in(&mut ReplayWorld::new(&stored, &task));
+        let (agreed, difference) = replay.outcome();
+        assert_eq!(difference, None, "{executor}, {seed}");
+        assert_eq!(agreed, told.lines.len(), "{executor}, {seed}");
+    }
+    for (what, count) in &seen {
+        assert!(*count > 10, "{what}: {seen:?}");
+    }
+}

@@ -1,0 +1,188 @@
+//! Beginning with a plan.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
+use super::stand::Goals;
+use super::{Run, Stop, Verdict, here};
+use crate::event::Ticket;
+use crate::executor::{Mission, News, StepId};
+use crate::preparation::PrepareError;
+use crate::record::Entry;
+
+/// A plan, and from where.
+#[derive(Clone, Copy)]
+pub(super) struct Course<'p> {
+    pub(super) plan: &'p TimeTriggeredPlan,
+    pub(super) situation: &'p Situation,
+    /// The tickets of what is under way there.
+    pub(super) running: &'p [Ticket],
+    /// What of it has begun since, before it is taken up.
+    pub(super) begun: &'p [Ticket],
+}
+
+impl<'p> Course<'p> {
+    /// A plan of which nothing has begun yet.
+    pub(super) fn of(
+        plan: &'p TimeTriggeredPlan,
+        situation: &'p Situation,
+        running: &'p [Ticket],
+    ) -> Self {
+        Self {
+            plan,
+            situation,
+            running,
+            begun: &[],
+        }
+    }
+}
+
+impl Run<'_> {
+    /// Makes a plan ready and begins with it.
+    pub(super) fn take_up(&mut self, course: Course<'_>) -> Result<(), Stop> {
+        let (task, goals) = (Arc::clone(&self.task), self.goals());
+        self.take_up_for(&task, &goals, course)
+    }
+
+    /// The same with a plan for these goals, which this task has.
+    pub(super) fn take_up_for(
+        &mut self,
+        task: &Task,
+        goals: &Goals,
+        course: Course<'_>,
+    ) -> Result<(), Stop> {
+        match self.prepare(task, course) {
+            Ok(mission) => self.begin_with(course, goals, &mission),
+            Err(error) => Err(no_plan(&error)),
+        }
+    }
+
+    /// Begins with a plan for these goals that is ready.
+    pub(super) fn begin_with(
+        &mut self,
+        course: Course<'_>,
+        goals: &Goals,
+        mission: &Mission,
+    ) -> Result<(), Stop> {
+        self.note_plan(course.plan);
+        self.begin_anew_with(course, goals);
+        self.begin_mission(mission)
+    }
+
+    /// Begins with a plan that is ready.
+    pub(super) fn begin_mission(&mut self, mission: &Mission) -> Result<(), Stop> {
+        self.lost = super::Lost::default();
+        let mut steps = mission.running.clone();
+        steps.extend(&mission.begun);
+        self.account.begin_plan(&steps);
+        if self.settings.plans_aside {
+            self.account.note_steps(mission);
+        }
+        self.steps = mission.time_triggered.steps.len();
+        self.progress.begin_plan();
+        self.news.clear();
+        self.ports.recorder.record(&Entry::Mission(mission));
+        if let Err(reason) = self.ports.executor.adopt(mission) {
+            self.account.begin_plan(&BTreeMap::new());
+            return self.replan(&reason);
+        }
+        // What has ended while the plan was made, the plan still waits for.
+        let mut missed: Vec<(Rational, News)> = Vec::new();
+        for (step, ticket) in mission.running.iter().map(|(step, it)| (*step, *it)) {
+            missed.extend(self.ending(step, ticket));
+        }
+        if !mission.begun.is_empty() {
+            // In the order in which they were told to start.
+            let mut begun: Vec<_> = mission
+                .begun
+                .iter()
+                .map(|(step, it)| (*it, *step))
+                .collect();
+            begun.sort_unstable();
+            for (ticket, step) in begun {
+                missed.extend(self.beginning(step, ticket));
+                missed.extend(self.ending(step, ticket));
+            }
+            missed.sort_by(|(one, _), (other, _)| one.cmp(other));
+        }
+        self.news.extend(missed.into_iter().map(|(_, news)| news));
+        Ok(())
+    }
+
+    /// The steps of a plan that these are: of each action the first ones that are not under way where
+    /// the plan begins. `None` if it does not have one of them.
+    pub(super) fn steps_of(
+        &self,
+        mission: &Mission,
+        begun: &[Ticket],
+    ) -> Option<BTreeMap<StepId, Ticket>> {
+        if begun.is_empty() {
+            return Some(BTreeMap::new());
+        }
+        let steps = mission.instances.iter().zip(&mission.time_triggered.steps);
+        let steps = steps.map(|(instance, step)| (StepId::from(*instance), step));
+        let mut left: Vec<_> = steps
+            .filter(|(id, _)| !mission.running.contains_key(id))
+            .collect();
+        left.sort_by(|(_, one), (_, other)| one.start.cmp(&other.start));
+        let step_of = |ticket: &Ticket| {
+            let name = &self.account.get(*ticket)?.action.name;
+            let index = left.iter().position(|(_, it)| it.action.name == *name)?;
+            Some((left.remove(index).0, *ticket))
+        };
+        begun.iter().map(step_of).collect()
+    }
+
+    /// That it has started, as news.
+    fn beginning(&self, step: StepId, ticket: Ticket) -> Option<(Rational, News)> {
+        let time = self.account.get(ticket)?.started.clone()?;
+        let measured = Vec::new();
+        let news = News::Started {
+            step,
+            time: time.clone(),
+            measured,
+        };
+        Some((time, news))
+    }
+
+    /// That it has ended, as news. What takes no time has, when it has started.
+    fn ending(&self, step: StepId, ticket: Ticket) -> Option<(Rational, News)> {
+        let entry = self.account.get(ticket)?;
+        let (time, ending) = entry.ended.clone()?;
+        if entry.planned.is_none() && entry.started.is_some() {
+            return None;
+        }
+        let measured = Vec::new();
+        let news = News::Ended {
+            step,
+            time: time.clone(),
+            ending,
+            measured,
+        };
+        Some((time, news))
+    }
+
+    pub(super) fn prepare(
+        &mut self,
+        task: &Task,
+        course: Course<'_>,
+    ) -> Result<Mission, PrepareError> {
+        if self.settings.plans_aside {
+            self.plan_task = Some(Arc::new(task.clone()));
+        }
+        let (preparer, need) = (&mut self.ports.preparer, self.ports.executor.need());
+        let here = (task, course.situation, course.running);
+        let mut mission = here::mission(here, course.plan, &self.now, &mut **preparer, need)?;
+        mission.begun = self.steps_of(&mission, course.begun).unwrap_or_default();
+        Ok(mission)
+    }
+}
+
+/// The end of a run whose plan cannot be made ready.
+pub(super) fn no_plan(error: &PrepareError) -> Stop {
+    let why = error.to_string();
+    Stop::Over(Verdict::NoPlan { why })
+}

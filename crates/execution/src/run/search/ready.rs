@@ -1,0 +1,351 @@
+//! Plans that are made ready beside the run: what goes on meanwhile, and how they take over.
+//!
+//! A plan is made ready from a moment, with what is under way then. It takes over as if it had been taken
+//! up at that moment, and its executor hears at once what has begun and ended since. So the executor's own
+//! check of times and amounts decides whether the plan can bear what has happened; nothing else is taken
+//! for granted.
+
+use std::sync::Arc;
+
+use elbowroom_model::ground::{Action, Body};
+use elbowroom_model::{Footprint, Situation, Step, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
+use super::super::beginning::{Course, no_plan};
+use super::super::lasting::Turn;
+use super::super::{Run, Stop};
+use super::fit::Begun;
+use super::{Goes, Search, WORD};
+use crate::event::{Measured, Ticket};
+use crate::executor::{News, Order};
+use crate::preparation::{Need, Wanted};
+use crate::record::Entry;
+use crate::run::intake::Remark;
+
+/// So many times a plan is made to fit again, and made ready again, because something unexpected was
+/// reported meanwhile. After that, its executor is told: a run to which something happens all the time
+/// does not wait for ever.
+const MOST_TRIES: usize = 2;
+
+/// A plan that is being made ready.
+pub(super) struct Readying {
+    plan: TimeTriggeredPlan,
+    /// From where.
+    situation: Situation,
+    /// What is under way there.
+    running: Vec<Ticket>,
+    /// How many actions had been started until then: those after them belong to the plan.
+    started: usize,
+    /// Since when it is ready.
+    since: Option<Rational>,
+    /// Whether something has happened since that nobody expected.
+    disagrees: bool,
+    /// Whether it was made to fit.
+    is_fitted: bool,
+}
+
+impl Run<'_> {
+    /// Begins to make a plan ready from there.
+    pub(super) fn make_ready(&mut self, mut search: Search, fit: Begun, is_fitted: bool) {
+        let (plan, situation, running) = fit;
+        let is_begun = self.ports.preparer.begin(&Wanted {
+            task: &search.task,
+            plan: &plan,
+            situation: &situation,
+            running: &running,
+            now: &self.now,
+            need: self.ports.executor.need(),
+        });
+        search.tries += 1;
+        search.readying = Some(Readying {
+            plan,
+            situation,
+            running,
+            started: self.account.started(),
+            // Who cannot do that beside the run is waited for.
+            since: (!is_begun).then(|| self.now.clone()),
+            disagrees: false,
+            is_fitted,
+        });
+        self.search = Some(search);
+    }
+
+    /// The plan is ready.
+    pub(in crate::run) fn note_plan_ready(&mut self) -> Remark {
+        let search = self.search.as_mut();
+        match search.and_then(|search| search.readying.as_mut()) {
+            Some(readying) if readying.since.is_none() => {
+                readying.since = Some(self.now.clone());
+                None
+            }
+            _ => Some("no plan was being made ready"),
+        }
+    }
+
+    /// Something has happened with which the plan that is being made ready does not reckon.
+    pub(in crate::run) fn note_disagreement(&mut self) {
+        let search = self.search.as_mut();
+        if let Some(readying) = search.and_then(|search| search.readying.as_mut()) {
+            readying.disagrees = true;
+        }
+    }
+
+    /// Amounts were measured, of which the executor of the next plan is told no more than what became of
+    /// them.
+    pub(in crate::run) fn note_measured(&mut self, measured: &[Measured]) {
+        if !measured.is_empty() {
+            self.note_disagreement();
+        }
+    }
+
+    /// When something about a plan that is made ready is to be decided, whatever happens.
+    pub(super) fn next_of_readying(&self, readying: &Readying) -> Rational {
+        match &readying.since {
+            Some(since) => (since + Rational::from(WORD)).max(&self.now + self.task.epsilon()),
+            None if self.now < readying.situation.time => readying.situation.time.clone(),
+            // Whoever makes it ready says so.
+            None => self.settings.time_limit.clone(),
+        }
+    }
+
+    /// Whether these can be started while a plan is made ready: it has them, too, and nothing that it does
+    /// before them touches what they touch.
+    pub(in crate::run) fn may_start(&self, orders: &[Order]) -> bool {
+        let readying = self.search.as_ref().and_then(|it| it.readying.as_ref());
+        let Some(readying) = readying else {
+            return true;
+        };
+        let steps = readying.plan.new_steps(&readying.situation).iter();
+        let mut left: Vec<&Step> = steps.collect();
+        left.sort_by(|one, other| one.start.cmp(&other.start));
+        let begun = begun_since(readying, self.account.started());
+        let begun = begun.filter_map(|it| self.account.get(it));
+        let mut take = |name: &str| {
+            let index = left.iter().position(|it| it.action.name == name)?;
+            Some(left.remove(index))
+        };
+        if !begun.map(|it| take(&it.action.name)).all(|it| it.is_some()) {
+            return false;
+        }
+        let starts: Option<Vec<&Step>> = orders.iter().map(|it| take(&it.action.name)).collect();
+        starts.is_some_and(|starts| {
+            starts.iter().all(|step| {
+                let mut earlier = left.iter().filter(|it| it.start < step.start);
+                !earlier.any(|it| touch(&self.task, &it.action, &step.action))
+            })
+        })
+    }
+
+    /// Sees to a plan that is made ready; whether the executor is not to be asked.
+    pub(super) fn tend_readying(&mut self) -> Result<bool, Stop> {
+        let Some(search) = &self.search else {
+            return Ok(false);
+        };
+        let Some(readying) = &search.readying else {
+            return Ok(false);
+        };
+        let Some(since) = &readying.since else {
+            let goes_on = search.course != Goes::UnderWay;
+            // Nothing of the plan begins before the time from which it is.
+            if goes_on && self.now >= readying.situation.time {
+                return Ok(false);
+            }
+            self.wait_for_search();
+            return Ok(true);
+        };
+        if self.is_silent(readying) && self.now < since + Rational::from(WORD) {
+            self.let_go_of_plan();
+            self.wait_for_search();
+            return Ok(true);
+        }
+        self.take_over_ready()?;
+        Ok(true)
+    }
+
+    /// Whether something that was begun meanwhile has not said that it has started.
+    fn is_silent(&self, readying: &Readying) -> bool {
+        let has_ended = |it: Ticket| self.account.get(it).is_none_or(|it| it.ended.is_some());
+        let mut begun = begun_since(readying, self.account.started());
+        begun.any(|it| !has_ended(it) && !self.belief.running().contains_key(&it))
+    }
+
+    /// A plan that is ready takes over, if what has happened meanwhile was to be expected.
+    fn take_over_ready(&mut self) -> Result<(), Stop> {
+        let Some(mut search) = self.search.take() else {
+            return Ok(());
+        };
+        let Some(readying) = search.readying.take() else {
+            return Ok(());
+        };
+        let mission = self.ports.preparer.collect(&Wanted {
+            task: &search.task,
+            plan: &readying.plan,
+            situation: &readying.situation,
+            running: &readying.running,
+            now: &self.now,
+            need: self.ports.executor.need(),
+        });
+        self.heed()?;
+        let begun: Vec<Ticket> = begun_since(&readying, self.account.started()).collect();
+        let mut mission = match mission {
+            Ok(mission) => mission,
+            Err(error) => {
+                if let Some(turn) = search.kept_for.take() {
+                    return self.plan_for_others(&turn);
+                }
+                if search.course != Goes::UnderWay || !begun.is_empty() {
+                    return self.search_again(&search.reason);
+                }
+                if !readying.is_fitted {
+                    return Err(no_plan(&error));
+                }
+                let plan = search.plan.as_ref().map(|(plan, _)| plan.clone());
+                return match plan {
+                    Some(plan) => self.take_over_from_nothing(search, &plan, false),
+                    None => Err(no_plan(&error)),
+                };
+            }
+        };
+        let steps = self.steps_of(&mission, &begun);
+        let agrees = !readying.disagrees && !self.is_silent(&readying) && steps.is_some();
+        if !agrees && (search.tries <= MOST_TRIES || !begun.is_empty()) {
+            search = match self.fit_again(search)? {
+                // Its executor is told.
+                Some(search) if begun.is_empty() => search,
+                Some(search) => return self.search_again(&search.reason),
+                None => return Ok(()),
+            };
+        }
+        if let Some(turn) = &search.kept_for {
+            self.ports.recorder.record(&Entry::Kept {
+                now: &self.now,
+                reason: &turn.reason,
+            });
+        } else {
+            let took = &self.now - &search.begun;
+            self.allowance = std::mem::take(&mut self.allowance).max(took);
+        }
+        self.tell_what_happened();
+        self.plan_task = Some(Arc::clone(&search.task));
+        mission.begun = steps.unwrap_or_default();
+        let course = Course {
+            plan: &readying.plan,
+            situation: &readying.situation,
+            running: &readying.running,
+            begun: &begun,
+        };
+        self.begin_with(course, &search.goals, &mission)
+    }
+
+    /// What has happened while a plan was made ready was not to be expected: it is made to fit again, or
+    /// another one is made. If its executor is to be told instead, the search is given back.
+    fn fit_again(&mut self, mut search: Search) -> Result<Option<Search>, Stop> {
+        if let Some(turn) = search.kept_for.take() {
+            self.keep_again(turn)?;
+            return Ok(None);
+        }
+        let went_on = search.course != Goes::UnderWay;
+        self.search = Some(search);
+        if went_on {
+            self.let_go_of_plan();
+        }
+        let Some(search) = self.search.take() else {
+            return Ok(None);
+        };
+        let plan = search.plan.as_ref().map(|(plan, _)| plan);
+        if let Some(fit) = plan.and_then(|plan| self.fitted(&search, plan)) {
+            self.news.clear();
+            self.make_ready(search, fit, true);
+            return Ok(None);
+        }
+        if went_on || !search.expected.is_empty() {
+            self.search_again(&search.reason)?;
+            return Ok(None);
+        }
+        Ok(Some(search))
+    }
+
+    /// Makes the rest of the present plan ready for other goals.
+    pub(in crate::run) fn make_rest_ready(&mut self, turn: Turn, rest: Begun) {
+        let may_go_on = !self.lost.plan
+            && self.settings.running == super::super::RunningRule::Keep
+            && self.ports.executor.need() != Need::PartialOrder;
+        let search = Search {
+            reason: turn.reason.clone(),
+            guess: super::Guess::AQuarterLonger,
+            task: Arc::clone(&self.task),
+            goals: self.goals(),
+            situation: rest.1.clone(),
+            running: rest.2.clone(),
+            expected: Vec::new(),
+            begun: self.now.clone(),
+            course: Goes::Plan { until: None },
+            is_made: true,
+            is_overtaken: false,
+            plan: None,
+            readying: None,
+            tries: 0,
+            left_behind: std::collections::BTreeMap::new(),
+            kept_for: Some(turn),
+        };
+        self.make_ready(search, rest, true);
+        if !may_go_on {
+            self.let_go_of_plan();
+        }
+    }
+
+    /// The rest of the plan is outdated: it is looked at again, or another plan is made.
+    fn keep_again(&mut self, turn: Turn) -> Result<(), Stop> {
+        self.lost.kept += 1;
+        if self.lost.kept > MOST_TRIES {
+            return self.plan_for_others(&turn);
+        }
+        self.turn_back(turn);
+        Ok(())
+    }
+
+    /// What is begun of the present plan belongs to no step of it any more; what it has changed is told.
+    pub(in crate::run) fn forget_steps(&mut self) {
+        for it in std::mem::take(&mut self.news) {
+            let (step, is_end) = match &it {
+                News::Started { step, .. } => (*step, false),
+                News::Ended { step, ending, .. } => {
+                    if *ending != crate::event::Ending::Succeeded {
+                        continue;
+                    }
+                    (*step, true)
+                }
+                _ => {
+                    self.news.push(it);
+                    continue;
+                }
+            };
+            if let Some(ticket) = self.account.ticket(step) {
+                self.tell_effects(ticket, is_end);
+            }
+        }
+        self.account.begin_plan(&std::collections::BTreeMap::new());
+    }
+}
+
+/// What was started since it was begun.
+fn begun_since(readying: &Readying, started: usize) -> impl Iterator<Item = Ticket> + use<> {
+    (readying.started..started).map(|number| Ticket(number as u64))
+}
+
+/// Whether it may matter which of two actions comes first.
+fn touch(task: &Task, one: &Action, other: &Action) -> bool {
+    let prints = |action: &Action| {
+        let mut all = vec![
+            Footprint::of_start(task, action),
+            Footprint::of_end(task, action),
+        ];
+        if let Body::Durative(body) = &action.body {
+            all.push(Footprint::of_condition(task, &body.over_all));
+        }
+        all
+    };
+    let others = prints(other);
+    let touches = |it: &Footprint| others.iter().any(|other| it.interferes_with(other));
+    prints(one).iter().any(touches)
+}

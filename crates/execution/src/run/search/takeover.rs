@@ -1,0 +1,111 @@
+//! How a plan that is there takes over.
+
+use elbowroom_model::TimeTriggeredPlan;
+use elbowroom_num::Rational;
+
+use super::super::beginning::Course;
+use super::super::{Run, Stop};
+use super::fit::{Begun, Expected};
+use super::{Goes, Search, WORD};
+use crate::executor::News;
+
+impl Run<'_> {
+    /// A plan takes over where nothing was started since it was asked for. Where things stand otherwise
+    /// than expected, it begins from here if it works from here; else what has happened is told to the
+    /// executor, which finds whether it can bear that.
+    pub(super) fn take_over_from_nothing(
+        &mut self,
+        search: Search,
+        plan: &TimeTriggeredPlan,
+        may_fit: bool,
+    ) -> Result<(), Stop> {
+        let time = search.situation.time.clone();
+        let (situation, running) = self.situation_at(time, search.guess);
+        let is_as_expected = situation == search.situation && running == search.running;
+        if !is_as_expected
+            && may_fit
+            && let Some(fit) = self.fitted(&search, plan)
+        {
+            if self.settings.readies_aside {
+                // All that has happened is in it.
+                self.news.clear();
+                self.make_ready(search, fit, true);
+                return Ok(());
+            }
+            let (plan, situation, running) = fit;
+            let course = Course::of(&plan, &situation, &running);
+            if let Ok(mission) = self.prepare(&search.task, course) {
+                return self.begin_with(course, &search.goals, &mission);
+            }
+        }
+        if !is_as_expected && !search.expected.is_empty() {
+            // It continues what was never started.
+            return self.search_again(&search.reason);
+        }
+        if self.settings.readies_aside {
+            let as_made = (
+                plan.clone(),
+                search.situation.clone(),
+                search.running.clone(),
+            );
+            self.make_ready(search, as_made, false);
+            return Ok(());
+        }
+        self.tell_what_happened();
+        let course = Course::of(plan, &search.situation, &search.running);
+        self.take_up_for(&search.task, &search.goals, course)
+    }
+
+    /// Has the executor of the next plan told what has happened. Steps of another plan mean nothing to
+    /// it.
+    pub(super) fn tell_what_happened(&mut self) {
+        let mut surprises = std::mem::take(&mut self.news);
+        surprises.retain(|it| !matches!(it, News::Started { .. } | News::Ended { .. }));
+        self.agenda.push(super::Todo::Tell(surprises));
+    }
+
+    /// A plan that is there takes over from the present one when it is time for that, or is made ready;
+    /// whether the executor is not to be asked.
+    pub(super) fn take_over_if_due(&mut self) -> Result<bool, Stop> {
+        let Some(search) = &self.search else {
+            return Ok(false);
+        };
+        let Some((plan, since)) = &search.plan else {
+            return Ok(false);
+        };
+        let is_begun = |it: &Expected| self.account.ticket(it.step).is_some();
+        // What is yet to begin is part of a plan that is made ready meanwhile.
+        let is_due = self.settings.readies_aside
+            || self.now >= search.situation.time
+            || search.expected.iter().all(is_begun);
+        // What was told to start and has not said that it has, cannot be planned with.
+        let is_told = |ticket| self.belief.running().contains_key(&ticket);
+        let waits_for_word =
+            !self.account.open_tickets().all(is_told) && self.now < since + Rational::from(WORD);
+        if search.course != Goes::UnderWay && (!is_due || waits_for_word) {
+            return Ok(false);
+        }
+        let fit = self.fitted(search, plan);
+        let Some(search) = self.search.take() else {
+            return Ok(false);
+        };
+        self.take_over_as(search, fit)?;
+        Ok(true)
+    }
+
+    /// The plan takes over as it was made to fit, or is made ready; if it does not fit, it is outdated.
+    fn take_over_as(&mut self, search: Search, fit: Option<Begun>) -> Result<(), Stop> {
+        if let Some(fit) = fit {
+            if self.settings.readies_aside {
+                self.make_ready(search, fit, true);
+                return Ok(());
+            }
+            let (plan, situation, running) = fit;
+            let course = Course::of(&plan, &situation, &running);
+            if let Ok(mission) = self.prepare(&search.task, course) {
+                return self.begin_with(course, &search.goals, &mission);
+            }
+        }
+        self.search_again(&search.reason)
+    }
+}
