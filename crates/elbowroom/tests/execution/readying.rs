@@ -137,8 +137,18 @@ fn a_plan_that_is_kept_goes_on_while_it_is_made_ready() {
 
 const ITEMS: [&str; 3] = ["book", "cup", "key"];
 
-/// A random script, how long plans take, and by how many quarters durations differ.
-fn random(task: &Task, seed: u64) -> (Vec<(Rational, Event)>, Vec<Rational>, Vec<i64>, Dice) {
+/// What is random about a run.
+struct Fate {
+    script: Vec<(Rational, Event)>,
+    /// How long plans take.
+    lengths: Vec<Rational>,
+    /// By how many quarters durations differ.
+    quarters: Vec<i64>,
+    /// For what else is left to chance.
+    dice: Dice,
+}
+
+fn fate(task: &Task, seed: u64) -> Fate {
     let mut dice = Dice(seed);
     let mut script = Vec::new();
     for _ in 0..20 {
@@ -166,7 +176,12 @@ fn random(task: &Task, seed: u64) -> (Vec<(Rational, Event)>, Vec<Rational>, Vec
     let lengths = (0..12).map(|_| Rational::new(dice.small(150), 10));
     let lengths = lengths.collect();
     let quarters = (0..7).map(|_| dice.small(3) - 1).collect();
-    (script, lengths, quarters, dice)
+    Fate {
+        script,
+        lengths,
+        quarters,
+        dice,
+    }
 }
 
 const EXECUTORS: [&str; 6] = [
@@ -188,7 +203,12 @@ fn random_run(
     seed: u64,
     readying: &dyn Fn(&mut Dice) -> Vec<Rational>,
 ) -> (Told, Beside) {
-    let (script, lengths, quarters, mut dice) = random(task, seed);
+    let Fate {
+        script,
+        lengths,
+        quarters,
+        mut dice,
+    } = fate(task, seed);
     let planner = Beside::taking(&lengths).readying(&readying(&mut dice));
     let execution = execution(task, executor(seed)).prepared_by(Readier(planner.clone()));
     let told = told(execution, task, (500, script), &planner, &quarters);
