@@ -65,6 +65,34 @@ fn options_of_run_that_could_do_nothing_are_refused() {
 }
 
 #[test]
+fn threads_are_the_embedded_planners_and_change_no_plan() {
+    fn plan<'a>(options: &[&'a str]) -> Vec<&'a str> {
+        [&["plan", RUN[1], RUN[2]], options].concat()
+    }
+    for (options, words) in [
+        (
+            &["--jobs", "2", "--planner", "cat {domain} {problem}"][..],
+            "leave out --jobs",
+        ),
+        (
+            &["--jobs", "2", "--objective", "room"],
+            "cannot be used with",
+        ),
+        (&["--jobs", "-1"], "--jobs"),
+        (&["--jobs", "many"], "--jobs"),
+    ] {
+        let said = refusal(&plan(options));
+        assert!(said.contains(words), "{options:?}: {said}");
+    }
+    let plans = ["0", "1", "2", "7"].map(|jobs| {
+        let output = elbowroom(&plan(&["--jobs", jobs]));
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        output.stdout
+    });
+    assert!(plans.windows(2).all(|two| two[0] == two[1]), "{plans:?}");
+}
+
+#[test]
 fn what_only_the_largest_box_has_asks_for_it_or_is_refused() {
     let plan = [
         "envelope",

@@ -10,9 +10,27 @@ use elbowroom_plan::{DecoupledEnvelope, InstanceId, ParametrizedPlan, PartialOrd
 
 use crate::event::{Ending, Measured, Ticket};
 use crate::forms::Forms;
-use crate::preparation::Need;
 use crate::progression::Progression;
 use crate::reason::Reason;
+
+/// The form of a plan that an executor requires, from the least to the most preparation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Need {
+    /// Which orderings facts need. Nothing is left open, and where numbers matter, nothing is
+    /// guaranteed: what `ROSPlan`'s dispatcher has.
+    Orderings,
+    /// The same, and the partial order of the plan's happenings, whose layers can be executed in
+    /// more than one order.
+    PartialOrder,
+    /// The orderings, with as many differences of times fixed as it takes for every schedule to
+    /// work.
+    Network,
+    /// The same, with quantities left open, and for which values the plan is guaranteed to work if
+    /// that can be found out.
+    OpenNetwork,
+    /// The same; without knowing for which values the plan is guaranteed to work it is of no use.
+    Envelope,
+}
 
 /// An action of the present plan, by a number that the executor chooses.
 ///

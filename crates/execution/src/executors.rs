@@ -25,10 +25,11 @@ use elbowroom_probability::Likelihoods;
 pub use adaptable::Orders;
 pub use lookahead::Foresight;
 
+use crate::executor::Need;
 use crate::executor::{Decided, Decision, Executor};
 use crate::odds::Odds;
 use crate::outlook::Outlook;
-use crate::preparation::{Need, Region};
+use crate::preparation::Region;
 use crate::reason::{About, Cause, Reason};
 use crate::rehearsal::Rehearsal;
 

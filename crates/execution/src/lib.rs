@@ -45,12 +45,14 @@ pub mod run;
 mod world;
 
 pub use event::{Command, Ending, Event, Measured, Observation, Request, Ticket};
-pub use executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
+pub use executor::{
+    Decided, Decision, Executor, Mission, Moment, Need, News, Order, Planned, StepId,
+};
 pub use forms::Forms;
 pub use odds::{Compared, Odds, Remainder};
 pub use outlook::{Move, Outlook, Standing, Weighed};
 pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
-pub use preparation::{Need, PrepareError, Prepared, Preparer, Region, Wanted};
+pub use preparation::{PrepareError, Prepared, Preparer, Region, Wanted};
 pub use progression::{Guards, Parts, Progression, Underway, UnderwayParts, Unreadable};
 pub use reason::{About, Behind, Cause, Changed, Promise, Reason};
 pub use record::{Entry, NoRecord, Recorder};

@@ -2,6 +2,7 @@
 //!
 //! What executes needs no solver; what stands behind these traits may have one.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_model::validate::Violation;
@@ -15,28 +16,8 @@ use elbowroom_plan::{
 };
 
 use crate::event::Ticket;
-use crate::executor::Mission;
+use crate::executor::{Mission, Need, StepId};
 use crate::forms::Forms;
-use crate::run::here;
-
-/// The form of a plan that an executor requires, from the least to the most preparation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Need {
-    /// Which orderings facts need. Nothing is left open, and where numbers matter, nothing is
-    /// guaranteed: what `ROSPlan`'s dispatcher has.
-    Orderings,
-    /// The same, and the partial order of the plan's happenings, whose layers can be executed in
-    /// more than one order.
-    PartialOrder,
-    /// The orderings, with as many differences of times fixed as it takes for every schedule to
-    /// work.
-    Network,
-    /// The same, with quantities left open, and for which values the plan is guaranteed to work if
-    /// that can be found out.
-    OpenNetwork,
-    /// The same; without knowing for which values the plan is guaranteed to work it is of no use.
-    Envelope,
-}
 
 /// A plan made ready to be executed.
 #[derive(Clone, Debug)]
@@ -133,8 +114,25 @@ impl Wanted<'_> {
     /// # Errors
     /// When the plan does not work.
     pub fn mission<P: Preparer + ?Sized>(&self, preparer: &mut P) -> Result<Mission, PrepareError> {
-        let here = (self.task, self.situation, self.running);
-        here::mission(here, self.plan, self.now, preparer, self.need)
+        let task = Arc::new(self.situation.rest_of_task(self.task));
+        // What is running comes first in it.
+        let plan = self.situation.rest_of_plan(self.plan);
+        let ready = preparer.prepare(&task, &plan, self.need)?;
+        let steps = ready.instances.iter().copied().map(StepId::from);
+        Ok(Mission {
+            running: steps.zip(self.running.iter().copied()).collect(),
+            begun: BTreeMap::new(),
+            task,
+            origin: self.situation.time.clone(),
+            now: self.now.clone(),
+            time_triggered: plan,
+            plan: ready.plan,
+            instances: ready.instances,
+            nominal: ready.nominal,
+            envelope: ready.envelope,
+            forms: ready.forms,
+            order: ready.order,
+        })
     }
 }
 

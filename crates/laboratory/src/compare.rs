@@ -156,7 +156,7 @@ pub fn run_recorded(
         }
     }
     if experiment.optimum && !whole.is_interrupted {
-        whole.optimum = pool.install(|| optimum::of(experiment, &fillings, &goes_on))?;
+        whole.optimum = pool.install(|| optimum::of(experiment, &fillings, part, &goes_on))?;
         whole.is_interrupted = !goes_on();
     }
     Ok(whole)

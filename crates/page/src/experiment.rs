@@ -187,10 +187,7 @@ pub(crate) fn facts(
 
 /// The executors in one column.
 fn group(results: &Results, column: usize) -> RateGroup {
-    let best = results
-        .optimum
-        .get(column)
-        .filter(|best| best.unknown.is_none());
+    let best = results.optimum.get(column).filter(|best| best.is_known());
     let best = best.map(|best| best.upper);
     let rows = results.rows.iter().zip(&results.cells);
     RateGroup {

@@ -57,6 +57,10 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         (Bars::default(), Guarantees::default(), Log::default());
     let mut report = None;
     let mut is_paused = false;
+    if let Ok(Some(snapshot)) = stored.snapshot() {
+        bars.known(&snapshot);
+        is_paused = snapshot.paused;
+    }
     for line in &stored.lines {
         if let Line::Observed(observed) = line
             && observed.remark.is_none()
@@ -145,7 +149,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
 /// What of the run is not on the page, as its record does not begin at the beginning.
 fn not_shown(stored: &Stored, left_out: usize) -> Option<String> {
     if stored.has_snapshot() {
-        let words = "what was before this segment of the journal, and facts and numbers";
+        let words = "what was before this segment of the journal, but for the last actions, and facts and numbers";
         return Some(words.to_owned());
     }
     let words = || format!("the first {left_out} lines of the trace, and facts and numbers");

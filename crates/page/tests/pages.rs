@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use elbowroom::answers::Exact;
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, envelope};
 use elbowroom::answers::run::simulate;
 use elbowroom::answers::{RunRequest, Unwatched};
@@ -10,9 +11,10 @@ use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
-use elbowroom::report::trace::{Line, Stored, TraceWriter};
+use elbowroom::report::trace::{Line, SnapshotLine, StartLine, Stored, TraceWriter, snapshot_text};
 use elbowroom_page::document::{Chart, Document, Section, Table, Text, Tone};
 use elbowroom_page::{PageError, document, page};
+use indexmap::IndexMap;
 
 /// Drives take longer than planned, and picking fails now and then.
 const WORLD: &str = "
@@ -245,4 +247,75 @@ fn what_is_no_document_is_refused_with_one_sentence() {
             "{format}: {error}"
         );
     }
+}
+
+/// A journal that begins anew: what was under way then, or had ended not long before, is on the page, and what is
+/// reported of it later belongs to it.
+#[test]
+fn a_journal_that_begins_anew_has_a_page_with_the_starts_from_before() {
+    let exact = |number: i64| Exact(Rational::from(number));
+    let start = |ticket, action: &str, began| StartLine {
+        ticket,
+        action: action.to_owned(),
+        duration: Some(exact(10)),
+        ordered: exact(began),
+        started: Some(exact(began)),
+        heard: None,
+        ended: None,
+        outcome: None,
+        why: None,
+        cancelled: None,
+        warned: None,
+        measured_at_start: IndexMap::new(),
+        measured_at_end: IndexMap::new(),
+    };
+    let over = StartLine {
+        ended: Some(exact(99)),
+        outcome: Some("failed".to_owned()),
+        why: Some("the wheel slips".to_owned()),
+        ..start(7, "(drive rover depot shelf)", 90)
+    };
+    let snapshot = SnapshotLine {
+        now: exact(100),
+        since: None,
+        started: 9,
+        allowance: exact(1),
+        answers: 0,
+        answers_since: exact(100),
+        timed: 0,
+        group: exact(100),
+        facts: IndexMap::new(),
+        numbers: IndexMap::new(),
+        facts_before: IndexMap::new(),
+        numbers_before: IndexMap::new(),
+        doubtful_facts: Vec::new(),
+        doubtful_numbers: Vec::new(),
+        goals: Vec::new(),
+        problem_goals: true,
+        paused: true,
+        replans: 0,
+        refused: IndexMap::new(),
+        refused_until: None,
+        starts: vec![over, start(8, "(drive rover shelf office)", 95)],
+        under_way: Vec::new(),
+        plan: None,
+    };
+    let header = trace("delivery", 3);
+    let header = header.lines().next().expect("a first line");
+    let at = r#"{"exact":"106","decimal":106.0}"#;
+    let ended = format!(
+        r#"{{"event":"observed","now":{at},"observation":{{"type":"ended","ticket":8,"outcome":"succeeded","measured":{{}},"time":{at}}},"planned":{{"earliest":null,"latest":null}}}}"#
+    );
+    let record = format!("{header}\n{}\n{ended}\n", snapshot_text(&snapshot));
+    let document = document("run.jsonl", &record).expect("a document");
+    let bars: Vec<_> = chart(&document).bars.iter().collect();
+    let of = |name: &str| {
+        let bar = bars.iter().find(|bar| bar.name == name).expect("a bar");
+        (bar.actual, bar.outcome)
+    };
+    let failed = of("(drive rover depot shelf)");
+    assert_eq!(failed, (Some((90.0, 99.0)), "failed"));
+    let succeeded = of("(drive rover shelf office)");
+    assert_eq!(succeeded, (Some((95.0, 106.0)), "succeeded"));
+    assert!(document.is_paused);
 }

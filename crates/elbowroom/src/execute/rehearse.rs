@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::executors::{ExecutorSpec, Means, Orders};
 use elbowroom_execution::run::PlanningTime;
-use elbowroom_execution::run::here::{Guess, mission, rest_of, situation_at};
+use elbowroom_execution::run::here::{Guess, rest_of, situation_at};
 use elbowroom_execution::{
-    Ending, Executor, Mission, Need, News, PlanAnswer, Planner, PlannerAnswer, Rehearsal,
-    Rehearsed, Rehearsing, Scene, Tells,
+    Ending, Executor, Mission, News, PlanAnswer, Planner, PlannerAnswer, Rehearsal, Rehearsed,
+    Rehearsing, Scene, Tells, Wanted,
 };
 use elbowroom_model::ground::FactId;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
@@ -315,9 +315,15 @@ impl Rehearse {
             let Ok(executor) = name.parse::<ExecutorSpec>() else {
                 continue;
             };
-            let here = (&**task, &situation, running.as_slice());
-            let need: Need = executor.registered.need;
-            if let Ok(mission) = mission(here, &rest, now, &mut self.preparer, need) {
+            let wanted = Wanted {
+                task,
+                plan: &rest,
+                situation: &situation,
+                running: &running,
+                now,
+                need: executor.registered.need,
+            };
+            if let Ok(mission) = wanted.mission(&mut self.preparer) {
                 ways.push(Way::TakesUp(executor, Box::new(mission)));
             }
         }

@@ -16,8 +16,8 @@ use elbowroom_probability::{
 use super::chooser::Chooser;
 use super::{Foresight, Registered};
 use crate::dispatch::replan;
+use crate::executor::Need;
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
-use crate::preparation::Need;
 use crate::reason::{About, Cause, Reason};
 use initial::Initial;
 pub use orders::Orders;

@@ -6,8 +6,8 @@ use elbowroom_plan::{Bound, Constraint};
 use super::Registered;
 use crate::dispatch::{Bounds, Dispatch, Sight, replan};
 use crate::event::Ending;
+use crate::executor::Need;
 use crate::executor::{Decided, Executor, Mission, Moment, News, Planned, StepId};
-use crate::preparation::Need;
 use crate::reason::{About, Cause, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {

@@ -5,8 +5,8 @@ use elbowroom_plan::{Bound, Constraint, Node, NodeId, Schedule, StnPlan};
 
 use super::Registered;
 use crate::dispatch::{Bounds, Dispatch, Sight, given, replan};
+use crate::executor::Need;
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
-use crate::preparation::Need;
 use crate::quantities::amounts;
 use crate::reason::{About, Cause, Reason};
 

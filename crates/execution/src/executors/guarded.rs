@@ -5,8 +5,8 @@ use elbowroom_plan::{Constraint, DecoupledEnvelope, Valuation};
 
 use super::{Registered, promise};
 use crate::dispatch::{Dispatch, replan};
+use crate::executor::Need;
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, Planned, StepId};
-use crate::preparation::Need;
 use crate::quantities::{Reading, amounts, duration_parameters};
 use crate::reason::{About, Cause, Promise, Reason};
 

@@ -12,9 +12,10 @@ use elbowroom_plan::{Bound, InstanceId, ParameterId, ParametrizedPlan, Valuation
 use super::{Registered, promise};
 use crate::dispatch::{Bounds, Dispatch, replan};
 use crate::event::Measured;
+use crate::executor::Need;
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Planned, StepId};
 use crate::odds::{Odds, Remainder};
-use crate::preparation::{Need, Region};
+use crate::preparation::Region;
 use crate::quantities::{Amounts, amounts, duration_parameters, places};
 use crate::reason::{About, Cause, Promise, Reason};
 

@@ -8,7 +8,7 @@ use elbowroom_probability::optimum::Table;
 
 use super::Registered;
 use super::adaptable::Adaptable;
-use crate::preparation::Need;
+use crate::executor::Need;
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "lookahead",

@@ -12,9 +12,9 @@ use elbowroom_num::Rational;
 
 use super::{Registered, live};
 use crate::dispatch::replan;
+use crate::executor::Need;
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
 use crate::outlook::Outlook;
-use crate::preparation::Need;
 use crate::progression::Outlook as Prospect;
 use crate::reason::{About, Cause, Reason};
 

@@ -5,8 +5,8 @@ use elbowroom_plan::{Constraint, NodeId};
 
 use super::Registered;
 use crate::dispatch::{Dispatch, given, replan};
+use crate::executor::Need;
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
-use crate::preparation::Need;
 use crate::quantities::amounts;
 use crate::reason::Reason;
 

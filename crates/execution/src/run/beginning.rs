@@ -7,10 +7,10 @@ use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use super::stand::Goals;
-use super::{Run, Stop, Verdict, here};
+use super::{Run, Stop, Verdict};
 use crate::event::Ticket;
 use crate::executor::{Mission, News, StepId};
-use crate::preparation::PrepareError;
+use crate::preparation::{PrepareError, Wanted};
 use crate::record::Entry;
 
 /// A plan, and from where.
@@ -173,9 +173,15 @@ impl Run<'_> {
         if self.settings.plans_aside {
             self.plan_task = Some(Arc::new(task.clone()));
         }
-        let (preparer, need) = (&mut self.ports.preparer, self.ports.executor.need());
-        let here = (task, course.situation, course.running);
-        let mut mission = here::mission(here, course.plan, &self.now, &mut **preparer, need)?;
+        let wanted = Wanted {
+            task,
+            plan: course.plan,
+            situation: course.situation,
+            running: course.running,
+            now: &self.now,
+            need: self.ports.executor.need(),
+        };
+        let mut mission = wanted.mission(&mut *self.ports.preparer)?;
         mission.begun = self.steps_of(&mission, course.begun).unwrap_or_default();
         Ok(mission)
     }

@@ -1,7 +1,5 @@
-//! Where a run stands: the situation for a plan from here, what is left of the present plan, and a
-//! plan made ready.
+//! Where a run stands: the situation for a plan from here, and what is left of the present plan.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_model::validate::{Settings, validate_from};
@@ -9,8 +7,6 @@ use elbowroom_model::{RunningAction, Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
 
 use crate::event::Ticket;
-use crate::executor::{Mission, StepId};
-use crate::preparation::{Need, PrepareError, Preparer};
 use crate::progression::Progression;
 
 /// When something will end that should have ended.
@@ -85,37 +81,4 @@ pub fn rest_of(
     let rest = TimeTriggeredPlan { steps };
     let verdict = validate_from(task, situation, &rest, &Settings::default());
     verdict.is_valid().then_some(rest)
-}
-
-/// A plan from a situation, made ready to be executed from `now` on. `running` are the tickets of
-/// what the situation has running.
-///
-/// # Errors
-/// When the plan does not work.
-pub fn mission<P: Preparer + ?Sized>(
-    (task, situation, running): (&Task, &Situation, &[Ticket]),
-    plan: &TimeTriggeredPlan,
-    now: &Rational,
-    preparer: &mut P,
-    need: Need,
-) -> Result<Mission, PrepareError> {
-    let task = Arc::new(situation.rest_of_task(task));
-    // What is running comes first in it.
-    let plan = situation.rest_of_plan(plan);
-    let ready = preparer.prepare(&task, &plan, need)?;
-    let steps = ready.instances.iter().copied().map(StepId::from);
-    Ok(Mission {
-        running: steps.zip(running.iter().copied()).collect(),
-        begun: BTreeMap::new(),
-        task,
-        origin: situation.time.clone(),
-        now: now.clone(),
-        time_triggered: plan,
-        plan: ready.plan,
-        instances: ready.instances,
-        nominal: ready.nominal,
-        envelope: ready.envelope,
-        forms: ready.forms,
-        order: ready.order,
-    })
 }

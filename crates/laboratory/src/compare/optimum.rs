@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::trials::Setting;
-use super::{Column, Experiment, ExperimentError};
+use super::{Column, Experiment, ExperimentError, Part};
 use crate::timed::{Settings, optimum};
 
 /// The name of the row.
@@ -17,31 +17,36 @@ pub(super) const ROW: &str = "optimum without foresight";
 pub(super) const SUMMARY: &str = "Bounds, in percent, for what the best of all executors reaches that knows \
     the world's distributions but not what will happen; it replans at any time and in no time.";
 
-/// The optimum of a column: the mean over its problems.
+/// The optimum of a column: the mean over its problems, or over those of a part of an experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnOptimum {
-    /// At least this.
+    /// At least this: a multiple of a billionth of one in `problems`, so that parts add up to the same as the whole.
     pub lower: f64,
-    /// And at most this.
+    /// And at most this; the same.
     pub upper: f64,
+    /// The number of problems.
+    pub problems: u64,
     /// Why the bounds say nothing, if they do not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unknown: Option<String>,
 }
 
-/// For each column. Problems are looked at in parallel, which changes nothing.
+/// For each column, of the problems that are a part's: every Nth one. Problems are looked at in parallel, which changes nothing.
 pub(super) fn of(
     experiment: &Experiment,
     fillings: &[Vec<(String, String)>],
+    part: Part,
     goes_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<ColumnOptimum>, ExperimentError> {
+    let is_of_part = |(problem, _): &(usize, _)| *problem as u64 % part.shards.max(1) == part.shard;
     let columns = experiment.columns.iter();
     columns
         .map(|column| {
             let bounds: Result<Vec<_>, ExperimentError> = fillings
                 .par_iter()
                 .enumerate()
+                .filter(is_of_part)
                 .map(|(problem, filling)| bounds(experiment, column, problem, filling, goes_on))
                 .collect();
             Ok(mean(&bounds?))
@@ -108,41 +113,134 @@ fn plans(
     plans.take(MOST_PLANS).map(names).collect()
 }
 
+/// Bounds are added up as whole numbers of these, of one.
+const SHARES: f64 = 1e9;
+
 fn mean(bounds: &[Result<(f64, f64), String>]) -> ColumnOptimum {
-    let (mut lower, mut upper, mut unknown) = (0.0, 0.0, None);
+    let mut sum = Sum::default();
+    let mut unknown = None;
     for found in bounds {
+        sum.problems += 1;
         match found {
             Ok((least, most)) => {
-                lower += least;
-                upper += most;
+                sum.lower += (least * SHARES).floor();
+                sum.upper += (most * SHARES).ceil();
             }
             Err(why) => {
-                upper += 1.0;
+                sum.upper += SHARES;
                 unknown.get_or_insert(why);
             }
         }
     }
-    #[allow(
-        clippy::cast_precision_loss,
-        reason = "an experiment has far fewer problems than 2^52"
-    )]
-    let count = bounds.len().max(1) as f64;
-    ColumnOptimum {
-        lower: lower / count,
-        upper: upper / count,
-        unknown: unknown.cloned(),
+    sum.mean(unknown.cloned())
+}
+
+/// The bounds of several problems, in whole numbers of [`SHARES`], which stay far below 2^52.
+#[derive(Default)]
+struct Sum {
+    lower: f64,
+    upper: f64,
+    problems: u64,
+}
+
+impl Sum {
+    fn of(column: &ColumnOptimum) -> Self {
+        let whole = |mean: f64| (mean * count(column.problems) * SHARES).round();
+        Self {
+            lower: whole(column.lower),
+            upper: whole(column.upper),
+            problems: column.problems,
+        }
+    }
+
+    fn mean(&self, unknown: Option<String>) -> ColumnOptimum {
+        let mean = |sum: f64| sum / SHARES / count(self.problems.max(1));
+        ColumnOptimum {
+            lower: mean(self.lower),
+            upper: mean(self.upper),
+            problems: self.problems,
+            unknown,
+        }
     }
 }
 
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "an experiment has far fewer problems than 2^52"
+)]
+fn count(problems: u64) -> f64 {
+    problems as f64
+}
+
 impl ColumnOptimum {
+    /// Adds the problems of another part.
+    pub(super) fn add(&mut self, other: &Self) {
+        let (mine, theirs) = (Sum::of(self), Sum::of(other));
+        let sum = Sum {
+            lower: mine.lower + theirs.lower,
+            upper: mine.upper + theirs.upper,
+            problems: mine.problems + theirs.problems,
+        };
+        let unknown = self.unknown.take().or_else(|| other.unknown.clone());
+        *self = sum.mean(unknown);
+    }
+
+    /// Whether there are bounds at all.
+    pub fn is_known(&self) -> bool {
+        self.unknown.is_none() && self.problems > 0
+    }
+
     /// In percent, rounded outwards.
     pub(super) fn words(&self) -> String {
-        if self.unknown.is_some() {
+        if !self.is_known() {
             return "-".to_owned();
         }
         let tenths = |value: f64| value / 10.0;
-        let lower = tenths((self.lower * 1000.0).floor());
-        let upper = tenths((self.upper * 1000.0).ceil());
+        // What a bound was rounded by, or is off by as a floating-point number, is not shown.
+        let lower = tenths((self.lower * 1000.0 + ROUNDING).floor());
+        let upper = tenths((self.upper * 1000.0 - ROUNDING).ceil());
         format!("{lower:.1} to {upper:.1}")
+    }
+}
+
+/// In tenths of a percentage point.
+const ROUNDING: f64 = 1e-5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Parts add up to the same as the whole, to the last bit, in whatever order; also with a part that has no problem.
+    #[test]
+    fn parts_add_up_to_the_whole() {
+        let bounds: Vec<Result<(f64, f64), String>> = (0..97)
+            .map(|number: u32| {
+                let lower = (f64::from(number) * 0.618_034).fract();
+                Ok((lower, lower + (1.0 - lower) / 3.0))
+            })
+            .collect();
+        let whole = mean(&bounds);
+        for shards in [1, 2, 3, 10, 100] {
+            let mut parts = (0..shards).map(|shard| {
+                let part = bounds.iter().skip(shard).step_by(shards).cloned();
+                mean(&part.collect::<Vec<_>>())
+            });
+            let first = parts.next().expect("one");
+            let sum = parts.fold(first, |mut sum, part| {
+                sum.add(&part);
+                sum
+            });
+            assert_eq!(sum, whole, "{shards} parts");
+        }
+        assert_eq!(whole.problems, 97);
+    }
+
+    #[test]
+    fn what_is_not_known_of_one_problem_is_not_known_of_the_column() {
+        let mut column = mean(&[Ok((1.0, 1.0))]);
+        assert_eq!(column.words(), "100.0 to 100.0");
+        column.add(&mean(&[Err("numbers that change".to_owned())]));
+        assert_eq!((column.lower, column.upper, column.problems), (0.5, 1.0, 2));
+        assert_eq!(column.words(), "-");
     }
 }

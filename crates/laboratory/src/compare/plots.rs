@@ -46,7 +46,7 @@ impl Results {
     /// The upper bound of what the best of all executors reaches, where it says something.
     fn reference(&self) -> Option<Series> {
         let point = |column: &super::ColumnOptimum| {
-            column.unknown.is_none().then_some(Point {
+            column.is_known().then_some(Point {
                 value: 100.0 * column.upper,
                 interval: None,
             })

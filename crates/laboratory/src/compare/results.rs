@@ -308,9 +308,13 @@ impl Partial for Results {
     fn add(&mut self, other: &Self) {
         self.is_interrupted |= other.is_interrupted;
         beginnings::merge(&mut self.beginnings, &other.beginnings);
-        // Every part has all of it.
+        // What was interrupted may have none.
         if self.optimum.is_empty() {
             self.optimum.clone_from(&other.optimum);
+        } else {
+            for (mine, theirs) in self.optimum.iter_mut().zip(&other.optimum) {
+                mine.add(theirs);
+            }
         }
         for (mine, theirs) in self
             .cells

@@ -4,12 +4,13 @@ mod drawn;
 
 use std::collections::{BTreeMap, VecDeque};
 
+use elbowroom::answers::Exact;
 use elbowroom::answers::envelope::timeline::WindowAnswer;
 use elbowroom::num::Rational;
 use elbowroom::report::line::{
     BoundLine, DecisionLine, ExecutedLine, GivenLine, ObservationLine, PlanLine, WindowLine,
 };
-use elbowroom::report::trace::Line;
+use elbowroom::report::trace::{Line, SnapshotLine};
 
 use super::windows::Windows;
 
@@ -129,6 +130,29 @@ impl Bars {
             Line::Over(report) => self.executed(&report.executed),
             _ => {}
         }
+    }
+
+    /// What was started before the record began anew, and is under way or has not ended long ago.
+    pub(super) fn known(&mut self, snapshot: &SnapshotLine) {
+        let time = |it: &Option<Exact>| it.as_ref().map(|it| it.0.clone());
+        for known in &snapshot.starts {
+            let start = Start {
+                action: known.action.clone(),
+                step: None,
+                ordered: known.ordered.0.clone(),
+                planned: time(&known.duration),
+                due: WindowLine::default(),
+                end_due: WindowLine::default(),
+                started: time(&known.started),
+                ended: time(&known.ended),
+                outcome: known.outcome.clone(),
+                why: known.why.clone(),
+            };
+            self.starts.insert(known.ticket, start);
+        }
+        let under_way = snapshot.plan.iter().flat_map(|plan| &plan.under_way);
+        let names = under_way.filter_map(|it| self.action(it.ticket));
+        self.running = names.map(str::to_owned).collect();
     }
 
     /// The executed steps of the run's report, which decides where observations contradict each

@@ -9,8 +9,8 @@ use elbowroom_num::Rational;
 
 use crate::dispatch::replan;
 use crate::event::{Ending, Ticket};
+use crate::executor::Need;
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
-use crate::preparation::Need;
 use crate::progression::Progression;
 use crate::reason::{About, Cause, Reason};
 use crate::rehearsal::{Rehearsal, Rehearsing, Scene, SeenChange};

@@ -17,8 +17,9 @@ use super::super::{Run, Stop};
 use super::fit::Begun;
 use super::{Goes, Search, WORD};
 use crate::event::{Measured, Ticket};
+use crate::executor::Need;
 use crate::executor::{News, Order};
-use crate::preparation::{Need, Wanted};
+use crate::preparation::Wanted;
 use crate::record::Entry;
 use crate::run::intake::Remark;
 
