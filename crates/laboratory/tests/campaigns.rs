@@ -78,8 +78,16 @@ fn a_column_says_how_likely_everything_is() {
         trials: 60,
         ..WHOLE
     };
-    let make = |experiment| run(experiment, part, &|_| true).expect("a correct test");
-    let (told, untold) = (make(&told), make(&untold));
+    // What the best could do takes minutes to find, and is not asked here.
+    let make = |experiment| {
+        let experiment = Experiment {
+            optimum: false,
+            clairvoyant: false,
+            ..experiment
+        };
+        run(&experiment, part, &|_| true).expect("a correct test")
+    };
+    let (told, untold) = (make(told), make(untold));
     let row = |name: &str| told.rows.iter().position(|row| row == name).unwrap();
     let (adaptable, failing) = (row("adaptable"), 1);
     // Told, it tries failed starts again; untold, a start is certain, and so a failure is a reason

@@ -45,7 +45,7 @@ fn only(experiment: Experiment, executors: &[&str]) -> Experiment {
 #[test]
 fn likelier_first_plans_lose_nothing_to_the_shortest_and_gain_much_where_these_fail() {
     let told = std::env::var("ELBOWROOM_TRIALS").ok();
-    let trials: u64 = told.map_or(200, |told| told.parse().expect("a number of trials"));
+    let trials: u64 = told.map_or(100, |told| told.parse().expect("a number of trials"));
     let worlds = std::env::var("ELBOWROOM_WORLDS").ok();
     let worlds = worlds.unwrap_or_else(|| "counter weld detour rendezvous door".to_owned());
     for name in worlds.split_whitespace() {
