@@ -132,13 +132,44 @@ fn what_executes_cannot_reach_a_solver() {
 
 /// Experiments need threads, and what only they ask for; who embeds the library gets neither.
 #[test]
-fn only_the_laboratory_makes_threads() {
+fn only_the_laboratory_has_a_pool_of_threads() {
     for (name, _) in LAYERS {
         let manifest = manifest_of(name);
         let dependencies = manifest.get("dependencies").and_then(Value::as_table);
         let has_threads = dependencies.is_some_and(|table| table.contains_key("rayon"));
         assert_eq!(has_threads, *name == "laboratory", "`{name}`");
     }
+}
+
+/// Crates that stand beside the world: what they make threads for waits for others.
+const BESIDE_THE_WORLD: [&str; 4] = ["cli", "external", "plansys2", "python"];
+
+/// The third rule of ARCHITECTURE.md. Tests may.
+#[test]
+fn threads_are_made_in_one_file_below_what_stands_beside_the_world() {
+    let mut found = Vec::new();
+    for (name, _) in LAYERS {
+        if BESIDE_THE_WORLD.contains(name) {
+            continue;
+        }
+        let mut left = vec![workspace().join("crates").join(name).join("src")];
+        while let Some(folder) = left.pop() {
+            for entry in fs::read_dir(&folder).expect("a folder") {
+                let path = entry.expect("an entry").path();
+                if path.is_dir() {
+                    left.push(path);
+                    continue;
+                }
+                let text = fs::read_to_string(&path).unwrap_or_default();
+                let code = text.split("#[cfg(test)]\nmod tests").next();
+                let makes = ["thread::spawn", "thread::scope", "thread::Builder"];
+                if code.is_some_and(|code| makes.iter().any(|it| code.contains(it))) {
+                    found.push(path.file_name().expect("a name").to_owned());
+                }
+            }
+        }
+    }
+    assert_eq!(found, ["side_by_side.rs"]);
 }
 
 /// Cargo itself says what is built for who asks for the library alone.

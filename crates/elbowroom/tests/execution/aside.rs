@@ -12,12 +12,12 @@ use elbowroom::execution::{
     PrepareError, Prepared, Preparer, Recorder, Request, Wanted, World, WorldError,
 };
 use elbowroom::flow;
-use elbowroom::model::validate::{Settings, validate};
-use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan, problem};
+use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
-use elbowroom::report::trace::{Line, Replay, ReplayPlanner, ReplayWorld, Stored};
+use elbowroom::report::trace::Line;
 
-use crate::lasting::scripted::{Dice, Notes, Scripted, abandon, fact, pursue, task};
+use crate::lasting::scripted::{Notes, Scripted, abandon, fact, pursue, task};
+use crate::meanwhile::{Fate, ITEMS, assert_in_order, assert_plays_back};
 
 /// A planner that works beside the run.
 #[derive(Clone, Default)]
@@ -537,106 +537,35 @@ fn a_plan_that_is_outdated_when_it_comes_is_made_again() {
     assert_eq!(told.report.starts, 3, "{:#?}", told.notes);
 }
 
-const ITEMS: [&str; 3] = ["book", "cup", "key"];
-
 /// Whatever is asked, however long plans take and actions deviate: what is executed is a plan by the
 /// judge's rules, nothing is started while the run is paused, and the record plays back to the same
 /// decisions.
 #[test]
 fn whatever_happens_meanwhile_what_is_done_is_valid_and_plays_back() {
-    let header = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
     for seed in 0..240 {
-        let dice = &mut Dice(seed);
         let executor =
             ["guarded", "live", "stn", "adaptable"][usize::try_from(seed % 4).expect("small")];
         let task = task("(free s)", "(have book)");
-        let mut script = Vec::new();
-        for _ in 0..20 {
-            let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
-            let event = match dice.below(10) {
-                0..=5 => pursue(item, &format!("(have {item})")),
-                6..=7 => abandon(item),
-                8 => Event::Asked(Request::Pause),
-                _ => Event::Asked(Request::Resume),
-            };
-            script.push((Rational::new(dice.small(600), 10), event));
-        }
-        // Somebody takes things away, and brings them back: in every other run, as what others do is
-        // nothing that a plan could be judged with.
-        for _ in 0..(seed % 2) * 6 {
-            let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
-            let here = fact(&task, &format!("(here {item})"), dice.below(2) == 0);
-            script.push((Rational::new(dice.small(600), 10), here));
-        }
-        for item in ITEMS {
-            script.push((seconds(61), fact(&task, &format!("(here {item})"), true)));
-        }
-        // However it went, it goes on in the end.
-        script.push((seconds(61), Event::Asked(Request::Resume)));
-        script.push((seconds(62), pursue("last", "(and (have book) (have key))")));
-        let lengths: Vec<Rational> = (0..12)
-            .map(|_| Rational::new(dice.small(150), 10))
-            .collect();
-        let planner = Beside::taking(&lengths);
-        let quarters: Vec<i64> = (0..7).map(|_| dice.small(3) - 1).collect();
+        let fate = Fate::of(&task, seed);
+        let planner = Beside::taking(&fate.lengths);
         let told = told(
             execution(&task, executor).lasting(true),
             &task,
-            (400, script),
+            (400, fate.script),
             &planner,
-            &quarters,
+            &fate.quarters,
         );
-        let is_last = |it: &String| it.contains("rest: goal-reached") && it.contains("last");
-        assert!(
-            told.notes.iter().any(is_last),
-            "{executor}, {seed}: {:#?}",
-            told.notes
-        );
-        let is_let_alone = seed % 2 == 0;
-        let steps: Vec<Step> = told
-            .report
-            .executed
-            .iter()
-            .map(|it| it.step.clone())
-            .collect();
-        let free = task.with_goal(problem::Condition::TRUE);
-        let verdict = validate(&free, &TimeTriggeredPlan { steps }, &Settings::default());
-        assert!(
-            verdict.is_valid() || !is_let_alone,
-            "{executor}, {seed}: {verdict:?} {:#?}",
-            told.notes
-        );
+        let about = (seed, executor);
+        assert_in_order(&task, &told, about);
         assert_eq!(planner.desk().waited_for, 0);
-        let mut is_paused = false;
-        for line in &told.lines {
-            if line.contains("\"event\":\"observed\"") {
-                is_paused |= line.contains("\"type\":\"pause\"");
-                is_paused &= !line.contains("\"type\":\"resume\"");
-            }
-            let starts =
-                line.contains("\"event\":\"command\"") && line.contains("\"type\":\"start\"");
-            assert!(!(starts && is_paused), "{executor}, {seed}: {line}");
-        }
         for (what, note) in [("kept", "is kept"), ("start", "start")] {
             let notes = told.notes.iter().filter(|it| it.contains(note));
             *seen.entry(what).or_default() += notes.count();
         }
         *seen.entry("given up").or_default() += planner.desk().given_up;
-
-        let stored =
-            Stored::read(&format!("{header}\n{}\n", told.lines.join("\n"))).expect("whole");
-        let mut replay = Replay::new(&stored, Arc::clone(&task));
-        let interruption = replay.interruption();
-        execution(&task, executor)
-            .lasting(true)
-            .planned_by(ReplayPlanner::new(&stored))
-            .recorded_by(&mut replay)
-            .ending_when(move || interruption.load(Ordering::SeqCst))
-            .run_in(&mut ReplayWorld::new(&stored, &task));
-        let (agreed, difference) = replay.outcome();
-        assert_eq!(difference, None, "{executor}, {seed}");
-        assert_eq!(agreed, told.lines.len(), "{executor}, {seed}");
+        let again = execution(&task, executor).lasting(true);
+        assert_plays_back(&task, &told, again, about);
     }
     for (what, count) in &seen {
         assert!(*count > 10, "{what}: {seen:?}");

@@ -12,6 +12,7 @@ mod late;
 mod likelier;
 mod literal;
 mod lookahead;
+mod meanwhile;
 mod nothing_left;
 mod one_time;
 mod openings;

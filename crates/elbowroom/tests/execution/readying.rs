@@ -3,21 +3,18 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use elbowroom::execute::{Analyst, Execution};
 use elbowroom::execution::run::RunSettings;
 use elbowroom::execution::{Event, Request};
 use elbowroom::flow;
-use elbowroom::model::validate::{Settings, validate};
-use elbowroom::model::{Step, Task, TimeTriggeredPlan, problem};
+use elbowroom::model::Task;
 use elbowroom::num::Rational;
-use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayPreparer, ReplayWorld, Stored};
+use elbowroom::report::trace::ReplayPreparer;
 
 use crate::aside::{Beside, Readier, Told, assert_has, seconds, settings, told};
 use crate::lasting::scripted::{Dice, abandon, fact, pursue, task};
-
-const HEADER: &str = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
+use crate::meanwhile::{Fate, assert_in_order, assert_plays_back, is_start};
 
 fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
     let settings = RunSettings {
@@ -135,55 +132,6 @@ fn a_plan_that_is_kept_goes_on_while_it_is_made_ready() {
     assert_eq!(planner.desk().begun, 1);
 }
 
-const ITEMS: [&str; 3] = ["book", "cup", "key"];
-
-/// What is random about a run.
-struct Fate {
-    script: Vec<(Rational, Event)>,
-    /// How long plans take.
-    lengths: Vec<Rational>,
-    /// By how many quarters durations differ.
-    quarters: Vec<i64>,
-    /// For what else is left to chance.
-    dice: Dice,
-}
-
-fn fate(task: &Task, seed: u64) -> Fate {
-    let mut dice = Dice(seed);
-    let mut script = Vec::new();
-    for _ in 0..20 {
-        let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
-        let event = match dice.below(10) {
-            0..=5 => pursue(item, &format!("(have {item})")),
-            6..=7 => abandon(item),
-            8 => Event::Asked(Request::Pause),
-            _ => Event::Asked(Request::Resume),
-        };
-        script.push((Rational::new(dice.small(600), 10), event));
-    }
-    // Somebody takes things away, and brings them back: in every other run, as what others do is
-    // nothing that a plan could be judged with.
-    for _ in 0..(seed % 2) * 6 {
-        let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
-        let here = fact(task, &format!("(here {item})"), dice.below(2) == 0);
-        script.push((Rational::new(dice.small(600), 10), here));
-    }
-    for item in ITEMS {
-        script.push((seconds(61), fact(task, &format!("(here {item})"), true)));
-    }
-    script.push((seconds(61), Event::Asked(Request::Resume)));
-    script.push((seconds(62), pursue("last", "(and (have book) (have key))")));
-    let lengths = (0..12).map(|_| Rational::new(dice.small(150), 10));
-    let lengths = lengths.collect();
-    let quarters = (0..7).map(|_| dice.small(3) - 1).collect();
-    Fate {
-        script,
-        lengths,
-        quarters,
-        dice,
-    }
-}
-
 const EXECUTORS: [&str; 6] = [
     "guarded",
     "live",
@@ -208,7 +156,7 @@ fn random_run(
         lengths,
         quarters,
         mut dice,
-    } = fate(task, seed);
+    } = Fate::of(task, seed);
     let planner = Beside::taking(&lengths).readying(&readying(&mut dice));
     let execution = execution(task, executor(seed)).prepared_by(Readier(planner.clone()));
     let told = told(execution, task, (500, script), &planner, &quarters);
@@ -249,49 +197,22 @@ fn whatever_happens_while_plans_are_made_ready_what_is_done_is_valid_and_plays_b
         };
         let (task, executor) = (task("(free s)", "(have book)"), executor(seed));
         let (told, planner) = random_run(&task, seed, &slowly);
-        let is_last = |it: &String| it.contains("rest: goal-reached") && it.contains("last");
-        let notes = &told.notes;
-        assert!(notes.iter().any(is_last), "{executor}, {seed}: {notes:#?}");
-        let executed = told.report.executed.iter();
-        let steps: Vec<Step> = executed.map(|it| it.step.clone()).collect();
-        let free = task.with_goal(problem::Condition::TRUE);
-        let verdict = validate(&free, &TimeTriggeredPlan { steps }, &Settings::default());
-        assert!(
-            verdict.is_valid() || seed % 2 == 1,
-            "{executor}, {seed}: {verdict:?} {notes:#?}"
-        );
-        let (mut is_paused, mut is_ready) = (false, true);
+        let about = (seed, executor);
+        assert_in_order(&task, &told, about);
+        let mut is_ready = true;
         for line in &told.lines {
-            if line.contains("\"event\":\"observed\"") {
-                is_paused |= line.contains("\"type\":\"pause\"");
-                is_paused &= !line.contains("\"type\":\"resume\"");
-            }
             is_ready &= !line.contains("\"event\":\"planned\"");
             is_ready |= line.contains("\"event\":\"plan\"");
-            let starts =
-                line.contains("\"event\":\"command\"") && line.contains("\"type\":\"start\"");
-            assert!(!(starts && is_paused), "{executor}, {seed}: {line}");
-            *seen.entry("begun meanwhile").or_default() += usize::from(starts && !is_ready);
+            *seen.entry("begun meanwhile").or_default() += usize::from(is_start(line) && !is_ready);
         }
         for (what, note) in [("kept", "is kept"), ("outdated", "while the plan was made")] {
-            let notes = notes.iter().filter(|it| it.contains(note));
+            let notes = told.notes.iter().filter(|it| it.contains(note));
             *seen.entry(what).or_default() += notes.count();
         }
         *seen.entry("readied").or_default() += planner.desk().readied;
-
-        let text = format!("{HEADER}\n{}\n", told.lines.join("\n"));
-        let stored = Stored::read(&text).expect("whole");
-        let mut replay = Replay::new(&stored, Arc::clone(&task));
-        let interruption = replay.interruption();
-        execution(&task, executor)
-            .planned_by(ReplayPlanner::new(&stored))
-            .prepared_by(ReplayPreparer(Analyst::new(flow::Settings::default())))
-            .recorded_by(&mut replay)
-            .ending_when(move || interruption.load(Ordering::SeqCst))
-            .run_in(&mut ReplayWorld::new(&stored, &task));
-        let (agreed, difference) = replay.outcome();
-        assert_eq!(difference, None, "{executor}, {seed}");
-        assert_eq!(agreed, told.lines.len(), "{executor}, {seed}");
+        let preparer = ReplayPreparer(Analyst::new(flow::Settings::default()));
+        let again = execution(&task, executor).prepared_by(preparer);
+        assert_plays_back(&task, &told, again, about);
     }
     for (what, count) in &seen {
         assert!(*count > 10, "{what}: {seen:?}");

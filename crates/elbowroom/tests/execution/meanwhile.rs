@@ -1,0 +1,121 @@
+//! What is asked and happens at random while plans are made, or made ready, beside a run; and what must hold
+//! whatever that is.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use elbowroom::execute::Execution;
+use elbowroom::execution::{Event, Request};
+use elbowroom::model::validate::{Settings, validate};
+use elbowroom::model::{Step, Task, TimeTriggeredPlan, problem};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored};
+
+use crate::aside::{Told, seconds};
+use crate::lasting::scripted::{Dice, abandon, fact, pursue};
+
+/// What can be fetched.
+pub(crate) const ITEMS: [&str; 3] = ["book", "cup", "key"];
+
+/// What is random about a run.
+pub(crate) struct Fate {
+    pub(crate) script: Vec<(Rational, Event)>,
+    /// How long plans take.
+    pub(crate) lengths: Vec<Rational>,
+    /// By how many quarters durations differ.
+    pub(crate) quarters: Vec<i64>,
+    /// For what else is left to chance.
+    pub(crate) dice: Dice,
+}
+
+impl Fate {
+    /// Goals that come and go, pauses, and, with odd seeds, somebody who takes things away. The script
+    /// ends with a goal that can be reached, called `last`.
+    pub(crate) fn of(task: &Task, seed: u64) -> Self {
+        let mut dice = Dice(seed);
+        let mut script = Vec::new();
+        for _ in 0..20 {
+            let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
+            let event = match dice.below(10) {
+                0..=5 => pursue(item, &format!("(have {item})")),
+                6..=7 => abandon(item),
+                8 => Event::Asked(Request::Pause),
+                _ => Event::Asked(Request::Resume),
+            };
+            script.push((Rational::new(dice.small(600), 10), event));
+        }
+        // Somebody takes things away, and brings them back: in every other run, as what others do is
+        // nothing that a plan could be judged with.
+        for _ in 0..(seed % 2) * 6 {
+            let item = ITEMS[usize::try_from(dice.below(3)).expect("small")];
+            let here = fact(task, &format!("(here {item})"), dice.below(2) == 0);
+            script.push((Rational::new(dice.small(600), 10), here));
+        }
+        for item in ITEMS {
+            script.push((seconds(61), fact(task, &format!("(here {item})"), true)));
+        }
+        // However it went, it goes on in the end.
+        script.push((seconds(61), Event::Asked(Request::Resume)));
+        script.push((seconds(62), pursue("last", "(and (have book) (have key))")));
+        let lengths = (0..12).map(|_| Rational::new(dice.small(150), 10));
+        let lengths = lengths.collect();
+        let quarters = (0..7).map(|_| dice.small(3) - 1).collect();
+        Self {
+            script,
+            lengths,
+            quarters,
+            dice,
+        }
+    }
+}
+
+/// The last goal was reached, what was executed is a plan by the judge's rules where nobody else did
+/// anything, and nothing was started in a pause. `name` says which run it is.
+pub(crate) fn assert_in_order(task: &Task, told: &Told, (seed, name): (u64, &str)) {
+    let notes = &told.notes;
+    let is_last = |it: &String| it.contains("rest: goal-reached") && it.contains("last");
+    assert!(notes.iter().any(is_last), "{name}, {seed}: {notes:#?}");
+    let executed = told.report.executed.iter();
+    let steps: Vec<Step> = executed.map(|it| it.step.clone()).collect();
+    let free = task.with_goal(problem::Condition::TRUE);
+    let verdict = validate(&free, &TimeTriggeredPlan { steps }, &Settings::default());
+    assert!(
+        verdict.is_valid() || seed % 2 == 1,
+        "{name}, {seed}: {verdict:?} {notes:#?}"
+    );
+    let mut is_paused = false;
+    for line in &told.lines {
+        if line.contains("\"event\":\"observed\"") {
+            is_paused |= line.contains("\"type\":\"pause\"");
+            is_paused &= !line.contains("\"type\":\"resume\"");
+        }
+        assert!(!(is_start(line) && is_paused), "{name}, {seed}: {line}");
+    }
+}
+
+/// Whether a line of a record tells the world to start something.
+pub(crate) fn is_start(line: &str) -> bool {
+    line.contains("\"event\":\"command\"") && line.contains("\"type\":\"start\"")
+}
+
+/// The record leads an execution like that which made it to the same decisions.
+pub(crate) fn assert_plays_back(
+    task: &Arc<Task>,
+    told: &Told,
+    execution: Execution<'_>,
+    (seed, name): (u64, &str),
+) {
+    let header = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
+    let text = format!("{header}\n{}\n", told.lines.join("\n"));
+    let stored = Stored::read(&text).expect("whole");
+    let mut replay = Replay::new(&stored, Arc::clone(task));
+    let interruption = replay.interruption();
+    execution
+        .planned_by(ReplayPlanner::new(&stored))
+        .recorded_by(&mut replay)
+        .ending_when(move || interruption.load(Ordering::SeqCst))
+        .run_in(&mut ReplayWorld::new(&stored, task));
+    let (agreed, difference) = replay.outcome();
+    assert_eq!(difference, None, "{name}, {seed}");
+    assert_eq!(agreed, told.lines.len(), "{name}, {seed}");
+}
