@@ -1,9 +1,10 @@
 """How soon a plan is begun, and with how much memory, by the number of its time points.
 
-    python3 testing/large_plans.py target/release/elbowroom [--executor stn] [TIME POINTS…]
+    python3 testing/large_plans.py target/release/elbowroom [--executor stn] [--numbers] [TIME POINTS…]
 
 *Begun* is when the trace has its first command, everything before that included: reading, judging, relaxing the
-plan, and making the network ready. *Run* is the whole process. Standard library only; memory is read from /proc.
+plan, and making the network ready. *Run* is the whole process. With --numbers, conditions read numbers. Standard
+library only; memory is read from /proc.
 """
 
 import argparse
@@ -39,11 +40,12 @@ def processor(process):
     return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def row(program, executor, points, patience):
+def row(program, executor, points, patience, has_numbers):
     """Measures one plan."""
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        texts = {"d.pddl": rounds.DOMAIN, "p.pddl": rounds.problem(ROBOTS, DOCKS)}
+        problem = rounds.problem(ROBOTS, DOCKS, has_numbers)
+        texts = {"d.pddl": rounds.domain(has_numbers), "p.pddl": problem}
         texts["plan"] = rounds.plan(ROBOTS, DOCKS, points // 2)
         for name, text in texts.items():
             (folder / name).write_text(text)
@@ -73,11 +75,12 @@ def main():
     parser.add_argument("points", nargs="*", type=int, default=[1_000, 10_000, 40_000, 100_000])
     parser.add_argument("--executor", default="stn")
     parser.add_argument("--patience", type=float, default=300)
+    parser.add_argument("--numbers", action="store_true", help="driving takes charge")
     chosen = parser.parse_intermixed_args()
     print("| time points | executor | begun | memory | run | memory |")
     print("|---:|---|---:|---:|---:|---:|", flush=True)
     for points in chosen.points:
-        row(chosen.program, chosen.executor, points, chosen.patience)
+        row(chosen.program, chosen.executor, points, chosen.patience, chosen.numbers)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Robots on their rounds: a domain, a problem and a plan of any length, for measurements.
 
-Each robot drives from place to place, and each tenth time it is served at a dock that others use, too.
+Each robot drives from place to place, and each tenth time it is served at a dock that others use, too. With numbers,
+driving takes charge, which a robot gets back where it is served.
 """
 
 PLACES = 10
@@ -20,8 +21,25 @@ DOMAIN = """(define (domain rounds)
     :effect (and (at start (not (free ?d))) (at end (free ?d)) (at end (served ?r)))))
 """
 
+NUMBERS = (
+    ("(:predicates", "(:functions (charge ?r - robot))\n  (:predicates"),
+    (":durative-actions)", ":durative-actions :numeric-fluents)"),
+    ("(over all (road ?a ?b))", "(at start (>= (charge ?r) 3)) (over all (>= (charge ?r) 0)) (over all (road ?a ?b))"),
+    ("(at end (at ?r ?b))", "(at end (at ?r ?b)) (at end (decrease (charge ?r) 3))"),
+    ("(at end (served ?r))", "(at end (served ?r)) (at end (assign (charge ?r) 60))"),
+)
 
-def problem(robots, docks):
+
+def domain(has_numbers=False):
+    """The domain."""
+    text = DOMAIN
+    for old, new in NUMBERS if has_numbers else ():
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+def problem(robots, docks, has_numbers=False):
     """Robots at places that lie on a ring."""
     names = [f"r{i}" for i in range(robots)]
     objects = f"{' '.join(names)} - robot {' '.join(f'p{i}' for i in range(PLACES))} - place"
@@ -29,6 +47,7 @@ def problem(robots, docks):
     facts = [f"(at r{i} p{i % PLACES})" for i in range(robots)]
     facts += [f"(road p{i} p{(i + 1) % PLACES})" for i in range(PLACES)]
     facts += [f"(free d{i})" for i in range(docks)]
+    facts += [f"(= (charge {robot}) 60)" for robot in names if has_numbers]
     goal = " ".join(f"(served {robot})" for robot in names)
     return (
         f"(define (problem all) (:domain rounds) (:objects {objects})"

@@ -3,6 +3,7 @@
 //! Requests wait at a [`Desk`]. The run fetches them as observations of its world ([`Attended`]), so
 //! that they stand in its record and it never waits for anybody.
 
+mod held;
 mod world;
 
 use std::sync::Arc;

@@ -7,28 +7,26 @@
 //! the durations that are left open, as long as every schedule works. So neither the pins nor the
 //! durations take all the room that there is.
 
-mod facts_alone;
-
-pub(crate) use facts_alone::are_enough as is_about_facts_alone;
-
 use elbowroom_envelope::linear::Factor;
 use elbowroom_envelope::obligations::Requirement;
 use elbowroom_envelope::soundness::{Broken, SoundBox, broken_in};
 use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::deorder::{pin_until_sound, with_all_sides, with_sides_one_way, without_sides};
+use elbowroom_plan::deorder::{
+    keeps_all_that_is_read, pin_until_sound, with_all_sides, with_sides_one_way, without_sides,
+};
 use elbowroom_plan::{
     Bound, BoxEnd, Constraint, DecoupledEnvelope, InstanceId, Node, NodeId, Parameter, ParameterId,
     ParameterKind, ParametrizedPlan, Reason, Schedule, Side, StnPlan,
 };
 
-/// [`sound`] of a plan that was deordered: where it is about facts alone, it is sound as it is.
+/// [`sound`] of a plan that was deordered, which may be all that it needs.
 pub(crate) fn of_deordered(
     task: &Task,
     plan: ParametrizedPlan,
     nominal: &Schedule,
 ) -> ParametrizedPlan {
-    if is_about_facts_alone(task, &plan) {
+    if keeps_all_that_is_read(task, &plan, nominal) {
         return plan;
     }
     sound(task, &plan, nominal)

@@ -1,5 +1,5 @@
-//! Every schedule of a deordered plan is a valid plan: the soundness check says so, also of plans
-//! about facts alone, which are made ready without it; and the judge, of schedules drawn at random.
+//! Every schedule of a deordered plan is a valid plan: the soundness check says so, also of those plans that
+//! are made ready without it; and the judge, of schedules drawn at random.
 
 #![allow(
     clippy::print_stdout,
@@ -22,7 +22,7 @@ use elbowroom_model::validate::Settings;
 use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
 use elbowroom_pddl::read_plan;
-use elbowroom_plan::deorder::{Deordered, pinned_to};
+use elbowroom_plan::deorder::{Deordered, keeps_all_that_is_read, pinned_to};
 use elbowroom_plan::parametrize::parametrize;
 use elbowroom_plan::{DecoupledEnvelope, NodeId, Schedule, StnPlan, Valuation, network_node};
 use elbowroom_stn::{ConsistentNetwork, Constraint};
@@ -132,8 +132,9 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Whether the plan is about facts alone and not long: then its envelope, which is worked out without a look
-/// at its conditions when it is made ready, is the one for which each of them was looked at.
+/// Whether deordering is said to keep all that the plan reads, and it is not long: then its envelope, which is
+/// worked out without a look at its conditions when it is made ready, is the one for which each of them was
+/// looked at.
 fn same_envelope(task: &Task, plan: &TimeTriggeredPlan, name: &str) -> bool {
     /// Looking at each condition takes time that grows with the square.
     const LONG: usize = 60;
@@ -141,7 +142,7 @@ fn same_envelope(task: &Task, plan: &TimeTriggeredPlan, name: &str) -> bool {
     let mut analyst = Analyst::new(flow::Settings::default());
     let ready = (plan.steps.len() <= LONG).then(|| analyst.prepare(&task, plan, Need::Envelope));
     let Some(Ok(ready)) = ready else { return false };
-    if ready.plan.reads_numbers(&task) {
+    if !keeps_all_that_is_read(&task, &ready.plan, &ready.nominal) {
         return false;
     }
     let open = Arc::new(ready.plan);

@@ -24,6 +24,8 @@ pub enum Growth {
 pub(crate) struct Frontier {
     growth: Growth,
     parameters: Vec<Progress>,
+    /// How many parameters have a step worth taking: those for whose sake the search goes on.
+    going: usize,
     /// Where the round robin stands.
     next: usize,
 }
@@ -55,7 +57,7 @@ impl Frontier {
             Some(scales) => scales[index].clone(),
             None => parameter.nominal.abs().max(Rational::ONE),
         };
-        let parameters = plan
+        let parameters: Vec<Progress> = plan
             .parameters
             .iter()
             .zip(precisions)
@@ -70,6 +72,7 @@ impl Frontier {
             .collect();
         Self {
             growth,
+            going: parameters.iter().filter(|own| own.goes_on()).count(),
             parameters,
             next: 0,
         }
@@ -80,19 +83,15 @@ impl Frontier {
     /// Round robin over the parameters, the upper end first. While some step is at least the
     /// precision, those down to half of it take part as well, as in the authors' code.
     pub(crate) fn next_end(&mut self) -> Option<(BoxEnd, Rational)> {
-        let unfinished = |progress: &Progress| progress.is_done != [true; 2];
-        let go_on = self
-            .parameters
-            .iter()
-            .any(|progress| unfinished(progress) && progress.step >= progress.precision);
-        if !go_on {
+        if self.going == 0 {
             return None;
         }
         let count = self.parameters.len();
         for offset in 0..count {
             let index = (self.next + offset) % count;
             let progress = &self.parameters[index];
-            if &progress.step + &progress.step < progress.precision {
+            if progress.is_done == [true; 2] || &progress.step + &progress.step < progress.precision
+            {
                 continue;
             }
             for side in [Side::Upper, Side::Lower] {
@@ -112,29 +111,45 @@ impl Frontier {
 
     /// The end was moved.
     pub(crate) fn accept(&mut self, end: BoxEnd) {
-        let progress = &mut self.parameters[end.parameter.index()];
-        if self.growth == Growth::Doubling && !progress.has_halved {
-            progress.step = &progress.step + &progress.step;
-        }
+        let growth = self.growth;
+        self.change(end, |progress, _| {
+            if growth == Growth::Doubling && !progress.has_halved {
+                progress.step = &progress.step + &progress.step;
+            }
+        });
     }
 
     /// The end could not be moved: the direction closes; when both have, the step is halved and
     /// they open again.
     pub(crate) fn reject(&mut self, end: BoxEnd) {
-        let progress = &mut self.parameters[end.parameter.index()];
-        progress.is_open[end.side.index()] = false;
-        progress.reopen_if_closed();
+        self.change(end, |progress, place| {
+            progress.is_open[place] = false;
+            progress.reopen_if_closed();
+        });
     }
 
     /// The end can go no further whatever the step: it is infinite, or at the border of its range.
     pub(crate) fn finish(&mut self, end: BoxEnd) {
+        self.change(end, |progress, place| {
+            progress.is_done[place] = true;
+            progress.reopen_if_closed();
+        });
+    }
+
+    fn change(&mut self, end: BoxEnd, change: impl FnOnce(&mut Progress, usize)) {
         let progress = &mut self.parameters[end.parameter.index()];
-        progress.is_done[end.side.index()] = true;
-        progress.reopen_if_closed();
+        self.going -= usize::from(progress.goes_on());
+        change(progress, end.side.index());
+        self.going += usize::from(progress.goes_on());
     }
 }
 
 impl Progress {
+    /// Whether the search goes on for this parameter's sake.
+    fn goes_on(&self) -> bool {
+        self.is_done != [true; 2] && self.step >= self.precision
+    }
+
     fn reopen_if_closed(&mut self) {
         let is_closed = (0..2).all(|place| !self.is_open[place] || self.is_done[place]);
         if is_closed {

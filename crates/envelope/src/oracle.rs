@@ -84,7 +84,7 @@ impl Oracle {
     }
 
     /// The oracle for a plan all of whose schedules are known to be valid, whatever the values of its
-    /// parameters, such as a deordered plan about facts alone. It takes time that grows little faster than
+    /// parameters ([`keeps_all_that_is_read`](elbowroom_plan::deorder::keeps_all_that_is_read)). It takes time that grows little faster than
     /// the plan; to look at each condition takes time that grows with the square of its length.
     ///
     /// # Errors

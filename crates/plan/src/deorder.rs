@@ -22,8 +22,11 @@
 //! - A duration obeys its domain rather than the planner's number; where the domain's bounds
 //!   depend on values that depend on the schedule, it stays as it was.
 //!
-//! Conditions on numbers that change continuously, or by amounts that depend on durations, can
-//! still fail in some schedules. [`pin_until_sound`] is for those. On the other hand, whether what
+//! That is not all that there is to it. Conditions on numbers that change continuously, or by amounts that
+//! depend on durations, can still fail in some schedules. So can over-all conditions that see several changes
+//! between start and end: of a fact that takes over from another one (`(or (a) (b))`), or an increase before a
+//! decrease, whose order nothing else keeps. [`pin_until_sound`] is for those, and
+//! [`keeps_all_that_is_read`] says of which plans it is known that there are none. On the other hand, whether what
 //! increases or decreases a number must stay on its side of an action depends on the numbers: such
 //! constraints have a reason of their own ([`Reason::Side`](crate::Reason::Side)), and are given
 //! up there as far as nothing needs them.
@@ -31,6 +34,7 @@
 mod course;
 pub(crate) mod durations;
 mod implied;
+mod kept;
 mod order;
 mod over_all;
 mod pin;
@@ -40,6 +44,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 pub use implied::without_implied;
+pub use kept::keeps_all_that_is_read;
 pub use pin::{pin_until_sound, pinned_to, with_all_sides, with_sides_one_way, without_sides};
 
 use crate::network::{Schedule, network_node};

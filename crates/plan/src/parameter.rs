@@ -106,21 +106,34 @@ impl ParametrizedPlan {
             .collect()
     }
 
-    /// Whether anything that the plan needs depends on numbers. If not, facts and times are all.
-    pub fn reads_numbers(&self, task: &Task) -> bool {
+    /// Whether the plan needs more than facts, one by one: it reads numbers, or throughout an action or a
+    /// conditional effect's, something that several facts decide about. If not, the order that deordering keeps and
+    /// times are all.
+    pub fn reads_more_than_facts(&self, task: &Task) -> bool {
         let reads = |condition: &Condition| {
             let mut reads = false;
             task.visit_fluents_of(condition, &mut |_| reads = true);
             reads
         };
+        let is_literal = |condition: &Condition| match condition {
+            Condition::Fact(fact) => !task.is_derived(*fact),
+            Condition::Not(part) => {
+                matches!(**part, Condition::Fact(fact) if !task.is_derived(fact))
+            }
+            _ => false,
+        };
+        let has_literals =
+            |throughout: &Condition| throughout.conjuncts().into_iter().all(is_literal);
         let mut instances = self.plan.instances.iter();
         reads(&self.goal)
             || instances.any(|instance| match &instance.action.body {
                 Body::Instantaneous(snap) => reads(&snap.condition),
                 Body::Durative(body) => {
+                    let mut effects = body.end.effects.iter();
                     reads(&body.start.condition)
-                        || reads(&body.over_all)
                         || reads(&body.end.condition)
+                        || !has_literals(&body.over_all)
+                        || !effects.all(|effect| has_literals(&effect.guard.over_all))
                 }
             })
     }

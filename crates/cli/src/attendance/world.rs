@@ -10,6 +10,7 @@ use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 
 use super::Attendance;
+use super::held::Held;
 use crate::bell::{Bell, Ring};
 use crate::clock::Clock;
 use crate::desk::Desk;
@@ -39,8 +40,8 @@ pub(crate) struct Attended<'a, W> {
     /// How much of the world's time passes in a piece.
     piece: Rational,
     now: Rational,
-    /// Measures the time on the wall clock since then.
-    since: Clock,
+    /// How far it is held back while a plan is made.
+    held: Held,
     /// What was told to start and has not ended.
     open: BTreeSet<u64>,
 }
@@ -65,7 +66,7 @@ impl<'a, W: World> Attended<'a, W> {
             is_live: Box::new(|| true),
             piece: Rational::new(millis, 1000) * factor,
             now: Rational::ZERO,
-            since: Clock::start(),
+            held: Held::start(),
             open: BTreeSet::new(),
         }
     }
@@ -104,21 +105,12 @@ impl<'a, W: World> Attended<'a, W> {
 
     fn note(&mut self, passage: &Passage) {
         self.now.clone_from(&passage.now);
-        self.since = Clock::start();
         for observation in &passage.observations {
             if let Event::Ended { ticket, .. } = &observation.event {
                 self.open.remove(&ticket.0);
             }
         }
     }
-}
-
-/// How far a world is ahead of the wall clock, if so much has passed there since it was last asked, and so
-/// much here: at most what it was asked to wait for. A world with a clock of its own cannot be held
-/// back, and what it has done while the run was busy is not waited for once more.
-fn ahead(passed: Duration, elapsed: Duration) -> Duration {
-    let piece = Duration::from_secs(1) / u32::try_from(PER_SECOND).unwrap_or(1);
-    passed.saturating_sub(elapsed).min(piece)
 }
 
 impl<W: World> World for Attended<'_, W> {
@@ -164,14 +156,14 @@ impl<W: World> World for Attended<'_, W> {
             let before = self.now.clone();
             let mut passage = self.inner.wait(until.min(&piece))?;
             let has_passed = passage.now > self.now;
-            let elapsed = self.since.elapsed();
             self.note(&passage);
             if is_planning {
                 let passed = (&self.now - &before).to_f64() / self.factor.to_f64();
                 let passed = Duration::try_from_secs_f64(passed).unwrap_or_default();
-                self.bell.wait(ahead(passed, elapsed));
+                self.bell.wait(self.held.after(passed));
+            } else {
+                self.held = Held::start();
             }
-            self.since = Clock::start();
             if let Some(desk) = self.desk.as_ref().filter(|desk| !desk.is_empty()) {
                 let mut asked = desk.fetch(&self.now, &self.task);
                 passage.observations.append(&mut asked);
@@ -196,24 +188,5 @@ impl<W: World> World for Attended<'_, W> {
         fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
         self.inner.look(facts, fluents)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::time::Duration;
-
-    use super::ahead;
-
-    #[test]
-    fn only_a_world_that_is_ahead_of_the_wall_clock_is_held_back() {
-        let millis = Duration::from_millis;
-        // A simulation, whose time passes at once.
-        assert_eq!(ahead(millis(20), millis(1)), millis(19));
-        // A robot, while the run was busy with something else for a while.
-        assert_eq!(ahead(millis(500), millis(500)), millis(0));
-        assert_eq!(ahead(millis(500), millis(501)), millis(0));
-        // A clock that cannot be held back.
-        assert_eq!(ahead(millis(5000), millis(500)), millis(20));
     }
 }

@@ -12,13 +12,14 @@ use elbowroom_num::Rational;
 use elbowroom_plan::deorder;
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
 use elbowroom_plan::partial_order::partial_order;
-use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side, Valuation};
+use elbowroom_plan::{
+    BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Schedule, Side, Valuation,
+};
 
 use super::facts_only::{as_timed, facts_only};
 use super::vary::is_about_an_absent_action;
 use crate::chances::{ChanceError, chances};
 use crate::flow::{self, FlowError};
-use crate::room;
 
 impl From<FlowError> for PrepareError {
     fn from(error: FlowError) -> Self {
@@ -126,10 +127,11 @@ impl Analyst {
         &self,
         task: &Arc<Task>,
         plan: &Arc<ParametrizedPlan>,
+        nominal: &Schedule,
     ) -> Result<DecoupledEnvelope, PrepareError> {
         let beyond = |refusal: Refusal| PrepareError::Beyond(refusal.to_string());
         let guarantee = self.settings.guarantee;
-        let oracle = if room::is_about_facts_alone(task, plan) {
+        let oracle = if deorder::keeps_all_that_is_read(task, plan, nominal) {
             Oracle::of_times(task, plan, guarantee)
         } else {
             Oracle::new(task, plan, guarantee)
@@ -179,8 +181,8 @@ impl Preparer for Analyst {
             Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
         });
         let envelope = match need {
-            Need::Envelope => Some(self.envelope(task, &plan)?),
-            Need::OpenNetwork => self.envelope(task, &plan).ok(),
+            Need::Envelope => Some(self.envelope(task, &plan, &nominal)?),
+            Need::OpenNetwork => self.envelope(task, &plan, &nominal).ok(),
             Need::Orderings | Need::PartialOrder | Need::Network => None,
         };
         Ok(Prepared {
@@ -220,7 +222,7 @@ impl Region for WholeRegion {
         plan: &ParametrizedPlan,
         values: &Valuation,
     ) -> Option<String> {
-        if !plan.reads_numbers(task) {
+        if !plan.reads_more_than_facts(task) {
             // What facts need is in the network, whatever the durations; the executor has it.
             return None;
         }
@@ -245,7 +247,7 @@ impl Region for WholeRegion {
         values: &Valuation,
         parameter: ParameterId,
     ) -> Box<dyn FnMut(&Rational) -> bool + 'a> {
-        if !plan.reads_numbers(task) {
+        if !plan.reads_more_than_facts(task) {
             return Box::new(|_| true);
         }
         let Ok(mut oracle) = Self::oracle_at(task, plan, values) else {

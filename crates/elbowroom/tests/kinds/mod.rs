@@ -14,6 +14,7 @@ mod deadline;
 mod handover;
 mod instant;
 mod kiln;
+mod lamps;
 mod level;
 mod light;
 mod loaf;
@@ -73,6 +74,7 @@ pub(crate) fn kinds() -> Vec<Kind> {
         kiln::END_AFTER_AN_END_BEFORE_A_DEADLINE,
         handover::END_WITHIN_ANOTHER,
         calm::ENDS_THAT_COINCIDE_WITHOUT_NEED,
+        lamps::ONE_FACT_TAKES_OVER,
         light::ENDS_AT_THE_SAME_INSTANT,
         power::CONDITION_FROM_AN_ACTION_THAT_STARTS_TOGETHER,
         level::COMPARISON_THAT_ENDS_IN_AN_EQUALITY,

@@ -229,18 +229,29 @@ fn effects_only(rng: &mut ChaCha8Rng, is_timeless: bool) -> Scenario {
     Scenario { problem, times }
 }
 
+fn comparison(rng: &mut ChaCha8Rng) -> Condition {
+    let one = Expression::Fluent(fluent(rng));
+    let left = match rng.random_range(0..4) {
+        0 => Expression::Add(vec![one, Expression::Fluent(fluent(rng))]),
+        _ => one,
+    };
+    Condition::Compare(
+        *[Comparison::AtMost, Comparison::AtLeast, Comparison::Equal]
+            .choose(rng)
+            .expect("something to choose from"),
+        left,
+        integer(rng.random_range(-2..12)),
+    )
+}
+
 fn condition(rng: &mut ChaCha8Rng) -> Condition {
     let atom = Condition::Atom(fact(rng));
-    match rng.random_range(0..4) {
-        0 => atom,
-        1 => Condition::Not(Box::new(atom)),
-        _ => Condition::Compare(
-            *[Comparison::AtMost, Comparison::AtLeast, Comparison::Equal]
-                .choose(rng)
-                .expect("something to choose from"),
-            Expression::Fluent(fluent(rng)),
-            integer(rng.random_range(-2..12)),
-        ),
+    match rng.random_range(0..8) {
+        0 | 1 => atom,
+        2 | 3 => Condition::Not(Box::new(atom)),
+        4 => Condition::Or(vec![atom, Condition::Atom(fact(rng))]),
+        5 => Condition::Or(vec![Condition::Not(Box::new(atom)), comparison(rng)]),
+        _ => comparison(rng),
     }
 }
 
