@@ -22,8 +22,8 @@ pub(crate) const ONE_FACT_TAKES_OVER: Kind = Kind {
     problem: "(define (problem one-watch) (:domain lamps) (:objects a b - lamp) (:init (on a))
   (:goal (and (seen) (on b) (not (on a)))))",
     plan: "0.5: (watch a b) [20]\n1: (light b) [5]\n2: (dim a) [7]\n",
-    inside: &[],
+    inside: &["dur_0=[15,30],dur_1=[1,10],dur_2=[1,10]"],
     outside: &[],
-    dynamic: &[],
+    dynamic: &["dur_0=[15,30],dur_1=[1,10],dur_2=[1,10]"],
     not_dynamic: &[],
 };

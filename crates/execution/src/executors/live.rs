@@ -65,8 +65,8 @@ struct Rest {
     /// The values with which the rest was last found to work, if nothing else has deviated since. As
     /// long as they stay so, what happens only chooses among schedules all of which work.
     accepted: Option<Valuation>,
-    /// Whether times are all that has to be looked at, and, if not, whether durations move numbers.
-    times_are_all: bool,
+    /// Whether the plan needs more than facts, one by one, and whether durations move any number.
+    reads_numbers: bool,
     durations_move_numbers: bool,
     /// How long the actions under way may take, where the numbers limit it.
     limits: BTreeMap<InstanceId, Rational>,
@@ -80,14 +80,14 @@ impl Executor for Live {
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let plan = &mission.plan;
         let (dispatch, promise) = promise::begin(mission)?;
-        let times_are_all = promise::times_are_all(mission);
+        let reads_numbers = plan.reads_more_than_facts(&mission.task);
         let mut rest = Rest {
             dispatch,
             promise,
             mission: Arc::new(mission.clone()),
             amounts: Vec::new(),
-            times_are_all,
-            durations_move_numbers: !times_are_all && plan.durations_move_numbers(),
+            reads_numbers,
+            durations_move_numbers: reads_numbers && plan.durations_move_numbers(),
             limits: BTreeMap::new(),
             // What has an envelope works as planned.
             accepted: mission.envelope.is_some().then(|| plan.nominal()),
@@ -177,7 +177,7 @@ impl Rest {
         }
         // Only ends and amounts can move the rest out of its envelope.
         let step = moment.news.iter().find_map(may_matter);
-        if let Some(step) = step.filter(|_| !self.times_are_all && !self.is_accepted(moment.now)) {
+        if let Some(step) = step.filter(|_| self.reads_numbers && !self.is_accepted(moment.now)) {
             let (plan, values) = self.remainder(moment.now);
             if let Some(why) = region.objection(&self.mission.task, &plan, &values) {
                 let action = &self.dispatch.action(step.instance()).name;

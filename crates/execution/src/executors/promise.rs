@@ -1,7 +1,6 @@
 //! What can be promised of the rest of a plan: the most that still holds.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::deorder::keeps_all_that_is_read;
 use elbowroom_plan::uncertain::Reading;
 use elbowroom_plan::{
     Bound, Constraint, InstanceId, ParameterId, ParameterKind, ParametrizedPlan, Valuation,
@@ -43,16 +42,10 @@ pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason
         let reading = |constraint: &Constraint| room.reading(constraint);
         Dispatch::controlled(mission, &reading)
     };
-    // Without an envelope nothing is known of other conditions but what the plan says.
-    let times_are_all = times_are_all(mission);
-    let knows_room = mission.envelope.is_some() || times_are_all;
-    most(times_are_all, knows_room, &mut attempt)
-}
-
-/// Whether the plan works in each of its schedules, whatever the durations: nothing but times has to be
-/// looked at.
-pub(super) fn times_are_all(mission: &Mission) -> bool {
-    keeps_all_that_is_read(&mission.task, &mission.plan, &mission.nominal)
+    // Without an envelope nothing is known of numbers but what the plan says.
+    let reads_numbers = mission.plan.reads_more_than_facts(&mission.task);
+    let knows_room = mission.envelope.is_some() || !reads_numbers;
+    most(reads_numbers, knows_room, &mut attempt)
 }
 
 /// Whether a reason says that something happened at another time than the plan allows.
@@ -98,8 +91,8 @@ pub(super) fn weaken(
             .map_err(|against| behind = against)
     };
     // What numbers bear is known only where nothing has left the envelope.
-    let times_are_all = times_are_all(mission);
-    if let Ok(((), promise)) = most(times_are_all, times_are_all, &mut attempt) {
+    let reads_numbers = mission.plan.reads_more_than_facts(&mission.task);
+    if let Ok(((), promise)) = most(reads_numbers, !reads_numbers, &mut attempt) {
         return Ok(promise);
     }
     if reason.cause == Cause::Unreachable {
@@ -118,7 +111,7 @@ pub(super) fn weaken(
 /// The first attempt to succeed, with what it promises. What numbers bear is known of all of the
 /// envelope, or, once something has left it (`knows_room` does not hold), of what is planned.
 fn most<T, E>(
-    times_are_all: bool,
+    reads_numbers: bool,
     knows_room: bool,
     attempt: &mut dyn FnMut(&Rational, Overrun) -> Result<T, E>,
 ) -> Result<(T, Promise), E> {
@@ -134,7 +127,7 @@ fn most<T, E>(
                 return Ok((done, promise));
             }
         }
-        if !times_are_all {
+        if reads_numbers {
             break;
         }
         share = share / Rational::from(2);
