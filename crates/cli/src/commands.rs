@@ -14,6 +14,7 @@ pub(crate) mod run;
 pub(crate) mod serve;
 pub(crate) mod shell;
 pub(crate) mod stn;
+mod threads;
 pub(crate) mod val;
 pub(crate) mod verify;
 pub(crate) mod world_check;

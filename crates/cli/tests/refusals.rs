@@ -58,6 +58,12 @@ fn options_of_run_that_could_do_nothing_are_refused() {
         (&["--spoil", "{dur_0: [9, 11]}"], "--world"),
         (&["--realtime", "1e-30"], "between 0.000001"),
         (&["--planning-time", "soon"], "--planning-time 2.5"),
+        (&["--jobs", "2", "--planner", "none"], "leave out --jobs"),
+        (
+            &["--jobs", "2", "--planner", "cat {domain} {problem}"],
+            "leave out --jobs",
+        ),
+        (&["--jobs", "-1"], "--jobs"),
     ] {
         let said = refusal(&[&RUN[..], options].concat());
         assert!(said.contains(words), "{options:?}: {said}");
@@ -90,6 +96,23 @@ fn threads_are_the_embedded_planners_and_change_no_plan() {
         output.stdout
     });
     assert!(plans.windows(2).all(|two| two[0] == two[1]), "{plans:?}");
+}
+
+#[test]
+fn the_trace_of_a_run_is_the_same_whatever_the_number_of_threads() {
+    let folder = folder("jobs");
+    let trace = folder.join("trace.jsonl").display().to_string();
+    let world = ["--world", "cases/delivery/world.toml", "--seed", "3"];
+    let traces = ["0", "1", "2", "7"].map(|jobs| {
+        let options = [&world[..], &["--trace", &trace, "--jobs", jobs]].concat();
+        let output = elbowroom(&[&RUN[..], &options].concat());
+        assert!(output.status.code() != Some(2), "{output:?}");
+        fs::read_to_string(&trace).expect("a trace")
+    });
+    assert!(traces.windows(2).all(|two| two[0] == two[1]), "{traces:?}");
+    let said = refusal(&["run", "--replay", &trace, "--jobs", "2"]);
+    assert!(said.contains("cannot be used with"), "{said}");
+    fs::remove_dir_all(folder).expect("it is there");
 }
 
 #[test]

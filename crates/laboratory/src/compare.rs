@@ -97,6 +97,7 @@ pub fn trace(
         filling: fillings.get(id.problem).ok_or_else(wrong)?,
         piece: 0,
         pieces: 1,
+        threads: 1,
     };
     setting.trace(id.trial)
 }
@@ -118,10 +119,12 @@ pub fn run_recorded(
     let fillings = experiment.fillings();
     // Trials of one problem have much in common; they are made one after the other unless there
     // are more threads than problems. Results are sums, and do not depend on that.
-    let pieces = pool
-        .current_num_threads()
+    let threads = pool.current_num_threads();
+    let pieces = threads
         .div_ceil(fillings.len().max(1))
+        .min(part.numbers().count())
         .max(1);
+    let planning_threads = for_each(threads, fillings.len() * pieces);
     let settings: Vec<Setting<'_>> = fillings
         .iter()
         .enumerate()
@@ -132,6 +135,7 @@ pub fn run_recorded(
                 filling,
                 piece,
                 pieces,
+                threads: planning_threads,
             })
         })
         .collect();
@@ -160,4 +164,21 @@ pub fn run_recorded(
         whole.is_interrupted = !goes_on();
     }
     Ok(whole)
+}
+
+/// How many threads each of so many pieces of work may have.
+fn for_each(threads: usize, pieces: usize) -> usize {
+    (threads / pieces.max(1)).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::for_each;
+
+    #[test]
+    fn threads_are_for_trials_first() {
+        for (threads, pieces, each) in [(1, 1, 1), (2, 1, 2), (2, 100, 1), (7, 2, 3), (4, 0, 4)] {
+            assert_eq!(for_each(threads, pieces), each, "{threads}, {pieces}");
+        }
+    }
 }

@@ -32,6 +32,9 @@ fn results_do_not_depend_on_the_number_of_threads_and_parts_add_up() {
     let make = |part| run(&experiment, part, &|_| true).expect("a correct test");
     let whole = make(WHOLE);
     assert_eq!(whole, make(Part { jobs: 3, ..WHOLE }));
+    // More threads than there are trials: the planner has the rest.
+    let one = Part { trials: 1, ..WHOLE };
+    assert_eq!(make(one), make(Part { jobs: 7, ..one }));
     let parts = [0, 1, 2].map(|shard| {
         make(Part {
             shard,

@@ -5,7 +5,7 @@ use std::sync::{Arc, PoisonError};
 
 use elbowroom::answers::RunRequest;
 use elbowroom::answers::run::{RunOutcome, run as execute, simulate};
-use elbowroom::execute::{RunSpec, check_vary};
+use elbowroom::execute::{EMBEDDED, RunSpec, check_vary};
 use elbowroom::execution::NoRecord;
 use elbowroom::execution::executors::EXECUTORS;
 use elbowroom::model;
@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 
 use crate::planner::{PyPlanner, Raised};
 use crate::recorder::Tape;
-use crate::task::{Task, read_options};
+use crate::task::{Task, read_options, threads};
 use crate::trouble::{Trouble, guarded, json};
 use crate::watch::Watch;
 use crate::world::PyWorld;
@@ -132,15 +132,20 @@ impl Task {
             epsilon: self.task.epsilon().clone(),
             ..RunSpec::new((&self.domain).into(), (&self.problem).into())
         };
-        let options: Map<String, Value> = read_options(options)?;
+        let mut options: Map<String, Value> = read_options(options)?;
+        // It is no part of a specification: nothing that is decided depends on it.
+        let jobs = options.remove("jobs").filter(|jobs| !jobs.is_null());
+        let jobs = jobs.map(serde_json::from_value).transpose();
+        let jobs = jobs.map_err(|error| Trouble::Request(format!("jobs: {error}")))?;
         let Value::Object(mut members) = serde_json::to_value(&usual).map_err(Trouble::request)?
         else {
             return Ok(usual);
         };
         members.extend(options);
-        let spec: RunSpec = serde_json::from_value(members.into()).map_err(Trouble::request)?;
+        let mut spec: RunSpec = serde_json::from_value(members.into()).map_err(Trouble::request)?;
         check_vary(&self.task, &spec.vary).map_err(Trouble::request)?;
         spec.check_planner()?;
+        spec.threads = threads(jobs, 1, spec.planner.eq_ignore_ascii_case(EMBEDDED))?;
         Ok(spec)
     }
 

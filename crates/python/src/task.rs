@@ -173,7 +173,11 @@ impl Task {
     }
 
     /// A plan: a document, and whether the search was ended by Ctrl-C.
-    #[pyo3(signature = (planner, time_limit, first, memory, progress))]
+    #[pyo3(signature = (planner, time_limit, first, memory, jobs, progress))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "each is a keyword argument in Python"
+    )]
     fn plan(
         &self,
         py: Python<'_>,
@@ -181,9 +185,12 @@ impl Task {
         time_limit: Option<f64>,
         first: bool,
         memory: Option<u64>,
+        jobs: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(String, bool)> {
         guarded(py, || {
+            let is_embedded = planner.eq_ignore_ascii_case(plan::EMBEDDED);
+            let threads = threads(jobs, EVERY_PROCESSOR, is_embedded)?;
             let mut watch = Watch::start(time_limit, progress);
             let limit = time_limit.map(std::time::Duration::try_from_secs_f64);
             let limit = limit.transpose().map_err(Trouble::request)?;
@@ -191,9 +198,9 @@ impl Task {
                 task: &self.task,
                 first_plan_only: first,
                 most_memory: memory,
-                threads: std::thread::available_parallelism().map_or(1, usize::from),
+                threads,
             };
-            let outcome = if planner.eq_ignore_ascii_case(plan::EMBEDDED) {
+            let outcome = if is_embedded {
                 plan::plan(&mut request, &mut watch)?
             } else {
                 let planner =
@@ -315,6 +322,26 @@ impl Task {
 fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Trouble> {
     let specs = texts.iter().map(|text| text.parse::<VarySpec>());
     specs.collect::<Result<_, _>>().map_err(Trouble::request)
+}
+
+/// As many threads as there are processors.
+const EVERY_PROCESSOR: usize = 0;
+
+/// How many threads the embedded planner may use for one plan: `jobs`, or as many as usual.
+pub(crate) fn threads(
+    jobs: Option<usize>,
+    usual: usize,
+    is_embedded: bool,
+) -> Result<usize, Trouble> {
+    if jobs.is_some() && !is_embedded {
+        return Err(Trouble::request(
+            "`jobs` says how many threads the embedded planner uses; another one has its own settings",
+        ));
+    }
+    Ok(match jobs.unwrap_or(usual) {
+        EVERY_PROCESSOR => std::thread::available_parallelism().map_or(1, usize::from),
+        jobs => jobs,
+    })
 }
 
 /// Options, as JSON.

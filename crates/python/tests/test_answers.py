@@ -92,6 +92,11 @@ def test_a_plan_is_found_for_each_case_and_is_valid(case: str) -> None:
     assert problem.check(plan).makespan == plan.makespan
 
 
+def test_threads_change_no_plan(problem: elbowroom.Problem) -> None:
+    plans = [str(problem.plan(jobs=jobs)) for jobs in (None, 0, 1, 2, 7)]
+    assert len(set(plans)) == 1
+
+
 def test_that_there_is_no_plan_is_an_answer() -> None:
     problem = elbowroom.read(
         "(define (domain d) (:predicates (p)))",
@@ -123,6 +128,10 @@ def test_mistakes_have_a_place_and_advice() -> None:
         (lambda p, q: p.check(DELIVERY / "plan.stn"), elbowroom.RequestError, "STN plan"),
         (lambda p, q: p.plan(planner="nobody-knows"), elbowroom.PlannerError, "nobody-knows"),
         (lambda p, q: p.plan(time_limit=-1), ValueError, "-1"),
+        (lambda p, q: p.plan(planner="lpg-td", jobs=2), elbowroom.RequestError, "`jobs`"),
+        (lambda p, q: p.run(q, planner="none", jobs=2), elbowroom.RequestError, "`jobs`"),
+        (lambda p, q: p.run(q, planner=print, jobs=2), elbowroom.RequestError, "`jobs`"),
+        (lambda p, q: p.run(q, jobs="many"), elbowroom.RequestError, "jobs"),
         (lambda p, q: p.run(q, executor="guardd"), elbowroom.RequestError, "guarded"),
         (lambda p, q: p.run(q, max_replan=3), elbowroom.RequestError, "max_replans"),
         (lambda p, q: p.run(q, world="no-such.toml"), FileNotFoundError, "no-such"),

@@ -130,6 +130,13 @@ def test_an_execution_refuses_what_it_has_not_asked_for(
     assert isinstance(over, elbowroom.Over) and over.run.verdict == "world-failed"
 
 
+def test_threads_change_no_run(problem: elbowroom.Problem) -> None:
+    runs = [problem.run(world=AsPlanned(Fraction(3, 2)), jobs=jobs) for jobs in (None, 0, 1, 2)]
+    assert all(run.verdict == "goal-reached" for run in runs)
+    assert all(run.trace() == runs[0].trace() for run in runs)
+    assert isinstance(problem.execution(jobs=2).next_command(), elbowroom.Start)
+
+
 def test_a_function_is_the_planner(problem: elbowroom.Problem, plan: Path) -> None:
     asked: list[str] = []
 

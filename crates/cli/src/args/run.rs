@@ -49,6 +49,11 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "N", default_value_t = 2_000, value_parser = whole)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) improve_states: u64,
+    /// Number of threads of the embedded planner; 0 for one per processor; 1 unless it is given, as on a robot
+    /// the other processors have work of their own. The plans are the same, but come sooner
+    #[arg(long, value_name = "N", value_parser = count, conflicts_with = "replay")]
+    #[arg(allow_negative_numbers = true)]
+    pub(crate) jobs: Option<usize>,
     /// The simulated world (docs/formats/world.md), or `spoiler`, an adversary that ends each
     /// action when that is worst; without it, everything goes as planned
     #[arg(long, value_name = "WORLD.toml|spoiler")]

@@ -17,6 +17,7 @@ use elbowroom::model::Task;
 use elbowroom::sim::WorldModel;
 
 use super::run::spec::contradiction;
+use super::threads::{self, EVERY_PROCESSOR};
 use crate::args::{EMBEDDED, PlanArgs, PlanObjectiveChoice};
 use crate::exit::{Answer, Exit, Failure};
 use crate::look::Look;
@@ -35,12 +36,7 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
     } else {
         Some(named(arguments)?)
     };
-    if planner.is_some() && arguments.jobs.is_some() {
-        return Err(Failure::new(
-            "--jobs says how many threads the embedded planner uses; another one has its own settings",
-            "leave out --jobs, or write what the planner is to be told into its command line",
-        ));
-    }
+    let threads = threads::of(arguments.jobs, EVERY_PROCESSOR, planner.is_none())?;
     let mut watch = Watch::start(arguments);
     let (task, domain, problem) = match reading::read(arguments, &mut watch, output)? {
         Ok(read) => read,
@@ -65,7 +61,7 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
         task: &task,
         first_plan_only: arguments.first || watch.limit().is_none(),
         most_memory: arguments.memory.map(|megabytes| megabytes << 20),
-        threads: threads(arguments.jobs.unwrap_or(0)),
+        threads,
     };
     let mut outcome = match &planner {
         None => plan(&mut request, &mut watch).map_err(unsupported)?,
@@ -86,14 +82,6 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
     // The line on the terminal goes before the answer comes.
     drop(watch);
     print(arguments, &outcome, output)
-}
-
-/// So many threads, or one for each processor.
-fn threads(jobs: usize) -> usize {
-    match jobs {
-        0 => std::thread::available_parallelism().map_or(1, usize::from),
-        jobs => jobs,
-    }
 }
 
 /// The plan that is best by an objective.

@@ -96,6 +96,10 @@ pub struct RunSpec {
     pub planner_states: u64,
     /// How many of them for a better plan than the first.
     pub improve_states: u64,
+    /// How many threads the embedded planner may use for one plan. Nothing that is decided depends on it, but
+    /// for how soon a plan is there; so it is no part of a trace.
+    #[serde(skip, default = "one")]
+    pub threads: usize,
     /// What to leave open; all durations that the domain fixes if empty.
     #[serde(with = "listed")]
     pub vary: Vec<VarySpec>,
@@ -135,6 +139,10 @@ pub struct RunSpec {
     /// The least separation of interfering happenings (ε).
     #[serde(with = "positive")]
     pub epsilon: Rational,
+}
+
+fn one() -> usize {
+    1
 }
 
 /// A file: its name, for messages, and what stands in it.
@@ -195,6 +203,7 @@ impl RunSpec {
             first_plan: FirstPlan::default(),
             planner_states: planner.most_states,
             improve_states: planner.improve_states,
+            threads: planner.settings.threads,
             vary: flow.vary,
             guarantee: flow.guarantee,
             precision: None,

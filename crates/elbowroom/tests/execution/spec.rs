@@ -156,6 +156,20 @@ fn headers_of_older_traces_are_read() {
     assert_eq!(sink.trim_end(), words);
 }
 
+/// Threads are for whoever plans; a trace says nothing of them, and one that does is none.
+#[test]
+fn the_planner_has_the_threads_that_no_trace_tells_of() {
+    let mut spec = spec();
+    assert_eq!(spec.embedded().settings.threads, 1);
+    spec.threads = 3;
+    assert_eq!(spec.embedded().settings.threads, 3);
+    let mut written = value(&spec);
+    assert_eq!(read_back(written.clone()).map(|it| it.threads), Ok(1));
+    written["threads"] = 3.into();
+    let why = read_back(written).expect_err("an unknown member");
+    assert!(why.contains("threads"), "{why}");
+}
+
 #[test]
 fn what_does_not_go_together_is_said_before_the_run() {
     let task = Arc::new(Task::new(elbowroom::model::Problem::default()));

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::trials::Setting;
-use super::{Column, Experiment, ExperimentError, Part};
+use super::{Column, Experiment, ExperimentError, Part, for_each};
 use crate::timed::{Settings, optimum};
 
 /// The name of the row.
@@ -39,7 +39,11 @@ pub(super) fn of(
     part: Part,
     goes_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<ColumnOptimum>, ExperimentError> {
-    let is_of_part = |(problem, _): &(usize, _)| *problem as u64 % part.shards.max(1) == part.shard;
+    let is_of_part = |(problem, _): &(usize, &Vec<(String, String)>)| {
+        *problem as u64 % part.shards.max(1) == part.shard
+    };
+    let problems = fillings.iter().enumerate().filter(is_of_part).count();
+    let threads = for_each(rayon::current_num_threads(), problems);
     let columns = experiment.columns.iter();
     columns
         .map(|column| {
@@ -47,7 +51,9 @@ pub(super) fn of(
                 .par_iter()
                 .enumerate()
                 .filter(is_of_part)
-                .map(|(problem, filling)| bounds(experiment, column, problem, filling, goes_on))
+                .map(|(problem, filling)| {
+                    bounds(experiment, column, (problem, filling, threads), goes_on)
+                })
                 .collect();
             Ok(mean(&bounds?))
         })
@@ -57,8 +63,7 @@ pub(super) fn of(
 fn bounds(
     experiment: &Experiment,
     column: &Column,
-    problem: usize,
-    filling: &[(String, String)],
+    (problem, filling, threads): (usize, &[(String, String)], usize),
     goes_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Result<(f64, f64), String>, ExperimentError> {
     let setting = Setting {
@@ -67,6 +72,7 @@ fn bounds(
         filling,
         piece: 0,
         pieces: 1,
+        threads,
     };
     let (task, world) = setting.scene(column)?;
     let settings = Settings {

@@ -37,6 +37,8 @@ pub(super) struct Setting<'a> {
     /// Which of the part's trials: every `pieces`-th, from this one on.
     pub(super) piece: usize,
     pub(super) pieces: usize,
+    /// How many threads the embedded planner may use for one plan.
+    pub(super) threads: usize,
 }
 
 /// The data shared by all trials of a problem.
@@ -310,7 +312,10 @@ impl Setting<'_> {
 
     pub(super) fn embedded(&self) -> Embedded<'static> {
         Embedded {
-            settings: embedded::Settings::default(),
+            settings: embedded::Settings {
+                threads: self.threads,
+                ..embedded::Settings::default()
+            },
             most_states: self.experiment.planner_states,
             improve_states: self.experiment.improve_states,
             clock: None,

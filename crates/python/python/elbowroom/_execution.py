@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from . import _native
 from ._answers import Run
-from ._errors import WorldError
+from ._errors import RequestError, WorldError
 from ._numbers import Number, document, text
 from ._world import Action, AsyncWorld, Observation, World, passage, wire
 
@@ -60,6 +60,8 @@ def run_options(
     """The specification of a run, as the native module reads it."""
     chosen: dict[str, Any] = {"executor": executor, "seed": seed}
     chosen["planner"] = planner if isinstance(planner, str) else "embedded"
+    if not isinstance(planner, str) and options.get("jobs") is not None:
+        raise RequestError("`jobs` says how many threads the embedded planner uses")
     for name, value in options.items():
         if name in _TEXTS and value is not None and value != "measured":
             value = text(value)

@@ -18,6 +18,7 @@ class Task:
         time_limit: float | None,
         first: bool,
         memory: int | None,
+        jobs: int | None,
         progress: _Progress,
     ) -> tuple[str, bool]: ...
     def stn(self, plan: _Named) -> tuple[str, str | None, str | None]: ...

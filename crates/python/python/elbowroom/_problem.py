@@ -167,6 +167,7 @@ class Problem:
         time_limit: float | None = None,
         first: bool | None = None,
         memory: int | None = None,
+        jobs: int | None = None,
         progress: ProgressCallback | bool | None = None,
     ) -> Plan | NoPlan:
         """Looks for a plan.
@@ -176,6 +177,8 @@ class Problem:
             time_limit: in seconds; better plans are looked for until then.
             first: whether the first plan is enough; by default, without a time limit.
             memory: about how many bytes the search may use.
+            jobs: how many threads the embedded planner may use; by default, and with 0, one for
+                each processor. The plan is the same, but comes sooner.
             progress: is told how far it has come; ``True`` shows a bar.
 
         Returns:
@@ -193,7 +196,7 @@ class Problem:
             first = time_limit is None
         limit = _seconds(time_limit)
         answer, is_interrupted = self._native.plan(
-            planner, limit, first, memory, listener(progress)
+            planner, limit, first, memory, jobs, listener(progress)
         )
         found = document(answer)
         _warn(is_interrupted, found["answer"] == "plan")
@@ -393,7 +396,9 @@ class Problem:
             options: further members of a run's specification, as the header of a trace has them
                 (``docs/formats/trace.md``): ``time_limit`` and ``planning_time`` in the world's
                 seconds, ``max_replans``, ``vary``, ``guarantee``, ``precision``, ``running``,
-                ``likelihoods``, …
+                ``likelihoods``, …; and ``jobs``, the number of threads of the embedded planner:
+                1 unless it is given, 0 for one for each processor. It changes no plan, and is no
+                part of the trace.
 
         Returns:
             What came of it; also when the goal was not reached. Ctrl-C ends the run in order.

@@ -164,8 +164,9 @@ pub(in crate::commands) fn run(
         journal,
         length,
         stored,
-        spec,
+        mut spec,
     } = cut(path)?;
+    spec.threads = super::spec::threads_of(arguments, &spec.planner)?;
     let Some(command) = spec.world_process.clone() else {
         return Err(unreadable(&name, "its world was no process"));
     };

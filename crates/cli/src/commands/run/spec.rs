@@ -10,7 +10,8 @@ use elbowroom::num::Rational;
 use elbowroom::plan::parametrize::ParametrizeError;
 use elbowroom::text::Source;
 
-use crate::args::{FirstPlanChoice, RunArgs, RunningChoice};
+use super::super::threads;
+use crate::args::{EMBEDDED, FirstPlanChoice, RunArgs, RunningChoice};
 use crate::exit::Failure;
 use crate::input;
 
@@ -33,6 +34,7 @@ pub(in crate::commands) fn of(
         seed: arguments.seed,
         planner_states: arguments.planner_states,
         improve_states: arguments.improve_states,
+        threads: threads_of(arguments, &arguments.planner)?,
         guarantee: arguments.guarantee.into(),
         precision: arguments.precision.clone(),
         objective: arguments.objective.map(Into::into),
@@ -85,6 +87,13 @@ pub(in crate::commands) fn of(
     spec.plans_aside = spec.can_plan_aside();
     spec.readies_aside = spec.plans_aside;
     Ok((spec, world))
+}
+
+/// How many threads a planner of this name has. By default one: beside a run, the other processors have
+/// the robot to look after.
+pub(super) fn threads_of(arguments: &RunArgs, planner: &str) -> Result<usize, Failure> {
+    let is_embedded = planner.eq_ignore_ascii_case(EMBEDDED);
+    threads::of(arguments.jobs, 1, is_embedded)
 }
 
 /// On a wall clock, and in a world that is a program, planning takes time unless the arguments say

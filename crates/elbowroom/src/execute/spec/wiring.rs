@@ -11,6 +11,7 @@ use elbowroom_external::{self as external, PlannerError};
 use elbowroom_model::problem::Problem;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
+use elbowroom_planner::embedded;
 use elbowroom_probability::Likelihoods;
 use elbowroom_sim::{Paced, SimWorld, WorldModel};
 use elbowroom_text::Diagnostics;
@@ -328,6 +329,10 @@ impl RunSpec {
     /// The embedded planner, with the limits of the run and without a clock.
     pub fn embedded(&self) -> Embedded<'static> {
         Embedded {
+            settings: embedded::Settings {
+                threads: self.threads,
+                ..embedded::Settings::default()
+            },
             most_states: self.planner_states,
             improve_states: self.improve_states,
             ..Embedded::default()

@@ -1,6 +1,8 @@
 //! No state that a plan goes through is a dead end, not even if the plan must end as early as it
 //! can.
 
+mod numbers;
+
 use std::fmt::Write;
 
 use elbowroom_model::reachability::{self, Answer};
@@ -14,6 +16,7 @@ use crate::embedded::compile::{Compiled, Wanted, compile};
 use crate::embedded::root::root;
 use crate::embedded::state::State;
 use crate::embedded::time::{NEVER, Ticks};
+use numbers::{Demand, Numbers};
 
 /// How many choices the slow search makes at most.
 const MOST: usize = 6;
@@ -36,6 +39,27 @@ pub(crate) struct Draft {
     initial: u8,
     goal: Vec<(u8, bool)>,
     timed: Vec<(u8, u8, bool)>,
+    /// For each action, if there are numbers.
+    numbers: Vec<Numbers>,
+    /// What the two numbers are in the beginning.
+    values: (i8, i8),
+    demands: Vec<Demand>,
+}
+
+/// Drafts in which two numbers are compared and changed, too.
+pub(crate) fn numeric_drafts() -> impl Strategy<Value = Draft> {
+    (
+        drafts(),
+        prop::collection::vec(numbers::numbers(), 4),
+        (-3..4_i8, -3..4_i8),
+        numbers::goals(),
+    )
+        .prop_map(|(draft, numbers, values, demands)| Draft {
+            numbers,
+            values,
+            demands,
+            ..draft
+        })
 }
 
 pub(crate) fn drafts() -> impl Strategy<Value = Draft> {
@@ -72,6 +96,9 @@ pub(crate) fn drafts() -> impl Strategy<Value = Draft> {
             initial,
             goal,
             timed,
+            numbers: Vec::new(),
+            values: (0, 0),
+            demands: Vec::new(),
         })
 }
 
@@ -96,14 +123,21 @@ fn written(literals: &[(u8, bool)], when: &str) -> String {
 impl Draft {
     pub(crate) fn task(&self) -> Task {
         let mut domain = "(define (domain d) (:requirements :durative-actions :adl
-            :timed-initial-literals) (:predicates (f0) (f1) (f2) (f3) (f4))"
+            :timed-initial-literals :numeric-fluents) (:predicates (f0) (f1) (f2) (f3) (f4))
+            (:functions (n0) (n1))"
             .to_owned();
         for (number, action) in self.actions.iter().enumerate() {
             let mut needs = written(&action.needs, "at start");
             needs += &written(action.lasting.as_slice(), "over all");
             needs += &written(action.at_end.as_slice(), "at end");
             let mut effects = written(&action.start, "at start");
-            let end = written(&action.end, "at end");
+            let mut end = written(&action.end, "at end");
+            if let Some(numbers) = self.numbers.get(number) {
+                let [at_start, at_end] = numbers.effects();
+                needs += &numbers.needs();
+                effects += &at_start;
+                end += &at_end;
+            }
             if action.is_conditional && !end.is_empty() {
                 write!(effects, "(when (at end (f0)) (and {end}))").expect("strings take all");
             } else {
@@ -121,6 +155,12 @@ impl Draft {
         for fact in (0..5).filter(|fact| self.initial >> fact & 1 == 1) {
             write!(problem, " (f{fact})").expect("strings take all");
         }
+        write!(
+            problem,
+            "(= (n0) {}) (= (n1) {})",
+            self.values.0, self.values.1
+        )
+        .expect("strings take all");
         // What happens at one time has no order, so nothing may become true and false then.
         let mut said = std::collections::BTreeSet::new();
         for &(time, fact, truth) in &self.timed {
@@ -129,7 +169,8 @@ impl Draft {
             }
             problem += &written(&[(fact, truth)], &format!("at {time}"));
         }
-        let goal = written(&self.goal, "and");
+        let demands = self.demands.iter().map(Demand::text);
+        let goal = written(&self.goal, "and") + &demands.collect::<String>();
         write!(problem, ") (:goal (and {goal})))").expect("strings take all");
         let sources = (
             Source::new("domain.pddl", domain + ")"),

@@ -1,0 +1,20 @@
+//! `--jobs`: how many threads the embedded planner uses for one plan.
+
+use crate::exit::Failure;
+
+/// As many as there are processors.
+pub(super) const EVERY_PROCESSOR: usize = 0;
+
+/// As many as were asked for, or as usual.
+pub(super) fn of(jobs: Option<usize>, usual: usize, is_embedded: bool) -> Result<usize, Failure> {
+    if jobs.is_some() && !is_embedded {
+        return Err(Failure::new(
+            "--jobs says how many threads the embedded planner uses; another one has its own settings",
+            "leave out --jobs, or write what the planner is to be told into its command line",
+        ));
+    }
+    Ok(match jobs.unwrap_or(usual) {
+        EVERY_PROCESSOR => std::thread::available_parallelism().map_or(1, usize::from),
+        jobs => jobs,
+    })
+}
