@@ -378,6 +378,11 @@ impl Outlook for Policy {
         if cell + 1 >= self.values.len() {
             return None;
         }
+        // Of what is none of the plan's actions nothing is known.
+        let knows = |name: &str| self.world.acts.iter().any(|act| act.name == name);
+        if self.stride != ALWAYS && !standing.started.is_none_or(knows) {
+            return None;
+        }
         let facts = self.world.facts.iter().enumerate();
         let facts = facts.fold(0, |all: Facts, (place, fact)| {
             all | (Facts::from(standing.belief.fact(*fact)) << place)
