@@ -403,7 +403,7 @@ fn where_a_plan_nearly_always_succeeds_it_goes_by_the_table_of_its_actions() {
     let model = WorldModel::read(world, task.problem()).expect("a world");
     let plan = names.map(|name| format!("(do-{name})")).into_iter();
     let settings = Settings {
-        most_states: 30_000,
+        most_states: 400_000,
         ..Settings::default()
     };
     let of = |plans: Vec<Vec<String>>| {
