@@ -4,6 +4,7 @@
 //! [`execute()`] is one call for a plan in one's own world. [`Execution`] puts a run together from
 //! whoever decides, plans, prepares and records.
 
+mod action_sets;
 mod analyst;
 mod candidates;
 mod execution;
@@ -21,6 +22,7 @@ mod spec;
 mod spoiling;
 mod vary;
 
+pub use action_sets::{action_sets, action_sets_to_tabulate};
 pub use analyst::{Analyst, WholeRegion};
 pub use candidates::{Candidate, Candidates, Limits, Pace};
 pub use execution::{Execution, Listener, execute, read_goal};

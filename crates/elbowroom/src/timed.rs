@@ -206,6 +206,11 @@ pub fn optimum(
     Ok(found)
 }
 
+/// Whether the process knows all that there is in a task and in a world.
+pub fn knows(task: &Task, model: &WorldModel, settings: &Settings) -> bool {
+    TimedWorld::new(task, model, settings).is_ok()
+}
+
 /// Of the states that there may be, those that act within certain actions may have one in so many before
 /// the whole process is looked at.
 const QUICK_SHARE: usize = 16;

@@ -3,7 +3,7 @@
 use elbowroom_model::ground::{Action, Body, Change, Effect, Expression, FluentId};
 use elbowroom_model::problem::Unknown;
 use elbowroom_num::Rational;
-use elbowroom_plan::{InstanceId, ParameterId, ParameterKind, ParametrizedPlan};
+use elbowroom_plan::{InstanceId, ParameterId, ParameterKind, ParametrizedPlan, Valuation};
 
 use crate::executor::{Amount, Moment, News};
 
@@ -110,6 +110,21 @@ pub(crate) fn expression(action: &Action, is_end: bool, fluent: FluentId) -> Opt
         Change::Update {
             fluent: own, value, ..
         } if *own == fluent => Some(value),
+        _ => None,
+    })
+}
+
+/// The amount by the plan at these values, where no number decides it that changes; the duration is that of the
+/// action.
+pub(crate) fn value_at(
+    action: &Action,
+    is_end: bool,
+    fluent: FluentId,
+    (values, duration): (&Valuation, Option<&Rational>),
+) -> Option<Rational> {
+    expression(action, is_end, fluent)?.evaluate(&mut |leaf| match leaf {
+        Expression::Duration => duration.cloned(),
+        Expression::Unknown(Unknown::Parameter(index)) => Some(values[ParameterId(*index)].clone()),
         _ => None,
     })
 }

@@ -357,3 +357,86 @@ fn what_is_under_way_is_let_go_when_the_goal_holds() {
         assert!(report.time < Rational::from(4), "{report:#?}");
     }
 }
+
+/// Six things at once, each of which takes as long as it likes, and one after them: the whole process has too
+/// many states, that of whoever keeps to these seven has few. The plan to begin with is another one that is quicker
+/// and fails half of the time.
+#[test]
+fn where_a_plan_nearly_always_succeeds_it_goes_by_the_table_of_its_actions() {
+    let names = ["a", "b", "c", "d", "e", "f"];
+    let actions = names.map(|name| {
+        format!(
+            "(:durative-action do-{name} :parameters () :duration (= ?duration 4)
+               :condition (at start (todo-{name}))
+               :effect (and (at start (not (todo-{name}))) (at end (done-{name}))))"
+        )
+    });
+    let domain = format!(
+        "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
+           (:predicates (day) (fresh) (rushed) (finished) {}) {}
+           (:durative-action finish :parameters () :duration (= ?duration 2)
+             :condition (and (at end (day)) {}) :effect (at end (finished)))
+           (:durative-action rush :parameters () :duration (= ?duration 1)
+             :condition (at start (fresh)) :effect (and (at start (not (fresh))) (at end (rushed))))
+           (:durative-action deliver :parameters () :duration (= ?duration 1)
+             :condition (at start (rushed)) :effect (at end (finished))))",
+        names
+            .map(|name| format!("(todo-{name}) (done-{name})"))
+            .join(" "),
+        actions.join("\n"),
+        names
+            .map(|name| format!("(at start (done-{name}))"))
+            .join(" ")
+    );
+    let problem = format!(
+        "(define (problem p) (:domain d) (:init (day) (fresh) (at 14 (not (day))) {})
+           (:goal (finished)))",
+        names.map(|name| format!("(todo-{name})")).join(" ")
+    );
+    let world = "format = \"elbowroom-world\"\nversion = 1
+        [[duration]]\naction = \"*\"\nuniform = { from = 0.2, to = 10.2 }
+        [[duration]]\naction = \"finish\"\nconstant = 2
+        [[failure]]\naction = \"rush\"\nprobability = 0.5";
+    let source = |text: &str| Source::new("test", text);
+    let read = read_problem(&source(&domain), &source(&problem));
+    let task = Arc::new(Task::new(read.expect("it is PDDL").0));
+    let model = WorldModel::read(world, task.problem()).expect("a world");
+    let plan = names.map(|name| format!("(do-{name})")).into_iter();
+    let settings = Settings {
+        most_states: 400_000,
+        ..Settings::default()
+    };
+    let of = |plans: Vec<Vec<String>>| {
+        let settings = Settings {
+            plans,
+            ..settings.clone()
+        };
+        Policy::close(&task, &model, &settings, &|| true).expect("all of it is known")
+    };
+    assert!(of(Vec::new()).is_none(), "there are not too many states");
+    let quick = vec!["(rush)".to_owned(), "(deliver)".to_owned()];
+    assert!(
+        of(vec![quick.clone()]).is_none(),
+        "it fails half of the time"
+    );
+    let sure = plan.chain(["(finish)".to_owned()]).collect();
+    let policy = of(vec![quick, sure]).expect("one of the plans nearly always succeeds");
+    let optimum = policy.optimum();
+    assert!(
+        optimum.within.is_some() && optimum.lower > 0.99,
+        "{optimum:?}"
+    );
+    let outlook: Arc<dyn Outlook> = Arc::new(policy);
+    let text = "0: (rush) [1]\n1.001: (deliver) [1]\n";
+    let first = read_plan(&source(text), &task).expect("it is a plan").0;
+    for seed in 0..50 {
+        let execution = Execution::of(&task)
+            .by("policy".parse().expect("it is registered"))
+            .beginning_with(first.clone())
+            .with_outlook(Some(Arc::clone(&outlook)));
+        let report = execution.run_in(&mut *model.world(&task, seed));
+        assert_eq!(report.verdict, Verdict::GoalReached, "{seed}: {report:#?}");
+        // Nobody was asked for a plan.
+        assert_eq!(report.replans, 0, "{seed}: {report:#?}");
+    }
+}

@@ -48,7 +48,7 @@ pub(super) enum Move {
 
 /// All that is worth looking at in a state in which the goal does not hold, and in which there is
 /// hope.
-pub(super) fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
+fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
     if !state.may_act {
         return vec![Move::Wait];
     }
@@ -103,6 +103,15 @@ impl<'a> Below<'a> {
             chances,
             stride,
         }
+    }
+
+    /// All that whoever acts so looks at in a state, as [`moves`].
+    pub(super) fn moves(&self, state: &State) -> Vec<Move> {
+        let mut moves = moves(self.world, state);
+        if self.stride == WHEN_SOMETHING_HAPPENS {
+            leave_nothing_undone(self.world, state, &mut moves);
+        }
+        moves
     }
 
     /// What may happen in a cell, with how likely all of it is.
@@ -303,11 +312,7 @@ impl Cell<'_> {
         if !state.is_hopeful(world, self.hopes) {
             return Vec::new();
         }
-        let mut moves = moves(world, state);
-        if self.bound.stride == WHEN_SOMETHING_HAPPENS {
-            leave_nothing_undone(world, state, &mut moves);
-        }
-        let moves = moves.into_iter();
+        let moves = self.bound.moves(state).into_iter();
         moves.map(|choice| self.choice(state, choice)).collect()
     }
 

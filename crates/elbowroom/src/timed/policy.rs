@@ -6,11 +6,12 @@ use elbowroom_num::Rational;
 use elbowroom_sim::{Side as Part, WorldModel};
 use indexmap::{IndexMap, IndexSet};
 
-use super::below::{ALWAYS, Below, Move, moves};
+use super::below::{ALWAYS, Below, Move, WHEN_SOMETHING_HAPPENS};
 use super::chances::Chances;
 use super::graph::{Expansion, Hopes, Phase, Running, State, Tolls, explored, settled, worth};
+use super::within::Search;
 use super::world::{Facts, TimedWorld};
-use super::{Grid, NotTabulated, Settings, Side, TimedOptimum, grid, refined};
+use super::{Grid, NotTabulated, QUICK_SHARE, Settings, Side, TimedOptimum, grid, refined};
 
 /// The values of all states on the grid of the bound from below, by which each move can be weighed.
 ///
@@ -24,9 +25,14 @@ pub struct Policy {
     step: Rational,
     /// By cell: what its states are worth.
     values: Vec<IndexMap<State, f64>>,
+    /// When it acts: see [`Below::new`].
+    stride: usize,
     tolls: Tolls,
     optimum: TimedOptimum,
 }
+
+/// How far from 1 the bound within the actions of a plan may be for nothing better to be looked for.
+const SURE: f64 = 0.005;
 
 /// How far apart the bounds may be for the policy to be as good as the best within what counts.
 const CLOSE: f64 = 0.02;
@@ -89,6 +95,10 @@ impl Policy {
     /// on a coarse grid loses much that others do not, because it decides only at the boundaries of
     /// cells. It gives up early where finer grids will hardly bring the bounds so close.
     ///
+    /// Where whoever does nothing but the actions of one of the [plans](Settings::plans) nearly always
+    /// succeeds, the policy is that one's: in half a point of certainty before anything else is looked
+    /// at, in two points where the whole process is too large.
+    ///
     /// # Errors
     /// As for [`new`](Self::new).
     pub fn close(
@@ -97,7 +107,30 @@ impl Policy {
         settings: &Settings,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
-        let world = TimedWorld::new(task, model, settings)?;
+        let world = TimedWorld::new(task, model, settings);
+        let horizon = world.as_ref().ok().map(|world| world.horizon);
+        let mut search = Search::new(task, model, settings, horizon);
+        let sure = Settings {
+            gap: SURE,
+            ..settings.clone()
+        };
+        search.refine(1.0, settings.most_states / QUICK_SHARE, &sure, goes_on);
+        if 1.0 - search.lower() <= SURE {
+            return Self::within(search, settings, goes_on);
+        }
+        let whole = world.and_then(|world| Self::close_in(world, settings, goes_on));
+        if !matches!(whole, Ok(Some(_))) && 1.0 - search.lower() <= CLOSE {
+            return Self::within(search, settings, goes_on);
+        }
+        whole
+    }
+
+    /// The policy in the whole process, if the bounds get close.
+    fn close_in(
+        world: TimedWorld,
+        settings: &Settings,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, NotTabulated> {
         let first = Settings {
             most_states: settings.most_states / FIRST_SHARE,
             ..settings.clone()
@@ -119,6 +152,29 @@ impl Policy {
         Self::on_finest(world, optimum, settings, goes_on)
     }
 
+    /// The policy of whoever keeps to a plan's actions and acts when something has happened, where that
+    /// one's bound is best.
+    fn within(
+        search: Search,
+        settings: &Settings,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, NotTabulated> {
+        let Some((world, fit, within)) = search.into_best() else {
+            return Ok(None);
+        };
+        let Some(exact) = fit.exact_step() else {
+            return Ok(None);
+        };
+        let chances = Chances::new(&world, fit.step(), fit.cells, Side::Below)?;
+        let optimum = TimedOptimum {
+            lower: within.lower,
+            within: Some(within),
+            ..TimedOptimum::unknown()
+        };
+        let acts = (fit.cells, WHEN_SOMETHING_HAPPENS);
+        Ok(Self::of(world, chances, optimum, exact, acts).filled(settings, goes_on))
+    }
+
     fn on_finest(
         world: TimedWorld,
         optimum: TimedOptimum,
@@ -130,14 +186,28 @@ impl Policy {
             return Ok(None);
         };
         #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
-        let (step, count) = (world.horizon / cells as f64, cells as f64);
+        let step = world.horizon / cells as f64;
         let chances = Chances::new(&world, step, cells, Side::Below)?;
         // The horizon is a number that somebody wrote, or a multiple of the resolution.
         let horizon = Rational::from_f64_as_written(world.horizon).unwrap_or_default();
         let exact = horizon / Rational::from(i64::try_from(cells).unwrap_or(i64::MAX));
-        let mut policy = Self {
-            step: exact,
+        Ok(Self::of(world, chances, optimum, exact, (cells, ALWAYS)).filled(settings, goes_on))
+    }
+
+    /// Without its values yet.
+    fn of(
+        world: TimedWorld,
+        chances: Chances,
+        optimum: TimedOptimum,
+        step: Rational,
+        (cells, stride): (usize, usize),
+    ) -> Self {
+        #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
+        let count = cells as f64;
+        Self {
+            step,
             values: Vec::new(),
+            stride,
             tolls: Tolls {
                 cell: 1.0 - HASTE / count,
                 step: 1.0 - HASTE / count,
@@ -145,13 +215,13 @@ impl Policy {
             optimum,
             world,
             chances,
-        };
+        }
+    }
+
+    fn filled(mut self, settings: &Settings, goes_on: &dyn Fn() -> bool) -> Option<Self> {
         let mut left = settings.most_states;
-        let Some(values) = policy.tabulated(&mut left, goes_on) else {
-            return Ok(None);
-        };
-        policy.values = values;
-        Ok(Some(policy))
+        self.values = self.tabulated(&mut left, goes_on)?;
+        Some(self)
     }
 
     /// The bounds between which the best of all executors lies, and the grids that were tried for
@@ -166,7 +236,7 @@ impl Policy {
         left: &mut usize,
         goes_on: &dyn Fn() -> bool,
     ) -> Option<Vec<IndexMap<State, f64>>> {
-        let bound = Below::new(&self.world, &self.chances, ALWAYS);
+        let bound = Below::new(&self.world, &self.chances, self.stride);
         let mut hopes = Hopes::new();
         let mut layers = explored(&bound, &mut hopes, left, goes_on).ok()?;
         let last = layers.pop().unwrap_or_default().into_iter();
@@ -198,7 +268,7 @@ impl Policy {
         if state.is_won(world) || !state.is_hopeful(world, &mut hopes) {
             return Vec::new();
         }
-        let bound = Below::new(world, &self.chances, ALWAYS);
+        let bound = Below::new(world, &self.chances, self.stride);
         let mut next = IndexSet::new();
         let only = IndexSet::from([state.clone()]);
         let nodes = bound.expand(cell, &only, &mut next, &mut hopes, usize::MAX);
@@ -207,7 +277,7 @@ impl Policy {
         let here = settled(&nodes, &after, self.tolls);
         let choices = nodes.first().into_iter().flatten();
         let worths = choices.map(|choice| worth(choice, &here, &after, self.tolls));
-        moves(world, state).into_iter().zip(worths).collect()
+        bound.moves(state).into_iter().zip(worths).collect()
     }
 
     /// The state that someone stands in, if those events have happened.
@@ -306,6 +376,11 @@ impl Outlook for Policy {
     fn weigh(&self, standing: &Standing<'_>) -> Option<Weighed> {
         let cell = standing.period;
         if cell + 1 >= self.values.len() {
+            return None;
+        }
+        // Of what is none of the plan's actions nothing is known.
+        let knows = |name: &str| self.world.acts.iter().any(|act| act.name == name);
+        if self.stride != ALWAYS && !standing.started.is_none_or(knows) {
             return None;
         }
         let facts = self.world.facts.iter().enumerate();

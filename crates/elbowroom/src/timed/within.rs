@@ -35,6 +35,31 @@ pub(super) struct Search {
     sets: Vec<Set>,
     /// The best so far.
     pub(super) best: Option<Within>,
+    /// The number of its set, and its grid.
+    best_on: Option<(usize, Fit)>,
+}
+
+/// A grid whose cells fit the times that are known.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    /// A time, in so many cells.
+    time: f64,
+    parts: f64,
+    /// How many cells there are.
+    pub(super) cells: usize,
+}
+
+impl Fit {
+    /// The length of a cell, in seconds.
+    pub(super) fn step(&self) -> f64 {
+        self.time / self.parts
+    }
+
+    /// The same, exactly.
+    pub(super) fn exact_step(&self) -> Option<Rational> {
+        let time = Rational::from_f64_as_written(self.time)?;
+        Some(time / Rational::from_f64_as_written(self.parts)?)
+    }
 }
 
 struct Set {
@@ -91,7 +116,14 @@ impl Search {
         Self {
             sets: sets.collect(),
             best: None,
+            best_on: None,
         }
+    }
+
+    /// The best, with the world of its actions and its grid.
+    pub(super) fn into_best(mut self) -> Option<(TimedWorld, Fit, Within)> {
+        let (place, fit) = self.best_on?;
+        Some((self.sets.swap_remove(place).world, fit, self.best?))
     }
 
     /// The best value found, 0 if there is none.
@@ -115,10 +147,11 @@ impl Search {
                 if upper - self.lower() <= settings.gap {
                     return;
                 }
-                if let Some(found) = self.sets[place].next(most_states, goes_on) {
+                if let Some((found, fit)) = self.sets[place].next(most_states, goes_on) {
                     left.push(place);
                     if found.lower > self.lower() {
                         self.best = Some(found);
+                        self.best_on = Some((place, fit));
                     }
                 }
             }
@@ -129,27 +162,29 @@ impl Search {
 
 impl Set {
     /// The next grid; `None` if it has too many states, or nobody wants it.
-    fn next(&mut self, most_states: usize, goes_on: &dyn Fn() -> bool) -> Option<Within> {
-        let (step, cells) = fitting(&self.world, self.cells)?;
-        let chances = Chances::new(&self.world, step, cells, Side::Below).ok()?;
+    fn next(&mut self, most_states: usize, goes_on: &dyn Fn() -> bool) -> Option<(Within, Fit)> {
+        let fit = fitting(&self.world, self.cells)?;
+        let step = fit.step();
+        let chances = Chances::new(&self.world, step, fit.cells, Side::Below).ok()?;
         let bound = Below::new(&self.world, &chances, WHEN_SOMETHING_HAPPENS);
         let mut left = most_states;
         let value = graph::value(&bound, &mut left, goes_on).ok()?;
         self.cells *= 2;
         let lower = (value - SLACK).max(0.0);
-        Some(Within {
+        let within = Within {
             lower,
             step,
             states: most_states - left,
             actions: self.actions.clone(),
-        })
+        };
+        Some((within, fit))
     }
 }
 
 /// The grid of so many cells up to twice as many on which the least time is lost: whoever acts at the
 /// boundaries of cells loses what is missing to a whole number of them for each time that is known,
 /// such as a duration or a deadline. It may end before the horizon: that is a loss, too.
-fn fitting(world: &TimedWorld, cells: usize) -> Option<(f64, usize)> {
+fn fitting(world: &TimedWorld, cells: usize) -> Option<Fit> {
     let lasting: Vec<f64> = world
         .acts
         .iter()
@@ -164,32 +199,34 @@ fn fitting(world: &TimedWorld, cells: usize) -> Option<(f64, usize)> {
     });
     let times: Vec<f64> = events.collect();
     #[allow(clippy::cast_precision_loss, reason = "at most 65,535 cells")]
-    let coarsest = world.horizon / cells as f64;
+    let wanted = cells as f64;
+    let coarsest = world.horizon / wanted;
     let loss = |step: f64| {
         let over = |time: &f64| ((time / step - 1e-9).ceil() * step - time).max(0.0);
         let under = |time: &f64| (time - (time / step + 1e-9).floor() * step).max(0.0);
         let lost: f64 = lasting.iter().map(over).sum();
         lost + times.iter().chain([&world.horizon]).map(under).sum::<f64>()
     };
-    let mut best = coarsest;
+    let mut best = (world.horizon, wanted);
     for time in lasting.iter().chain(&times).chain([&world.horizon]) {
         let mut parts = (time / coarsest).ceil().max(1.0);
         while time / parts >= coarsest / 2.0 {
             let step = time / parts;
-            if step <= coarsest && loss(step) < loss(best) - 1e-9 {
-                best = step;
+            if step <= coarsest && loss(step) < loss(best.0 / best.1) - 1e-9 {
+                best = (*time, parts);
             }
             parts += 1.0;
         }
     }
-    let count = (world.horizon / best + 1e-9).floor();
+    let (time, parts) = best;
+    let count = (world.horizon / (time / parts) + 1e-9).floor();
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "it is a small positive number"
     )]
-    let count = (count < f64::from(u16::MAX)).then_some(count as usize)?;
-    Some((best, count))
+    let cells = (count < f64::from(u16::MAX)).then_some(count as usize)?;
+    Some(Fit { time, parts, cells })
 }
 
 /// How long an action takes, if that is known.

@@ -11,8 +11,9 @@ use elbowroom::execution::{
 };
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
-use elbowroom::plan::{ParametrizedPlan, Valuation};
+use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
 
+use crate::guarantee::one_order;
 use crate::scene::Scene;
 
 /// Ten sites more, and nothing about time: only how much a survey takes of the battery.
@@ -270,4 +271,84 @@ fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_abou
         }
     }
     assert!(outlived > 3, "{outlived}");
+}
+
+/// Asks about the rest of the plan whether or not what was observed is within its envelope, and counts how often it
+/// was.
+struct AlwaysAsked(Arc<AtomicUsize>);
+
+impl Region for AlwaysAsked {
+    fn objection(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &ParametrizedPlan,
+        values: &Valuation,
+    ) -> Option<String> {
+        WholeRegion.objection(task, plan, values)
+    }
+
+    fn objection_inside(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &ParametrizedPlan,
+        values: &Valuation,
+        guaranteed: &DecoupledEnvelope,
+    ) -> Option<String> {
+        let inside = usize::from(guaranteed.contains(values));
+        self.0.fetch_add(inside, Ordering::Relaxed);
+        WholeRegion.objection(task, plan, values)
+    }
+}
+
+/// Where what was observed is within the plan's envelope, the rest of the plan works: who asks about the rest all the
+/// same is told so, and the runs are the same.
+#[test]
+fn what_stays_within_the_envelope_needs_no_question() {
+    let asked = Arc::new(AtomicUsize::new(0));
+    let mut lost = 0;
+    let durations = |name: &str| {
+        let mut scene = Scene::case(name);
+        scene.flow.vary = vec!["durations".parse().expect("a specification")];
+        scene
+    };
+    for (name, scene) in [
+        ("battery", durations("battery")),
+        ("tank", durations("tank")),
+        ("hatchery", durations("hatchery")),
+        ("small battery", one_order("160", "151")),
+        ("large battery", one_order("180", "171")),
+    ] {
+        for (seed, spread) in (0..15).zip(["0.05", "0.2", "0.5"].into_iter().cycle()) {
+            let varies = |heading: &str, spread: &str| {
+                format!(
+                    "{heading}\nnormal = {{ mean = 1, deviation = {spread} }}\nrelative = true\n"
+                )
+            };
+            let mut world = varies("[[duration]]\naction = \"*\"", spread);
+            if name.ends_with(" battery") {
+                for (action, fluent) in [("make-base-1", "charge"), ("make-base-2", "weight")] {
+                    let heading =
+                        format!("[[amount]]\naction = \"{action}\"\nfluent = \"{fluent}\"");
+                    world += &varies(&heading, spread);
+                }
+            }
+            let model = scene.world(&world);
+            let run = |means: Means| {
+                let live: ExecutorSpec = "live".parse().unwrap();
+                let execution = scene.execution("live").decided_by(Made(live.build(means)));
+                execution.run_in(&mut *model.world(&scene.task, seed))
+            };
+            let trusting = run(Means::from(Box::new(WholeRegion)));
+            let asking = run(Means::from(Box::new(AlwaysAsked(Arc::clone(&asked)))));
+            assert_eq!(
+                format!("{trusting:?}"),
+                format!("{asking:?}"),
+                "{name}, seed {seed}"
+            );
+            let mut causes = trusting.reasons.iter().map(|reason| reason.cause);
+            lost += usize::from(causes.any(|cause| cause == Cause::GuaranteeLost));
+        }
+    }
+    let asked = asked.load(Ordering::Relaxed);
+    assert!(asked > 10 && lost > 3, "{asked}, {lost}");
 }

@@ -61,19 +61,25 @@ fn scenes() -> Vec<(String, Scene)> {
         scenes.push((name, Scene::two_orders(early, late)));
     }
     for (capacity, charge) in [("160", "151"), ("180", "171")] {
-        let problem = read("experiments/table2/problem.pddl");
-        let problem = problem
-            .replace("{capacity}", capacity)
-            .replace("{charge}", charge);
-        let domain = read("experiments/table2/domain.pddl");
-        let mut scene = Scene::new(&domain, &problem, Some(ONE_ORDER));
-        scene.flow.vary = ["constant make-base-1 charge", "constant make-base-2 weight"]
-            .map(|spec| spec.parse().expect("a correct test"))
-            .to_vec();
+        let scene = one_order(capacity, charge);
         scenes.push((format!("two orders with a charge of {charge}"), scene));
     }
     scenes.extend(robot_deliveries());
     scenes
+}
+
+/// Table 2, with a plan for one of the orders.
+pub(super) fn one_order(capacity: &str, charge: &str) -> Scene {
+    let problem = read("experiments/table2/problem.pddl");
+    let problem = problem
+        .replace("{capacity}", capacity)
+        .replace("{charge}", charge);
+    let domain = read("experiments/table2/domain.pddl");
+    let mut scene = Scene::new(&domain, &problem, Some(ONE_ORDER));
+    scene.flow.vary = ["constant make-base-1 charge", "constant make-base-2 weight"]
+        .map(|spec| spec.parse().expect("a correct test"))
+        .to_vec();
+    scene
 }
 
 /// A plan for table 2: the steps of the base run side by side.

@@ -16,7 +16,7 @@ use crate::executor::Need;
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Planned, StepId};
 use crate::odds::{Odds, Remainder};
 use crate::preparation::Region;
-use crate::quantities::{Amounts, amounts, duration_parameters, places};
+use crate::quantities::{Amounts, amounts, duration_parameters, places, value_at};
 use crate::reason::{About, Cause, Promise, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
@@ -179,7 +179,13 @@ impl Rest {
         let step = moment.news.iter().find_map(may_matter);
         if let Some(step) = step.filter(|_| self.reads_numbers && !self.is_accepted(moment.now)) {
             let (plan, values) = self.remainder(moment.now);
-            if let Some(why) = region.objection(&self.mission.task, &plan, &values) {
+            let task = &self.mission.task;
+            let guaranteed = self.mission.envelope.as_ref();
+            let why = match guaranteed.filter(|_| self.is_as_valued(&values)) {
+                Some(guaranteed) => region.objection_inside(task, &plan, &values, guaranteed),
+                None => region.objection(task, &plan, &values),
+            };
+            if let Some(why) = why {
                 let action = &self.dispatch.action(step.instance()).name;
                 let reason = Reason::new(Cause::GuaranteeLost)
                     .of(action)
@@ -196,6 +202,17 @@ impl Rest {
     fn is_accepted(&self, now: &Rational) -> bool {
         let accepted = self.accepted.as_ref();
         accepted.is_some_and(|accepted| *accepted == self.values_at(now))
+    }
+
+    /// Whether all amounts that were observed are what the plan says at these values.
+    fn is_as_valued(&self, values: &Valuation) -> bool {
+        let mut amounts = self.amounts.iter();
+        amounts.all(|(instance, is_end, measured)| {
+            let action = &self.mission.plan.plan.instance(*instance).action;
+            let duration = self.durations.get(instance).map(|own| &values[*own]);
+            value_at(action, *is_end, measured.fluent, (values, duration)).as_ref()
+                == Some(&measured.amount)
+        })
     }
 
     /// Why another plan is to be preferred. Asked when an action has ended and nothing is under

@@ -1,8 +1,6 @@
 //! The row for the best of all executors: see [`timed`](crate::timed).
 
-use elbowroom::execute::{Candidate, Candidates, Limits};
-use elbowroom_model::{Situation, Task};
-use elbowroom_sim::WorldModel;
+use elbowroom::execute::action_sets;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -76,47 +74,13 @@ fn bounds(
     };
     let (task, world) = setting.scene(column)?;
     let settings = Settings {
-        plans: plans(&setting, &task, &world, goes_on),
+        plans: action_sets(&task, &world, setting.embedded(), goes_on),
         ..Settings::default()
     };
     let found = optimum(&task, &world, &settings, goes_on);
     Ok(found
         .map(|found| (found.lower, found.upper))
         .map_err(|why| why.to_string()))
-}
-
-/// How many plans the best is sought within.
-const MOST_PLANS: usize = 8;
-
-/// How many variants of the problem they are made for at most, and how many states may be looked at for
-/// all but the first.
-const MOST_SEARCHES: usize = 8;
-const OTHER_STATES: u64 = 10_000;
-
-/// The actions of plans that differ.
-fn plans(
-    setting: &Setting<'_>,
-    task: &Task,
-    world: &WorldModel,
-    goes_on: &(dyn Fn() -> bool + Sync),
-) -> Vec<Vec<String>> {
-    let embedded = setting.embedded();
-    let limits = Limits {
-        most_states: embedded.most_states,
-        improve_states: embedded.improve_states,
-        other_states: OTHER_STATES,
-        searches: MOST_SEARCHES,
-    };
-    // What is only thought of gets no numbers.
-    let thought = task.with_own_table();
-    let situation = Situation::initial(&thought);
-    let mut source = Candidates::new(&thought, &situation, Some(world), embedded.settings, limits);
-    let plans = std::iter::from_fn(|| source.next(&mut |_| goes_on()));
-    let names = |plan: Candidate| {
-        let steps = plan.plan.steps.into_iter();
-        steps.map(|step| step.action.name.clone()).collect()
-    };
-    plans.take(MOST_PLANS).map(names).collect()
 }
 
 /// Bounds are added up as whole numbers of these, of one.

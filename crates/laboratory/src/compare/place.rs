@@ -16,7 +16,7 @@ use super::trials::{PLANS, PREPARED, Setting, world};
 use super::{Column, ExperimentError, Planning};
 use elbowroom::execute::{
     Analyst, Choice, Chooser, Known, Likeliest, Rehearse, RememberingPlanner, RememberingPreparer,
-    Replanning, Rollouts, SharedLikeliest, SharedRehearse,
+    Replanning, Rollouts, SharedLikeliest, SharedRehearse, action_sets_to_tabulate,
 };
 use elbowroom::timed::{Policy, Settings};
 
@@ -74,8 +74,15 @@ impl Setting<'_> {
             .iter()
             .any(ExecutorSpec::asks_outlook);
         let outlook = asks_outlook.then(|| {
+            let most_states = self.experiment.table_states;
+            let plans = if self.experiment.planner == Planning::Embedded && most_states > 0 {
+                action_sets_to_tabulate(task, &world, self.embedded(), goes_on)
+            } else {
+                Vec::new()
+            };
             let settings = Settings {
-                most_states: self.experiment.table_states,
+                most_states,
+                plans,
                 ..Settings::default()
             };
             let policy = Policy::close(task, &world, &settings, goes_on);

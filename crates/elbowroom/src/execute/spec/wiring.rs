@@ -19,7 +19,7 @@ use elbowroom_text::Diagnostics;
 use super::{EMBEDDED, NOBODY, RunSpec};
 use crate::execute::{
     Analyst, Chooser, Choosing, Embedded, Execution, External, FirstPlan, Known, Likeliest,
-    Rehearse, Replanning, Rollouts, SharedRehearse, Spoiling,
+    Rehearse, Replanning, Rollouts, SharedRehearse, Spoiling, action_sets_to_tabulate,
 };
 use crate::timed::{Policy, Settings};
 use crate::{BoxTextError, ChanceError, flow, parse_box};
@@ -379,13 +379,22 @@ impl RunSpec {
         let model = self.model(task.problem()).map_err(SpecError::World)?;
         let envelopes = self.envelopes_in(model.as_ref());
         let model = model.filter(|_| self.executor.asks_odds());
+        let is_embedded = matches!(self.whom()?, Whom::Embedded);
         let outlook = model.as_ref().filter(|_| self.executor.asks_outlook());
         let outlook = outlook.and_then(|model| {
-            let policy = Policy::close(task, model, &Settings::default(), &|| true);
+            let plans = if is_embedded {
+                action_sets_to_tabulate(task, model, self.embedded(), &|| true)
+            } else {
+                Vec::new()
+            };
+            let settings = Settings {
+                plans,
+                ..Settings::default()
+            };
+            let policy = Policy::close(task, model, &settings, &|| true);
             let policy = policy.ok()??;
             Some(Arc::new(policy) as Arc<dyn Outlook>)
         });
-        let is_embedded = matches!(self.whom()?, Whom::Embedded);
         let model = model.filter(|_| is_embedded);
         let rehearsal = match &outlook {
             Some(_) => None,
