@@ -66,7 +66,7 @@ struct Rest {
     /// long as they stay so, what happens only chooses among schedules all of which work.
     accepted: Option<Valuation>,
     /// Whether the plan needs more than facts, one by one, and whether durations move any number.
-    reads_numbers: bool,
+    reads_more_than_facts: bool,
     durations_move_numbers: bool,
     /// How long the actions under way may take, where the numbers limit it.
     limits: BTreeMap<InstanceId, Rational>,
@@ -80,14 +80,14 @@ impl Executor for Live {
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let plan = &mission.plan;
         let (dispatch, promise) = promise::begin(mission)?;
-        let reads_numbers = plan.reads_more_than_facts(&mission.task);
+        let reads_more_than_facts = plan.reads_more_than_facts(&mission.task);
         let mut rest = Rest {
             dispatch,
             promise,
             mission: Arc::new(mission.clone()),
             amounts: Vec::new(),
-            reads_numbers,
-            durations_move_numbers: reads_numbers && plan.durations_move_numbers(),
+            reads_more_than_facts,
+            durations_move_numbers: reads_more_than_facts && plan.durations_move_numbers(),
             limits: BTreeMap::new(),
             // What has an envelope works as planned.
             accepted: mission.envelope.is_some().then(|| plan.nominal()),
@@ -177,7 +177,9 @@ impl Rest {
         }
         // Only ends and amounts can move the rest out of its envelope.
         let step = moment.news.iter().find_map(may_matter);
-        if let Some(step) = step.filter(|_| self.reads_numbers && !self.is_accepted(moment.now)) {
+        if let Some(step) =
+            step.filter(|_| self.reads_more_than_facts && !self.is_accepted(moment.now))
+        {
             let (plan, values) = self.remainder(moment.now);
             let task = &self.mission.task;
             let guaranteed = self.mission.envelope.as_ref();

@@ -43,9 +43,9 @@ pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason
         Dispatch::controlled(mission, &reading)
     };
     // Without an envelope nothing is known of numbers but what the plan says.
-    let reads_numbers = mission.plan.reads_more_than_facts(&mission.task);
-    let knows_room = mission.envelope.is_some() || !reads_numbers;
-    most(reads_numbers, knows_room, &mut attempt)
+    let reads_more_than_facts = mission.plan.reads_more_than_facts(&mission.task);
+    let knows_room = mission.envelope.is_some() || !reads_more_than_facts;
+    most(reads_more_than_facts, knows_room, &mut attempt)
 }
 
 /// Whether a reason says that something happened at another time than the plan allows.
@@ -91,8 +91,8 @@ pub(super) fn weaken(
             .map_err(|against| behind = against)
     };
     // What numbers bear is known only where nothing has left the envelope.
-    let reads_numbers = mission.plan.reads_more_than_facts(&mission.task);
-    if let Ok(((), promise)) = most(reads_numbers, !reads_numbers, &mut attempt) {
+    let reads_more_than_facts = mission.plan.reads_more_than_facts(&mission.task);
+    if let Ok(((), promise)) = most(reads_more_than_facts, !reads_more_than_facts, &mut attempt) {
         return Ok(promise);
     }
     if reason.cause == Cause::Unreachable {
@@ -111,7 +111,7 @@ pub(super) fn weaken(
 /// The first attempt to succeed, with what it promises. What numbers bear is known of all of the
 /// envelope, or, once something has left it (`knows_room` does not hold), of what is planned.
 fn most<T, E>(
-    reads_numbers: bool,
+    reads_more_than_facts: bool,
     knows_room: bool,
     attempt: &mut dyn FnMut(&Rational, Overrun) -> Result<T, E>,
 ) -> Result<(T, Promise), E> {
@@ -127,7 +127,7 @@ fn most<T, E>(
                 return Ok((done, promise));
             }
         }
-        if reads_numbers {
+        if reads_more_than_facts {
             break;
         }
         share = share / Rational::from(2);

@@ -8,6 +8,7 @@
 mod past;
 mod under_way;
 
+use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -172,14 +173,13 @@ pub(in crate::commands) fn run(
     };
     let task = Arc::new(super::task(&spec, output)?);
     // Before anything else is mentioned: the table of facts is as it was.
-    let snapshot = stored.snapshot();
-    let snapshot = snapshot.map_err(|error| unreadable(&name, &error.to_string()))?;
+    let wrong = |error: &dyn fmt::Display| unreadable(&name, &error.to_string());
+    let snapshot = stored.snapshot().map_err(|error| wrong(&error))?;
     let stand = snapshot.as_ref().map(|it| it.stand(&task)).transpose();
     let stand = stand.map_err(|why| unreadable(&name, &format!("line 2: {why}")))?;
     let now = snapshot.as_ref().map(|it| it.now().clone());
     let first = spec.has_plan.then(|| stored.first_plan(&task)).transpose();
-    let first = first.map_err(|error| unreadable(&name, &error.to_string()))?;
-    let first = first.flatten();
+    let first = first.map_err(|error| wrong(&error))?.flatten();
     let mut file = JournalFile::go_on(path, &journal, length)?.in_segments(host.segments());
     let interrupt = Interrupt::listen();
     let attendance = host.attend(&spec, &task, &interrupt)?;
