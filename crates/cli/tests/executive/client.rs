@@ -186,12 +186,20 @@ impl Executive {
         Some((status, serde_json::from_str(text).ok()?))
     }
 
-    /// The page.
+    /// The page, which is there as soon as the problem is taken up.
     pub(crate) fn page(&self) -> String {
-        let stream = TcpStream::connect(self.address()).expect("it listens");
-        let (status, text) = said(stream, "GET", "/", None, "");
-        assert_eq!(status, 200, "{text}");
-        text
+        let mut last = String::new();
+        for _ in 0..MOST_GLANCES {
+            let stream = TcpStream::connect(self.address()).expect("it listens");
+            let (status, text) = said(stream, "GET", "/", None, "");
+            match status {
+                200 => return text,
+                409 => last = text,
+                _ => panic!("{status}: {text}"),
+            }
+            std::thread::sleep(GLANCE);
+        }
+        panic!("there is no page: {last}");
     }
 
     /// Waits until things stand like that.
