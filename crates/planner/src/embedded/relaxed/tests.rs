@@ -8,12 +8,12 @@ use elbowroom_model::problem::Comparison;
 use elbowroom_model::reachability::{self, Answer};
 use elbowroom_num::Rational;
 use proptest::prelude::*;
-use proptest::test_runner::TestRunner;
+use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 
 use super::graph::{Gain, Kind};
 use super::{Estimate, MOST, Relaxed, UNREACHED};
 use crate::embedded::apply::{Step, Stepper};
-use crate::embedded::compile::{Compiled, Compressibility, Wanted, compile};
+use crate::embedded::compile::{Compiled, Compressibility, NONE, Wanted, compile};
 use crate::embedded::pairs::tests::{Draft, drafts, numeric_drafts};
 use crate::embedded::root::root;
 use crate::embedded::state::State;
@@ -153,11 +153,14 @@ fn compare(
         "{stopped:?}, {full:?}"
     );
     assert!(stopped.steps <= full.steps, "{stopped:?}, {full:?}");
-    if let Some(least) = compresses
-        && stopped.steps != full.steps
-    {
+    if stopped.steps != full.steps {
         // An end by itself, of an action that is not compressed, may be missing.
-        let has_end = |&action: &u32| compiled.action(action).compressibility < least;
+        let graph = &late.graph;
+        let has_end = |&action: &u32| {
+            let (start, end) = graph.operators_of(action);
+            let start = graph.operators.get(start as usize);
+            end != NONE && start.is_some_and(|start| start.kind == Kind::Start(action))
+        };
         assert!(full.actions.iter().any(has_end), "{stopped:?}, {full:?}");
     }
 }
@@ -232,12 +235,12 @@ fn an_estimate_that_stops_early_is_that_of_all_that_can_be_reached_with_numbers(
     };
     let failed = Cell::new(0);
     let way = (numeric_drafts(), prices(), choices());
-    TestRunner::new(config)
+    // How many tests are not passed differs from one set of random problems to the next: they are the same each time.
+    TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha))
         .run(&way, |(draft, prices, choices)| {
             failed.set(failed.get() + walk(&draft, &prices, &choices));
             Ok(())
         })
         .expect("the estimates agree");
-    // How many there are differs from one set of random problems to the next.
     assert!(failed.get() > 100, "{}", failed.get());
 }
