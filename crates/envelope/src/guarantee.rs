@@ -1,7 +1,7 @@
 //! What is guaranteed inside a box, and the half of the box check that depends on it.
 
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
@@ -73,8 +73,15 @@ pub(crate) enum Controllability {
 #[derive(Clone, Debug)]
 pub(crate) struct Control {
     pub(crate) plan: Arc<ParametrizedPlan>,
-    /// That there is no schedule at all is the better reason, where it is one.
-    feasibility: Feasibility,
+    /// That there is no schedule at all is the better reason, where it is one. Of many plans it is never asked.
+    feasibility: OnceLock<Feasibility>,
+}
+
+impl Control {
+    fn feasibility(&self) -> &Feasibility {
+        let make = || Feasibility::new(&self.plan, &Reduction::new(&self.plan));
+        self.feasibility.get_or_init(make)
+    }
 }
 
 /// Why a plan cannot be scheduled as demanded; [`Controllability::objection`] works out the values.
@@ -85,19 +92,21 @@ pub(crate) enum Uncontrollable {
 }
 
 impl Controllability {
-    /// For this plan.
+    /// For this plan, whose reduced network may be known already.
     pub(crate) fn new(
         guarantee: Guarantee,
         plan: &Arc<ParametrizedPlan>,
-        reduction: &Reduction,
+        reduction: Option<&Reduction>,
     ) -> Self {
-        let feasibility = Feasibility::new(plan, reduction);
-        let control = |feasibility| Control {
+        let feasibility = reduction.map(|reduction| Feasibility::new(plan, reduction));
+        let control = |feasibility: Option<Feasibility>| Control {
             plan: Arc::clone(plan),
-            feasibility,
+            feasibility: feasibility.map(OnceLock::from).unwrap_or_default(),
         };
         match guarantee {
-            Guarantee::Weak => Self::Weak(feasibility),
+            Guarantee::Weak => Self::Weak(
+                feasibility.unwrap_or_else(|| Feasibility::new(plan, &Reduction::new(plan))),
+            ),
             Guarantee::Dynamic => Self::Dynamic(control(feasibility), DynamicControl::default()),
             Guarantee::Strong => Self::Strong(control(feasibility)),
         }
@@ -139,10 +148,10 @@ impl Controllability {
     }
 
     fn feasibility(&self) -> &Feasibility {
-        let (Self::Weak(feasibility)
-        | Self::Dynamic(Control { feasibility, .. }, _)
-        | Self::Strong(Control { feasibility, .. })) = self;
-        feasibility
+        match self {
+            Self::Weak(feasibility) => feasibility,
+            Self::Dynamic(control, _) | Self::Strong(control) => control.feasibility(),
+        }
     }
 
     /// What stands against the box, in terms of other boxes.

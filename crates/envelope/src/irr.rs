@@ -1,6 +1,7 @@
 //! Incremental Rectangular Robustification.
 
 mod ahead;
+mod own_bounds;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -147,30 +148,34 @@ pub fn irr(
     let plan = Arc::clone(oracle.plan());
     let already = oracle.checks();
     let envelope = DecoupledEnvelope::point(&plan.nominal());
-    if let Some(objection) = oracle.start(&envelope)? {
-        return Ok(IrrRun {
-            envelope: Err(objection),
-            widenings: 0,
-            checks: oracle.checks() - already,
-            stop: StopReason::Converged,
-        });
-    }
-    let frontier = Frontier::new(
-        &plan,
-        settings.precisions(&plan),
-        settings
-            .relative
-            .is_some()
-            .then(|| scales(&plan))
-            .as_deref(),
-        settings.growth,
-    );
-    let mut search = Ahead::new(oracle, settings, frontier, envelope);
+    let scales = settings.relative.is_some().then(|| scales(&plan));
+    let precisions = settings.precisions(&plan);
+    let frontier = Frontier::new(&plan, precisions, scales.as_deref(), settings.growth);
     let mut widenings = 0;
-    let stop = search.run(&mut |widening| {
+    let mut count = |widening: Option<&Widening<'_>>| {
         widenings += usize::from(widening.is_some());
         on_step(widening)
-    });
+    };
+    let asks_little = oracle.asks_little();
+    let mut search = Ahead::new(oracle, settings, frontier, envelope);
+    // A box that is inside shows that the nominal values, which it holds, are so, too.
+    let at_once = asks_little
+        .then(|| search.run_at_once(&mut count))
+        .flatten();
+    let stop = match at_once {
+        Some(stop) => stop,
+        None => match search.start()? {
+            None => search.run(&mut count),
+            Some(objection) => {
+                return Ok(IrrRun {
+                    envelope: Err(objection),
+                    widenings: 0,
+                    checks: oracle.checks() - already,
+                    stop: StopReason::Converged,
+                });
+            }
+        },
+    };
     let (checks, envelope) = (search.checks(), search.finish());
     oracle.count_checks(already + checks);
     Ok(IrrRun {

@@ -13,8 +13,7 @@ use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
 use crate::known::Known;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
-use crate::reduction::Reduction;
-use crate::soundness::{Asked, Broken, Conditions, Counterexample, Soundness};
+use crate::soundness::{Broken, Conditions, Counterexample, Soundness};
 
 /// Decides whether a plan is guaranteed to work in a box: for all values in it there is a
 /// schedule, and every schedule is valid (paper 1, CHECKINENVELOPE and theorem 1). "There is a
@@ -43,7 +42,8 @@ pub struct Oracle {
     guarantee: Guarantee,
     asked: Asked,
     controllability: Controllability,
-    /// The conditions on all schedules; `None` while no values with a schedule are known.
+    /// The conditions on all schedules; `None` while no values with a schedule are known, and where they are not asked
+    /// about.
     soundness: Option<Soundness>,
     /// The values whose order of happenings `soundness` goes by; at first the nominal ones.
     around: Valuation,
@@ -59,6 +59,15 @@ pub struct Oracle {
     without_schedule: usize,
     /// What the last search has found out.
     known: Known,
+}
+
+/// What of a plan is asked about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asked {
+    /// Every condition that all its schedules have to meet, and the times.
+    All,
+    /// Nothing but the times: its network is known to see to the conditions.
+    Times,
 }
 
 /// An [`Objection`] before the values are worked out.
@@ -104,11 +113,12 @@ impl Oracle {
         asked: Asked,
     ) -> Result<Self, Refusal> {
         let around = plan.nominal();
-        let soundness = Soundness::around(task, plan, &around, asked)?;
-        let controllability = match &soundness {
-            Some(soundness) => Controllability::new(guarantee, plan, soundness.reduction()),
-            None => Controllability::new(guarantee, plan, &Reduction::new(plan)),
+        let soundness = match asked {
+            Asked::All => Soundness::around(task, plan, &around)?,
+            Asked::Times => None,
         };
+        let reduction = soundness.as_ref().map(Soundness::reduction);
+        let controllability = Controllability::new(guarantee, plan, reduction);
         Ok(Self {
             task: Arc::clone(task),
             plan: Arc::clone(plan),
@@ -331,6 +341,26 @@ impl Oracle {
         moved: Option<BoxEnd>,
         trusted: Option<BoxEnd>,
     ) -> Result<Option<Reason>, Refusal> {
+        // A sound box with an infeasible one rejected afterwards would leave the networks of the
+        // feasibility check ahead of the accepted box, so soundness comes first.
+        if self.asked == Asked::All
+            && let Some(reason) = self.unsound(envelope, trusted)?
+        {
+            return Ok(Some(reason));
+        }
+        if let Some(found) = self.controllability.refuses(envelope, moved)? {
+            self.without_schedule += 1;
+            return Ok(Some(Reason::Uncontrollable(found)));
+        }
+        Ok(None)
+    }
+
+    /// Why not every schedule in the box meets the conditions, or there is none.
+    fn unsound(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        trusted: Option<BoxEnd>,
+    ) -> Result<Option<Reason>, Refusal> {
         let is_there = self.soundness.is_some() && envelope.contains(&self.around);
         let without_schedule = if is_there {
             None
@@ -342,16 +372,8 @@ impl Oracle {
             let values = without_schedule.unwrap_or_else(|| self.around.clone());
             return Ok(Some(Reason::NoSchedule(values)));
         };
-        // A sound box with an infeasible one rejected afterwards would leave the networks of the
-        // feasibility check ahead of the accepted box, so soundness comes first.
-        if let Some(broken) = soundness.broken(&self.task, &self.plan, envelope, trusted)? {
-            return Ok(Some(Reason::Broken(broken)));
-        }
-        if let Some(found) = self.controllability.refuses(envelope, moved)? {
-            self.without_schedule += 1;
-            return Ok(Some(Reason::Uncontrollable(found)));
-        }
-        Ok(None)
+        let broken = soundness.broken(&self.task, &self.plan, envelope, trusted)?;
+        Ok(broken.map(Reason::Broken))
     }
 
     /// Goes by the order that happenings have in the box from now on. The box need not hold the
@@ -360,8 +382,7 @@ impl Oracle {
     /// Values in the box that have no schedule, if that shows already; then nothing changes.
     fn move_to(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Valuation>, Refusal> {
         let nearest = envelope.nearest(&self.plan.nominal());
-        let Some(soundness) = Soundness::around(&self.task, &self.plan, &nearest, self.asked)?
-        else {
+        let Some(soundness) = Soundness::around(&self.task, &self.plan, &nearest)? else {
             return Ok(Some(nearest));
         };
         self.refuted_before = self.refutations();

@@ -98,18 +98,9 @@ pub fn broken_in(
     envelope: &DecoupledEnvelope,
 ) -> Result<Option<Broken>, Refusal> {
     let nearest = envelope.nearest(&plan.nominal());
-    let soundness = Soundness::around(task, plan, &nearest, Asked::All)?;
+    let soundness = Soundness::around(task, plan, &nearest)?;
     let mut soundness = soundness.ok_or(Refusal::NoNominalSchedule)?;
     soundness.broken(task, plan, envelope, None)
-}
-
-/// What of a plan is asked about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Asked {
-    /// Every condition that all its schedules have to meet.
-    All,
-    /// Nothing but the times: its network is known to see to the conditions.
-    Times,
 }
 
 /// The number of conditions of a plan, by what enforces them in all its schedules.
@@ -151,16 +142,12 @@ impl Soundness {
         task: &Task,
         plan: &ParametrizedPlan,
         valuation: &Valuation,
-        asked: Asked,
     ) -> Result<Option<Self>, Refusal> {
         let reduction = Reduction::new(plan);
         let Some(schedule) = earliest_schedule(&reduction, valuation) else {
             return Ok(None);
         };
-        let obligations = match asked {
-            Asked::All => Obligations::compile(task, plan, &schedule, &reduction.substitution)?,
-            Asked::Times => Obligations::default(),
-        };
+        let obligations = Obligations::compile(task, plan, &schedule, &reduction.substitution)?;
         let mut direct = Vec::new();
         for (index, obligation) in obligations.direct.iter().enumerate() {
             for (case, bad) in obligation.bad_cases.iter().enumerate() {

@@ -48,7 +48,7 @@ pub use kept::keeps_all_that_is_read;
 pub use pin::{pin_until_sound, pinned_to, with_all_sides, with_sides_one_way, without_sides};
 
 use crate::network::{Schedule, network_node};
-use crate::stn_plan::{Instance, InstanceId, Node, NodeId, StnPlan};
+use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, StnPlan};
 use crate::valuation::Valuation;
 use order::{Order, Timeline};
 
@@ -140,11 +140,9 @@ pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, Deord
     let course = course::constraints(task, &stn_plan, &footprints, &times)?;
     stn_plan.constraints.extend(course);
     let sides: Vec<_> = sides.into_constraints().collect();
-    let mut kept = stn_plan.clone();
-    kept.constraints.extend(sides.iter().cloned());
-    let nominal = nominal(task, &kept, times)?;
+    let nominal = nominal(task, &stn_plan, &sides, times)?;
     Ok(Deordered {
-        plan: implied::with_sides(without_implied(stn_plan), sides),
+        plan: implied::with_sides(without_implied(stn_plan, &nominal), sides),
         instances,
         nominal,
     })
@@ -229,12 +227,20 @@ pub(crate) fn labelled(task: &Task, plan: &TimeTriggeredPlan) -> Labelled {
 
 /// The original times, or the earliest that start nothing sooner than the original does, as far
 /// as that is possible.
-fn nominal(task: &Task, plan: &StnPlan, times: Schedule) -> Result<Schedule, DeorderError> {
+fn nominal(
+    task: &Task,
+    plan: &StnPlan,
+    sides: &[Constraint],
+    times: Schedule,
+) -> Result<Schedule, DeorderError> {
+    let mut all = plan.constraints.iter().chain(sides);
+    if times.iter().all(|time| !time.is_negative()) && all.all(|own| holds(own, &times)) {
+        return Ok(times);
+    }
+    let mut plan = plan.clone();
+    plan.constraints.extend_from_slice(sides);
     let network = plan.network(&Valuation::default());
     let original = elbowroom_stn::Schedule::from(times);
-    if original.holds_in(&network) {
-        return Ok(original.into());
-    }
     let mut network =
         ConsistentNetwork::try_from(network.clone()).map_err(|cycle| DeorderError::NoSchedule {
             nodes: cycle
@@ -256,6 +262,18 @@ fn nominal(task: &Task, plan: &StnPlan, times: Schedule) -> Result<Schedule, Deo
         }
     }
     Ok(network.earliest_schedule(zero).into())
+}
+
+/// Whether a constraint without parameters holds at these times.
+fn holds(constraint: &Constraint, times: &Schedule) -> bool {
+    let difference = &times[constraint.to] - &times[constraint.from];
+    let is_within = |bound: &Bound, is_outside: fn(&Rational, &Rational) -> bool| match bound {
+        Bound::Finite(value) => !is_outside(&difference, value),
+        Bound::Infinite => true,
+        Bound::Parameter(_) => false,
+    };
+    is_within(&constraint.lower, |difference, lower| difference < lower)
+        && is_within(&constraint.upper, |difference, upper| difference > upper)
 }
 
 #[cfg(test)]

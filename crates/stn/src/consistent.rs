@@ -55,6 +55,20 @@ impl<W: Weight> ConsistentNetwork<W> {
         }
     }
 
+    /// The network, if this is a schedule of it.
+    pub fn by(network: Network<W>, schedule: Schedule<W>) -> Option<Self> {
+        if !schedule.holds_in(&network) {
+            return None;
+        }
+        let mut repair = Repair::default();
+        repair.resize(network.node_count());
+        Some(Self {
+            network,
+            schedule,
+            repair,
+        })
+    }
+
     /// The nodes and constraints.
     pub fn network(&self) -> &Network<W> {
         &self.network

@@ -12,10 +12,12 @@ use std::sync::Arc;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
+use super::own_bounds::OwnBounds;
 use super::{MOST_UNDECIDED, Settings, StopReason, Widening, farthest};
 use crate::frontier::Frontier;
 use crate::known::Known;
 use crate::learn::Learnt;
+use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
 
@@ -34,6 +36,8 @@ pub(super) struct Ahead<'a> {
     undecided: usize,
     /// How many steps to take before the next check.
     length: usize,
+    /// What is known beforehand of how far ends can go, where the oracle is not asked.
+    bounds: Option<OwnBounds>,
 }
 
 /// A step that was taken.
@@ -59,7 +63,7 @@ struct Leap {
 }
 
 impl<'a> Ahead<'a> {
-    /// From a box that the oracle has accepted.
+    /// From the box of the nominal values.
     pub(super) fn new(
         oracle: &'a mut Oracle,
         settings: &'a Settings,
@@ -78,7 +82,38 @@ impl<'a> Ahead<'a> {
             known: Known::default(),
             checks: 1,
             undecided: 0,
+            bounds: None,
         }
+    }
+
+    /// What stands against the box that the search begins with.
+    pub(super) fn start(&mut self) -> Result<Option<Objection>, Refusal> {
+        self.oracle.start(&self.envelope)
+    }
+
+    /// Takes all steps that there are before anything is checked. That little is in the way is seen at
+    /// once so; where something is, nothing has happened. Whether anything is left to do.
+    pub(super) fn run_at_once(
+        &mut self,
+        on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
+    ) -> Option<StopReason> {
+        let length = std::mem::replace(&mut self.length, usize::MAX);
+        self.bounds = Some(OwnBounds::of(&self.plan));
+        let leap = self.leap();
+        (self.length, self.bounds) = (length, None);
+        if let Confirmed::No(cut) = self.confirmed(&leap) {
+            self.known.reset(&self.envelope);
+            if let Some(cut) = cut {
+                self.known.add(cut, &self.envelope);
+            }
+            return None;
+        }
+        self.frontier = leap.frontier.clone();
+        let flow = self.tell(&leap, on_step);
+        if flow.is_break() {
+            return Some(StopReason::Cancelled);
+        }
+        leap.end
     }
 
     /// The number of boxes decided about.
@@ -200,7 +235,11 @@ impl<'a> Ahead<'a> {
 
     /// Whether the box with that end moved is known not to be inside.
     fn is_refused(&self, end: BoxEnd, from: &Rational, to: Option<&Rational>) -> bool {
-        self.oracle.is_too_far(end, to) || self.known.refuses(end, from, to)
+        let is_too_far = match &self.bounds {
+            Some(bounds) => bounds.exclude(end, to),
+            None => self.oracle.is_too_far(end, to),
+        };
+        is_too_far || self.known.refuses(end, from, to)
     }
 
     /// Whether the box after these steps is inside the envelope; if not, what that says about

@@ -8,7 +8,7 @@ use super::Oracle;
 use crate::guarantee::{Control, Controllability};
 use crate::proved::{ConditionProof, ControlProof};
 use crate::reduction::Reduction;
-use crate::soundness::{Asked, Soundness};
+use crate::soundness::Soundness;
 
 impl Oracle {
     /// Why there are times for all nodes, whatever the values in the box are; `None` if there are
@@ -34,7 +34,7 @@ impl Oracle {
     pub fn condition_proofs(&self, envelope: &DecoupledEnvelope) -> Option<Vec<ConditionProof>> {
         let (task, plan) = (&self.task, &self.plan);
         let nominal = plan.nominal();
-        let soundness = Soundness::around(task, plan, &nominal, Asked::All).ok()??;
+        let soundness = Soundness::around(task, plan, &nominal).ok()??;
         soundness.told(task, plan, envelope)
     }
 }

@@ -3,7 +3,7 @@
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 
-use super::Oracle;
+use super::{Asked, Oracle};
 use crate::cut::{Cut, Ground};
 use crate::known::Known;
 use crate::learn::Learnt;
@@ -22,13 +22,15 @@ impl Oracle {
         self.checks += 1;
         self.remembers_accepted = false;
         self.proofs_hold_in_last = false;
-        let is_there = self.soundness.is_some() && envelope.contains(&self.around);
+        let is_there = self.asked == Asked::Times
+            || self.soundness.is_some() && envelope.contains(&self.around);
         if !is_there && self.move_to(envelope)?.is_some() {
             return Ok(Learnt::Unknown);
         }
         // What a condition says about other boxes counts where all values have a schedule.
         let learnt = self.controllability.learn(&self.plan, envelope)?;
-        if learnt != Learnt::Nothing {
+        if learnt != Learnt::Nothing || self.asked == Asked::Times {
+            self.proofs_hold_in_last = learnt == Learnt::Nothing;
             return Ok(learnt);
         }
         let Some(soundness) = &mut self.soundness else {
@@ -98,6 +100,11 @@ impl Oracle {
     /// told without looking at the other ends. `None` is infinitely far.
     pub(crate) fn is_too_far(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
         self.controllability.is_too_far(end, reach)
+    }
+
+    /// Whether a box that is far too wide takes no longer to check than a narrow one.
+    pub(crate) fn asks_little(&self) -> bool {
+        self.asked == Asked::Times
     }
 
     /// Takes a box inside the accepted one for the accepted one.

@@ -4,7 +4,7 @@ use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
-use super::{Asked, Soundness};
+use super::Soundness;
 use crate::obligations::Refusal;
 
 /// A box in which every schedule is valid. That there is a schedule for each value is not asked,
@@ -26,7 +26,7 @@ impl<'a> SoundBox<'a> {
     /// reasoning.
     pub fn new(task: &'a Task, plan: &'a ParametrizedPlan) -> Result<Option<Self>, Refusal> {
         let nominal = plan.nominal();
-        let soundness = Soundness::around(task, plan, &nominal, Asked::All)?;
+        let soundness = Soundness::around(task, plan, &nominal)?;
         let mut soundness = soundness.ok_or(Refusal::NoNominalSchedule)?;
         let envelope = DecoupledEnvelope::point(&nominal);
         let broken = soundness.broken(task, plan, &envelope, None)?;

@@ -13,7 +13,10 @@ use super::Repr::{Big, Small};
 /// A whole number, or `p/q` in lowest terms: exactly what [`FromStr`] reads back.
 impl fmt::Display for Rational {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let is_plain = f.width().is_none() && f.precision().is_none();
         match &self.0 {
+            Small(numerator, 1) if is_plain => write!(f, "{numerator}"),
+            Small(numerator, denominator) if is_plain => write!(f, "{numerator}/{denominator}"),
             Small(numerator, 1) => f.pad(&numerator.to_string()),
             Small(numerator, denominator) => f.pad(&format!("{numerator}/{denominator}")),
             Big(big) => f.pad(&big.to_string()),

@@ -1,66 +1,37 @@
 //! Leaves out constraints that others imply.
 
-use std::collections::BTreeSet;
-
 use elbowroom_num::{CommonDenominator, Rational};
-use elbowroom_stn::{ConsistentNetwork, ConstraintId, Network, Weight};
+use elbowroom_stn::{ConsistentNetwork, Network, Weight};
 
-use crate::network::network_node;
+use crate::network::{Schedule, network_node};
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
-use crate::valuation::Valuation;
 
 /// The plan without the bounds that its other constraints imply whatever its durations and
 /// timed initials are.
 ///
 /// Durations and times of timed initials stay, and count only as not negative here: either may
-/// become a parameter later, and then what it alone implied would be lost. A plan that has
-/// parameters, or no schedule, is returned as it is.
+/// become a parameter later, and then what it alone implied would be lost. A plan of which these times are no
+/// schedule is returned as it is.
+///
+/// What is left is the same for all schedules; how soon it is found is not. In a schedule in which actions take their
+/// time, what a constraint of a long plan may follow from is near it. In one in which nothing takes time, all of the plan
+/// is, and each constraint would be looked for in all of it.
 #[must_use]
-pub fn without_implied(mut plan: StnPlan) -> StnPlan {
-    let mut network = Network::with_nodes(plan.nodes.len());
-    let mut kept = BTreeSet::new();
-    let mut keep_later = |network: &mut Network, from, to| {
-        let least = elbowroom_stn::Constraint::at_least(from, to, Rational::ZERO);
-        kept.insert(network.add(least));
-    };
-    for (node, _) in plan.nodes().skip(1) {
-        keep_later(&mut network, network_node(NodeId::ZERO), network_node(node));
-    }
-    let mut bounds: Vec<[Option<ConstraintId>; 2]> = Vec::with_capacity(plan.constraints.len());
-    for constraint in &plan.constraints {
-        let (from, to) = (network_node(constraint.from), network_node(constraint.to));
-        if is_set(&plan, constraint) {
-            keep_later(&mut network, from, to);
-            bounds.push([None, None]);
-            continue;
-        }
-        let mut add = |bound: &Bound, is_lower: bool| match bound {
-            Bound::Finite(value) if is_lower => {
-                Some(network.add(elbowroom_stn::Constraint::at_least(from, to, value.clone())))
-            }
-            Bound::Finite(value) => {
-                Some(network.add(elbowroom_stn::Constraint::at_most(from, to, value.clone())))
-            }
-            Bound::Infinite | Bound::Parameter(_) => None,
-        };
-        bounds.push([add(&constraint.lower, true), add(&constraint.upper, false)]);
-    }
-    let spread = spread_out(&plan);
-    let keep = |id: ConstraintId| kept.contains(&id);
+pub fn without_implied(mut plan: StnPlan, times: &Schedule) -> StnPlan {
+    let Drafted { drafts, bounds } = drafted(&plan);
     // Whole numbers are several times faster.
-    let implied = match whole(&network, spread.as_ref()) {
-        Some((network, spread)) => implied_in(network, spread, keep),
-        None => implied_in(network, spread, keep),
+    let implied = match whole(&drafts, times) {
+        Some((drafts, times)) => implied_in(plan.nodes.len(), drafts, times),
+        None => implied_in(plan.nodes.len(), drafts, times.iter().cloned().collect()),
     };
-    let Some(implied) = implied else {
+    let Some(is_implied) = implied else {
         return plan;
     };
-    let implied: BTreeSet<ConstraintId> = implied.into_iter().collect();
     for (constraint, [lower, upper]) in plan.constraints.iter_mut().zip(bounds) {
-        if lower.is_some_and(|id| implied.contains(&id)) {
+        if lower.is_some_and(|id| is_implied[id]) {
             constraint.lower = Bound::Infinite;
         }
-        if upper.is_some_and(|id| implied.contains(&id)) {
+        if upper.is_some_and(|id| is_implied[id]) {
             constraint.upper = Bound::Infinite;
         }
     }
@@ -71,66 +42,108 @@ pub fn without_implied(mut plan: StnPlan) -> StnPlan {
     plan
 }
 
-/// The plan's own network, in whose earliest schedule its actions take their time.
-fn spread_out(plan: &StnPlan) -> Option<Network> {
-    let bounds = |own: &Constraint| [own.lower.parameter(), own.upper.parameter()];
-    let mut open = plan.constraints.iter().flat_map(bounds);
-    if open.any(|parameter| parameter.is_some()) {
-        return None;
+/// A constraint of a network, and whether it has to stay.
+struct Draft<W> {
+    constraint: elbowroom_stn::Constraint<W>,
+    stays: bool,
+}
+
+/// The network of a plan in which durations and times of timed initials may become anything.
+struct Drafted {
+    drafts: Vec<Draft<Rational>>,
+    /// Of each of the plan's constraints, which drafts its two bounds are.
+    bounds: Vec<[Option<usize>; 2]>,
+}
+
+fn drafted(plan: &StnPlan) -> Drafted {
+    let mut drafts = Vec::with_capacity(plan.nodes.len() + plan.constraints.len());
+    let staying = |from, to| Draft {
+        constraint: elbowroom_stn::Constraint::at_least(from, to, Rational::ZERO),
+        stays: true,
+    };
+    let zero = network_node(NodeId::ZERO);
+    for (node, _) in plan.nodes().skip(1) {
+        drafts.push(staying(zero, network_node(node)));
     }
-    Some(plan.network(&Valuation::default()))
-}
-
-/// What is implied in a network; `None` if it has no schedule.
-///
-/// It is looked for in the earliest schedule of `spread`, if it has one: there, what a constraint of a long plan
-/// may follow from is near it. In a schedule in which nothing takes time, all of the plan is, and each
-/// constraint would be looked for in all of it.
-fn implied_in<W: Weight>(
-    network: Network<W>,
-    spread: Option<Network<W>>,
-    keep: impl Fn(ConstraintId) -> bool,
-) -> Option<Vec<ConstraintId>> {
-    let network = ConsistentNetwork::try_from(network).ok()?;
-    let spread = spread.and_then(|spread| ConsistentNetwork::try_from(spread).ok());
-    let schedule = spread.map(|spread| spread.earliest_schedule(network_node(NodeId::ZERO)));
-    Some(match schedule {
-        Some(schedule) if schedule.holds_in(network.network()) => {
-            network.implied_seen_from(&schedule, keep)
+    let mut bounds = Vec::with_capacity(plan.constraints.len());
+    for constraint in &plan.constraints {
+        let (from, to) = (network_node(constraint.from), network_node(constraint.to));
+        if is_set(plan, constraint) {
+            drafts.push(staying(from, to));
+            bounds.push([None, None]);
+            continue;
         }
-        _ => network.implied(keep),
-    })
+        let mut add = |constraint| {
+            drafts.push(Draft {
+                constraint,
+                stays: false,
+            });
+            drafts.len() - 1
+        };
+        let lower = finite(&constraint.lower)
+            .map(|value| add(elbowroom_stn::Constraint::at_least(from, to, value)));
+        let upper = finite(&constraint.upper)
+            .map(|value| add(elbowroom_stn::Constraint::at_most(from, to, value)));
+        bounds.push([lower, upper]);
+    }
+    Drafted { drafts, bounds }
 }
 
-/// The networks with all bounds multiplied by their common denominator, if that leaves them so small that no
+fn finite(bound: &Bound) -> Option<Rational> {
+    match bound {
+        Bound::Finite(value) => Some(value.clone()),
+        Bound::Infinite | Bound::Parameter(_) => None,
+    }
+}
+
+/// Of each constraint, whether the others imply it; `None` if the times are no schedule.
+fn implied_in<W: Weight>(
+    node_count: usize,
+    drafts: Vec<Draft<W>>,
+    times: Vec<W>,
+) -> Option<Vec<bool>> {
+    let mut network = Network::with_nodes(node_count);
+    let mut stays = Vec::with_capacity(drafts.len());
+    for draft in drafts {
+        network.add(draft.constraint);
+        stays.push(draft.stays);
+    }
+    let network = ConsistentNetwork::by(network, elbowroom_stn::Schedule::new(times))?;
+    let mut is_implied = vec![false; stays.len()];
+    for id in network.implied(|id| stays[id.index()]) {
+        is_implied[id.index()] = true;
+    }
+    Some(is_implied)
+}
+
+/// All bounds and times multiplied by their common denominator, if that leaves them so small that no
 /// sum of them overflows.
-fn whole(
-    network: &Network,
-    spread: Option<&Network>,
-) -> Option<(Network<i128>, Option<Network<i128>>)> {
-    let both = || std::iter::once(network).chain(spread);
-    let bounds = both().flat_map(Network::constraints);
-    let unit = CommonDenominator::of(bounds.map(|constraint| &constraint.bound))?;
-    let whole = |network: &Network| {
-        let mut whole = Network::with_nodes(network.node_count());
-        for constraint in network.constraints() {
-            whole.add(elbowroom_stn::Constraint {
+fn whole(drafts: &[Draft<Rational>], times: &Schedule) -> Option<(Vec<Draft<i128>>, Vec<i128>)> {
+    let bounds = drafts.iter().map(|draft| &draft.constraint.bound);
+    let unit = CommonDenominator::of(bounds.chain(times.iter()))?;
+    let whole = |number: &Rational| unit.whole(number).map(i128::from);
+    let draft = |draft: &Draft<Rational>| {
+        let constraint = &draft.constraint;
+        Some(Draft {
+            constraint: elbowroom_stn::Constraint {
                 from: constraint.from,
                 to: constraint.to,
-                bound: i128::from(unit.whole(&constraint.bound)?),
-            });
-        }
-        Some(whole)
+                bound: whole(&constraint.bound)?,
+            },
+            stays: draft.stays,
+        })
     };
-    let spread = match spread {
-        Some(spread) => Some(whole(spread)?),
-        None => None,
-    };
-    Some((whole(network)?, spread))
+    Some((
+        drafts.iter().map(draft).collect::<Option<_>>()?,
+        times.iter().map(whole).collect::<Option<_>>()?,
+    ))
 }
 
 /// The plan with those of the sides that its other constraints do not imply.
 pub(super) fn with_sides(mut plan: StnPlan, mut sides: Vec<Constraint>) -> StnPlan {
+    if sides.is_empty() {
+        return plan;
+    }
     // As above, but sides are least distances and may be given up: none makes another needless.
     let mut network = Network::with_nodes(plan.nodes.len());
     for constraint in &plan.constraints {
