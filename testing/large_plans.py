@@ -19,9 +19,26 @@ import rounds
 ROBOTS, DOCKS = 20, 4
 
 
-def begun(trace):
-    """Whether a command is in the trace."""
-    return trace.exists() and b'"event":"command"' in trace.read_bytes()[:50_000_000]
+COMMAND = b'"event":"command"'
+
+
+class Trace:
+    """What has been read of a trace; each byte is read once."""
+
+    def __init__(self, path):
+        self.path, self.read, self.end = path, 0, b""
+
+    def has_command(self):
+        """Whether a command is among what has come in since the last time."""
+        if not self.path.exists():
+            return False
+        with self.path.open("rb") as file:
+            file.seek(self.read)
+            new = file.read()
+        self.read += len(new)
+        text = self.end + new
+        self.end = text[-len(COMMAND) :]
+        return COMMAND in text
 
 
 def peak(process):
@@ -54,9 +71,10 @@ def row(program, executor, points, patience, has_numbers):
         begin = time.monotonic()
         process = subprocess.Popen(line, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         memory = at_first = None
+        trace = Trace(folder / "trace.jsonl")
         while process.poll() is None and memory is None:
-            time.sleep(0.005)
-            if begun(folder / "trace.jsonl"):
+            time.sleep(0.002)
+            if trace.has_command():
                 memory, at_first = peak(process), processor(process)
             if time.monotonic() - begin > patience:
                 process.kill()

@@ -167,6 +167,12 @@ fn without_a_problem_it_waits_for_one_and_takes_others_afterwards() {
     );
     let (status, refusal) = own.post("/v1/goals", &json!({"goal": "(done a1)"}));
     assert_eq!(status, 409, "{refusal}");
+    let (status, page) = own.page_now();
+    let asks_again = page.contains("http-equiv=\"refresh\"");
+    assert!(
+        status == 409 && asks_again && page.contains("elbowroom ctl problem FILE"),
+        "{page}"
+    );
     let (status, refusal) = own.put("/v1/problem", &json!({"problem": "(define"}));
     assert_eq!(status, 422, "{refusal}");
     let text = fs::read_to_string(command::root().join(PROBLEM)).expect("a problem");

@@ -156,7 +156,7 @@ impl Dispatch {
             requirements: network.requirements,
             links: network.links,
         };
-        let form = mission.forms.of(&network.network);
+        let form = mission.forms.of(network.network);
         let form = form.map_err(|behind| Box::new(contradiction(mission, &sources, &behind)))?;
         let horizon = Horizon::dispatchable(form);
         let bounds = |constraint: &Constraint| bounds_of(reading(constraint));
@@ -240,10 +240,10 @@ impl Dispatch {
         bounds: &dyn Fn(&Constraint) -> Bounds,
     ) -> Self {
         let plan = mission.plan.plan.clone();
-        let at_nominal = plan.at(&mission.plan.nominal());
+        let nominal = mission.plan.nominal();
         let ends = ends_of(&plan);
         let durations = durations(&plan, bounds);
-        let progress = Progress::new(&plan, &at_nominal.constraints);
+        let progress = Progress::new(&plan, &plan.constraints_at(&nominal));
         let timed = plan
             .nodes()
             .filter(|(_, what)| matches!(what, Node::Timed(_)));
@@ -253,11 +253,7 @@ impl Dispatch {
         timed.sort_by(|one, other| other.cmp(one));
         let mut dispatch = Self {
             task: Arc::clone(&mission.task),
-            actions: at_nominal
-                .instances
-                .into_iter()
-                .map(|instance| instance.action)
-                .collect(),
+            actions: plan.actions_at(&nominal),
             plan,
             nominal: mission.nominal.clone(),
             origin: mission.origin.clone(),

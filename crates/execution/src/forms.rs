@@ -14,26 +14,57 @@ const MOST: usize = 8;
 /// The form of a network, or what stands against there being one.
 pub(crate) type Form = Result<Arc<Dispatchable<Rational>>, Vec<NetworkLimit>>;
 
+/// A network that somebody has asked for.
+#[derive(Clone)]
+enum Known {
+    /// Its form, which has the network.
+    Controllable(Arc<Dispatchable<Rational>>),
+    /// The network, and what stands against it.
+    Refused(Arc<UncertainNetwork>, Vec<NetworkLimit>),
+}
+
 /// The dispatchable forms of the networks of a plan, each computed once for all executions of it.
 ///
 /// Copies share what they remember. Networks are compared in full, so that it makes no difference
 /// to any answer what is remembered.
 #[derive(Clone, Default)]
-pub struct Forms(Arc<Mutex<Vec<(UncertainNetwork, Form)>>>);
+pub struct Forms(Arc<Mutex<Vec<Known>>>);
+
+impl Known {
+    fn network(&self) -> &UncertainNetwork {
+        match self {
+            Self::Controllable(form) => form.network(),
+            Self::Refused(network, _) => network,
+        }
+    }
+
+    fn form(&self) -> Form {
+        match self {
+            Self::Controllable(form) => Ok(Arc::clone(form)),
+            Self::Refused(_, limits) => Err(limits.clone()),
+        }
+    }
+}
 
 impl Forms {
     /// The form of a network.
-    pub(crate) fn of(&self, network: &UncertainNetwork) -> Form {
+    pub(crate) fn of(&self, network: UncertainNetwork) -> Form {
         let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = known().iter().find(|(known, _)| known == network).cloned();
-        if let Some((_, form)) = same {
-            return form;
+        let same = known()
+            .iter()
+            .find(|known| *known.network() == network)
+            .cloned();
+        if let Some(same) = same {
+            return same.form();
         }
-        let form = network.dispatchable().map(Arc::new);
-        let form = form.map_err(|conflict| grounds(&conflict.steps));
+        let found = match network.into_dispatchable() {
+            Ok(form) => Known::Controllable(Arc::new(form)),
+            Err((network, conflict)) => Known::Refused(Arc::new(network), grounds(&conflict.steps)),
+        };
+        let form = found.form();
         let mut known = known();
         if known.len() < MOST {
-            known.push((network.clone(), form.clone()));
+            known.push(found);
         }
         form
     }

@@ -1,15 +1,16 @@
 //! From a plan to its temporal network, and from a schedule back to a plan with fixed times.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use elbowroom_model::ground::{Body, Expression};
+use elbowroom_model::ground::{Action, Body, Expression};
 use elbowroom_model::problem::Unknown;
 use elbowroom_model::{Step, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_stn::Network;
 
 use crate::numbers::numbers_by_id;
-use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
+use crate::stn_plan::{Bound, Constraint, Instance, Node, NodeId, Reason, StnPlan};
 use crate::valuation::{ParameterId, Valuation};
 
 /// A time for each node of an [`StnPlan`], by position.
@@ -101,28 +102,46 @@ impl StnPlan {
     /// The plan with these values in place of its parameters.
     #[must_use]
     pub fn at(&self, valuation: &Valuation) -> Self {
-        let mut plan = self.clone();
-        for instance in &mut plan.instances {
-            let mut is_open = false;
-            let action = instance.action.map_leaves(&mut |leaf| match leaf {
-                Expression::Unknown(Unknown::Parameter(index)) => {
-                    is_open = true;
-                    Some(Expression::Constant(valuation[ParameterId(*index)].clone()))
-                }
-                _ => None,
-            });
-            if is_open {
-                instance.action = Arc::new(action);
-            }
+        let actions = self.actions_at(valuation);
+        let instances = self.instances.iter().zip(actions);
+        Self {
+            instances: instances
+                .map(|(instance, action)| Instance {
+                    label: instance.label.clone(),
+                    action,
+                })
+                .collect(),
+            nodes: self.nodes.clone(),
+            constraints: self.constraints_at(valuation),
         }
-        for constraint in &mut plan.constraints {
-            for bound in [&mut constraint.lower, &mut constraint.upper] {
-                if let Bound::Parameter(id) = bound {
-                    *bound = Bound::Finite(valuation[*id].clone());
-                }
-            }
-        }
-        plan
+    }
+
+    /// The actions of its instances, with these values in place of its parameters. What is one action in the plan is
+    /// one here.
+    pub fn actions_at(&self, valuation: &Valuation) -> Vec<Arc<Action>> {
+        let mut known: HashMap<*const Action, Arc<Action>> = HashMap::new();
+        let actions = self.instances.iter().map(|instance| {
+            let at = known.entry(Arc::as_ptr(&instance.action));
+            let make = || action_at(&instance.action, valuation);
+            Arc::clone(at.or_insert_with(make))
+        });
+        actions.collect()
+    }
+
+    /// Its constraints, with these values in place of its parameters.
+    pub fn constraints_at(&self, valuation: &Valuation) -> Vec<Constraint> {
+        let at = |bound: &Bound| match bound {
+            Bound::Parameter(id) => Bound::Finite(valuation[*id].clone()),
+            known => known.clone(),
+        };
+        let constraints = self.constraints.iter().map(|constraint| Constraint {
+            from: constraint.from,
+            to: constraint.to,
+            lower: at(&constraint.lower),
+            upper: at(&constraint.upper),
+            reason: constraint.reason.clone(),
+        });
+        constraints.collect()
     }
 
     /// What is left of the plan `now`: what has happened stays where it is, and of the rest what
@@ -183,5 +202,22 @@ impl StnPlan {
         }
         steps.sort_by(|a, b| a.start.cmp(&b.start));
         TimeTriggeredPlan { steps }
+    }
+}
+
+/// The action with these values in place of its parameters; itself if it has none.
+fn action_at(action: &Arc<Action>, valuation: &Valuation) -> Arc<Action> {
+    let mut is_open = false;
+    let at = action.map_leaves(&mut |leaf| match leaf {
+        Expression::Unknown(Unknown::Parameter(index)) => {
+            is_open = true;
+            Some(Expression::Constant(valuation[ParameterId(*index)].clone()))
+        }
+        _ => None,
+    });
+    if is_open {
+        Arc::new(at)
+    } else {
+        Arc::clone(action)
     }
 }

@@ -4,7 +4,7 @@
 //! { "exact": "1393/2", "decimal": 696.5 }
 //! ```
 
-use std::borrow::Cow;
+use std::fmt::Display;
 
 use elbowroom_num::{End, Rational};
 use serde::de::Error;
@@ -20,11 +20,24 @@ pub const MINUS_INFINITY: &str = "-inf";
 pub struct Exact(pub Rational);
 
 /// Either member of the pair, as it stands.
-#[derive(Serialize, Deserialize)]
-struct Pair<'a> {
-    exact: Cow<'a, str>,
+#[derive(Deserialize)]
+struct Pair {
+    exact: String,
     /// For readers without fractions; ignored when read.
+    #[serde(rename = "decimal")]
+    _decimal: Option<f64>,
+}
+
+/// The pair of a number, which is written digit by digit: traces have a great many of them.
+#[derive(Serialize)]
+struct Written<T: Display> {
+    #[serde(serialize_with = "text")]
+    exact: T,
     decimal: Option<f64>,
+}
+
+fn text<T: Display, S: Serializer>(exact: &T, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(exact)
 }
 
 impl Serialize for Exact {
@@ -50,8 +63,8 @@ impl From<Rational> for Exact {
 /// # Errors
 /// As the serializer.
 pub fn serialize<S: Serializer>(number: &Rational, serializer: S) -> Result<S::Ok, S::Error> {
-    let pair = Pair {
-        exact: Cow::Owned(number.to_string()),
+    let pair = Written {
+        exact: number,
         decimal: Some(number.to_f64()),
     };
     pair.serialize(serializer)
@@ -155,8 +168,8 @@ fn serialize_end<S: Serializer>(
 /// # Errors
 /// As the serializer.
 pub fn infinite<S: Serializer>(infinity: &'static str, serializer: S) -> Result<S::Ok, S::Error> {
-    let pair = Pair {
-        exact: Cow::Borrowed(infinity),
+    let pair = Written {
+        exact: infinity,
         decimal: None,
     };
     pair.serialize(serializer)

@@ -186,12 +186,17 @@ impl Executive {
         Some((status, serde_json::from_str(text).ok()?))
     }
 
+    /// What is there in place of the page at this moment, with its status.
+    pub(crate) fn page_now(&self) -> (u16, String) {
+        let stream = TcpStream::connect(self.address()).expect("it listens");
+        said(stream, "GET", "/", None, "")
+    }
+
     /// The page, which is there as soon as the problem is taken up.
     pub(crate) fn page(&self) -> String {
         let mut last = String::new();
         for _ in 0..MOST_GLANCES {
-            let stream = TcpStream::connect(self.address()).expect("it listens");
-            let (status, text) = said(stream, "GET", "/", None, "");
+            let (status, text) = self.page_now();
             match status {
                 200 => return text,
                 409 => last = text,

@@ -3,6 +3,7 @@
 use elbowroom_num::{CommonDenominator, Rational};
 
 use super::dispatchable::Dispatchable;
+use super::graph::Graph;
 use super::{Conflict, ContingentLink, UncertainNetwork};
 use crate::{Constraint, Network};
 
@@ -104,13 +105,30 @@ impl UncertainNetwork<Rational> {
     /// # Errors
     /// The cycle that shows that the network is not dynamically controllable.
     pub fn dispatchable(&self) -> Result<Dispatchable<Rational>, Conflict> {
+        let graph = self.searched()?;
+        Ok(Dispatchable::new(self.clone(), graph))
+    }
+
+    /// The same, of a network that is in the form afterwards.
+    ///
+    /// # Errors
+    /// The network, and the cycle that shows that it is not dynamically controllable.
+    #[allow(clippy::result_large_err, reason = "the network is given back")]
+    pub fn into_dispatchable(self) -> Result<Dispatchable<Rational>, (Self, Conflict)> {
+        match self.searched() {
+            Ok(graph) => Ok(Dispatchable::new(self, graph)),
+            Err(conflict) => Err((self, conflict)),
+        }
+    }
+
+    fn searched(&self) -> Result<Graph<Rational>, Conflict> {
         let Some(whole) = self.whole() else {
-            return self.dynamic();
+            return self.search(true);
         };
         let fraction = |number: i64| whole.unit.fraction(number);
-        match whole.network.search(true) {
-            Ok(graph) => Ok(Dispatchable::new(self.clone(), graph.map(fraction))),
-            Err(conflict) => Err(conflict.map(fraction)),
-        }
+        let found = whole.network.search(true);
+        found
+            .map(|graph| graph.map(fraction))
+            .map_err(|conflict| conflict.map(fraction))
     }
 }

@@ -223,13 +223,13 @@ fn headline(balance: &Balance, parameters: &[Room]) -> String {
     line
 }
 
-/// How conditions on numbers are met, and what the dispatcher keeps to beside the network.
+/// How conditions that are no bounds on one difference are met, and what the dispatcher keeps to beside the network.
 fn met(conditions: &Conditions) -> Option<String> {
     let mut met = Vec::new();
     if conditions.all_schedules > 0 {
         let count = conditions.all_schedules;
         met.push(format!(
-            "Conditions on numbers, met by every schedule within the windows: {count}."
+            "Conditions on numbers or several facts, met by every schedule: {count}."
         ));
     }
     if conditions.enforced > 0 {

@@ -21,6 +21,13 @@ const JSON: &str = "application/json";
 const TEXT: &str = "text/plain; charset=utf-8";
 const HTML: &str = "text/html; charset=utf-8";
 
+/// The page while there is no problem, or it is not taken up yet: it asks again by itself.
+const WAITING: &str = "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
+    <meta http-equiv=\"refresh\" content=\"1\">\n<title>Elbowroom</title>\n\
+    <h1>Waiting for a problem</h1>\n\
+    <p>The executive has no problem yet. Give it one with <code>elbowroom ctl problem FILE</code>; \
+    this page shows the run as soon as there is one.</p>\n</html>\n";
+
 /// How often it is looked whether the executive was asked to end.
 const GLANCE: Duration = Duration::from_millis(100);
 
@@ -151,10 +158,8 @@ impl Front {
     fn answer(&self, request: &Request, stream: &mut Stream) -> Result<io::Result<()>, Refused> {
         let broken = |why: String| Refused::new(500, why, "this is a bug; please report it");
         Ok(match (request.verb.as_str(), request.path.as_str()) {
-            ("GET", "/") => {
-                self.run()?;
-                respond(stream, 200, HTML, &self.board.page().map_err(broken)?)
-            }
+            ("GET", "/") if self.run().is_err() => respond(stream, 409, HTML, WAITING),
+            ("GET", "/") => respond(stream, 200, HTML, &self.board.page().map_err(broken)?),
             ("GET", "/document") => {
                 self.run()?;
                 respond(stream, 200, JSON, &self.board.document().map_err(broken)?)
