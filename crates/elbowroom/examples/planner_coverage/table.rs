@@ -155,8 +155,9 @@ fn score(runs: &BTreeMap<&str, &Row>, planner: &str) -> f64 {
     let best = values.reduce(if more { f64::max } else { f64::min });
     match (best, value(row)) {
         (Some(best), Some(own)) if best.total_cmp(&own).is_eq() => 1.0,
-        (Some(best), Some(own)) if best > 0.0 && own > 0.0 => {
-            if more {
+        // Below zero, the better value is the larger one by its size where less is better.
+        (Some(best), Some(own)) if best * own > 0.0 => {
+            if more == (best > 0.0) {
                 own / best
             } else {
                 best / own
