@@ -9,6 +9,8 @@ mod segments;
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
+#[cfg(unix)]
+use std::time::Duration;
 
 use crate::exit::Failure;
 use crate::words::plain;
@@ -148,6 +150,12 @@ impl JournalFile {
     }
 }
 
+/// How often it is looked whether another program still claims a journal, and after which time: for two seconds.
+#[cfg(unix)]
+const MOST_GLANCES: usize = 100;
+#[cfg(unix)]
+const GLANCE: Duration = Duration::from_millis(20);
+
 /// Keeps every other program from writing this journal, until this one ends, however it does. Where
 /// files cannot be locked, nothing is kept.
 fn claim(path: &Path, file: &File) -> Result<(), Failure> {
@@ -155,8 +163,15 @@ fn claim(path: &Path, file: &File) -> Result<(), Failure> {
     {
         use rustix::fs::{FlockOperation, flock};
         use rustix::io::Errno;
-        if flock(file, FlockOperation::NonBlockingLockExclusive) == Err(Errno::WOULDBLOCK) {
-            return Err(under_way(path));
+        // A program that was killed while it started another one leaves its claim to that, until the other is what
+        // it is to be.
+        let mut glances = 0;
+        while flock(file, FlockOperation::NonBlockingLockExclusive) == Err(Errno::WOULDBLOCK) {
+            if glances == MOST_GLANCES {
+                return Err(under_way(path));
+            }
+            glances += 1;
+            std::thread::sleep(GLANCE);
         }
     }
     #[cfg(not(unix))]
