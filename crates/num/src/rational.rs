@@ -236,6 +236,9 @@ impl Rational {
     /// The number in decimal notation with at most `digits` digits after the point, rounded
     /// half away from zero, without trailing zeros: `1/3` with 3 digits is `0.333`.
     pub fn to_decimal(&self, digits: u32) -> String {
+        if let Small(whole, 1) = &self.0 {
+            return whole.to_string();
+        }
         let scale = IBig::from(10).pow(digits as usize);
         let magnitude = self.abs().to_big();
         let doubled = RBig::from(scale.clone() * IBig::from(2)) * magnitude + RBig::ONE;
