@@ -16,8 +16,9 @@ use std::sync::Arc;
 use elbowroom::execute::Analyst;
 use elbowroom::execution::{Need, Preparer};
 use elbowroom::flow;
+use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::soundness::broken_in;
-use elbowroom_envelope::{Guarantee, Oracle, irr};
+use elbowroom_envelope::{Guarantee, IrrRun, Oracle, irr};
 use elbowroom_model::validate::Settings;
 use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
@@ -146,10 +147,25 @@ fn same_envelope(task: &Task, plan: &TimeTriggeredPlan, name: &str) -> bool {
         return false;
     }
     let open = Arc::new(ready.plan);
-    let mut oracle = Oracle::new(&task, &open, Guarantee::default()).unwrap();
     let settings = flow::Settings::default().search;
-    let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
-    assert_eq!(ready.envelope, run.envelope.ok(), "{name}");
+    let search = |oracle: Result<Oracle, Refusal>| {
+        irr(&mut oracle?, &settings, &mut |_| ControlFlow::Continue(()))
+    };
+    for guarantee in Guarantee::ALL {
+        // One box after the other, and all at once where that is right: the same steps.
+        let asked = search(Oracle::new(&task, &open, guarantee));
+        let of_times = search(Oracle::of_times(&task, &open, guarantee));
+        let (Ok(asked), Ok(of_times)) = (asked, of_times) else {
+            continue;
+        };
+        let steps = |run: &IrrRun| (run.widenings, run.checks, run.stop);
+        assert_eq!(steps(&asked), steps(&of_times), "{name}, {guarantee}");
+        let (asked, of_times) = (asked.envelope.ok(), of_times.envelope.ok());
+        assert_eq!(asked, of_times, "{name}, {guarantee}");
+        if guarantee == Guarantee::default() {
+            assert_eq!(ready.envelope, asked, "{name}");
+        }
+    }
     true
 }
 
