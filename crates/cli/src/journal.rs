@@ -150,9 +150,9 @@ impl JournalFile {
     }
 }
 
-/// How often it is looked whether another program still claims a journal, and after which time: for two seconds.
+/// How often it is looked whether another program still claims a journal, and after which time: for a second.
 #[cfg(unix)]
-const MOST_GLANCES: usize = 100;
+const MOST_GLANCES: usize = 50;
 #[cfg(unix)]
 const GLANCE: Duration = Duration::from_millis(20);
 

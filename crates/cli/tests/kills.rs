@@ -354,8 +354,9 @@ fn a_run_that_is_under_way_is_not_gone_on_with_beside_it() {
         std::thread::sleep(Duration::from_millis(50));
     }
     let resume = ["run", "--resume", &journal].map(str::to_owned);
-    for line in [&resume[..], &line] {
-        let second = awaited(started(line), "the second");
+    // Both wait a little for the journal, and the first run does not last long.
+    for second in [started(&resume), started(&line)] {
+        let second = awaited(second, "the second");
         let text = String::from_utf8_lossy(&second.stderr).into_owned();
         assert_eq!(second.status.code(), Some(2), "{text}");
         assert!(text.contains("is under way"), "{text}");

@@ -1,6 +1,6 @@
 //! From a plan to its temporal network, and from a schedule back to a plan with fixed times.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_model::ground::{Action, Body, Expression};
@@ -119,7 +119,7 @@ impl StnPlan {
     /// The actions of its instances, with these values in place of its parameters. What is one action in the plan is
     /// one here.
     pub fn actions_at(&self, valuation: &Valuation) -> Vec<Arc<Action>> {
-        let mut known: HashMap<*const Action, Arc<Action>> = HashMap::new();
+        let mut known: BTreeMap<*const Action, Arc<Action>> = BTreeMap::new();
         let actions = self.instances.iter().map(|instance| {
             let at = known.entry(Arc::as_ptr(&instance.action));
             let make = || action_at(&instance.action, valuation);
