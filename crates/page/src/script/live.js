@@ -1,6 +1,7 @@
 // A run that goes on: what is new is fetched from the program that runs it, at most twice a second.
 
 const OFTEN = 500;
+const SOON = 50;
 
 // Somebody who presses a button or drags something is not interrupted.
 let released = Promise.resolve();
@@ -67,6 +68,9 @@ function liveView(update) {
     if (isBusy || isOver || !following.checked) return;
     isBusy = true;
     while (isStale && following.checked && !isOver) {
+      // The end is told right behind the last change, and nobody answers after it.
+      await new Promise((done) => setTimeout(done, SOON));
+      if (isOver) break;
       isStale = false;
       const answer = await fetch("document").catch(() => null);
       const newer = answer?.ok && (await answer.json());
