@@ -119,13 +119,18 @@ impl StnPlan {
     /// The actions of its instances, with these values in place of its parameters. What is one action in the plan is
     /// one here.
     pub fn actions_at(&self, valuation: &Valuation) -> Vec<Arc<Action>> {
-        let mut known: BTreeMap<*const Action, Arc<Action>> = BTreeMap::new();
-        let actions = self.instances.iter().map(|instance| {
-            let at = known.entry(Arc::as_ptr(&instance.action));
-            let make = || action_at(&instance.action, valuation);
-            Arc::clone(at.or_insert_with(make))
-        });
-        actions.collect()
+        let mut known: BTreeMap<usize, usize> = BTreeMap::new();
+        let mut actions: Vec<Arc<Action>> = Vec::with_capacity(self.instances.len());
+        for instance in &self.instances {
+            let address = Arc::as_ptr(&instance.action).addr();
+            let action = match known.get(&address) {
+                Some(&same) => Arc::clone(&actions[same]),
+                None => action_at(&instance.action, valuation),
+            };
+            known.entry(address).or_insert(actions.len());
+            actions.push(action);
+        }
+        actions
     }
 
     /// Its constraints, with these values in place of its parameters.

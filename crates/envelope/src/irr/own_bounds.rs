@@ -15,9 +15,11 @@ pub(super) struct OwnBounds {
 impl OwnBounds {
     pub(super) fn of(plan: &ParametrizedPlan) -> Self {
         let constraints = &plan.plan.constraints;
-        let mut differences: Vec<(NodeId, NodeId, ParameterId)> =
-            constraints.iter().filter_map(difference).collect();
-        differences.sort_unstable();
+        let mut differences: Vec<Vec<(NodeId, ParameterId)>> =
+            vec![Vec::new(); plan.plan.nodes.len()];
+        for (from, to, parameter) in constraints.iter().filter_map(difference) {
+            differences[to.index()].push((from, parameter));
+        }
         let mut bounds = Self {
             most: vec![[None, None]; plan.parameters.len()],
         };
@@ -60,16 +62,15 @@ fn difference(constraint: &Constraint) -> Option<(NodeId, NodeId, ParameterId)> 
     is_whole.then_some((constraint.from, constraint.to, parameter))
 }
 
-/// The parameters that are the difference of these times, of a list in order.
+/// The parameters that are the difference of these times, of those that each node is the later one of.
 fn with_ends(
-    differences: &[(NodeId, NodeId, ParameterId)],
-    ends: (NodeId, NodeId),
+    differences: &[Vec<(NodeId, ParameterId)>],
+    (from, to): (NodeId, NodeId),
 ) -> impl Iterator<Item = ParameterId> {
-    let first = differences.partition_point(|&(from, to, _)| (from, to) < ends);
-    let those = differences[first..].iter();
+    let those = differences[to.index()].iter();
     those
-        .take_while(move |&&(from, to, _)| (from, to) == ends)
-        .map(|&(_, _, parameter)| parameter)
+        .filter(move |(start, _)| *start == from)
+        .map(|&(_, parameter)| parameter)
 }
 
 fn finite(bound: &Bound) -> Option<&Rational> {
