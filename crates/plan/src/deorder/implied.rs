@@ -1,6 +1,6 @@
 //! Leaves out constraints that others imply.
 
-use elbowroom_num::{CommonDenominator, Rational};
+use elbowroom_num::{CommonDenominator, Delta, Rational};
 use elbowroom_stn::{ConsistentNetwork, Network, Weight};
 
 use crate::network::{Schedule, network_node};
@@ -19,10 +19,15 @@ use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 #[must_use]
 pub fn without_implied(mut plan: StnPlan, times: &Schedule) -> StnPlan {
     let Drafted { drafts, bounds } = drafted(&plan);
-    // Whole numbers are several times faster.
+    // Whole numbers are several times faster. The others are those that envelopes compute with, too, so that the
+    // search is compiled for these two alone.
     let implied = match whole(&drafts, times) {
         Some((drafts, times)) => implied_in(plan.nodes.len(), drafts, times),
-        None => implied_in(plan.nodes.len(), drafts, times.iter().cloned().collect()),
+        None => {
+            let in_delta = |number: &Rational| Some(Delta::from(number.clone()));
+            let (drafts, times) = in_terms(&drafts, times, &in_delta).expect("each number is one");
+            implied_in(plan.nodes.len(), drafts, times)
+        }
     };
     let Some(is_implied) = implied else {
         return plan;
@@ -121,21 +126,29 @@ fn implied_in<W: Weight>(
 fn whole(drafts: &[Draft<Rational>], times: &Schedule) -> Option<(Vec<Draft<i128>>, Vec<i128>)> {
     let bounds = drafts.iter().map(|draft| &draft.constraint.bound);
     let unit = CommonDenominator::of(bounds.chain(times.iter()))?;
-    let whole = |number: &Rational| unit.whole(number).map(i128::from);
+    in_terms(drafts, times, &|number| unit.whole(number).map(i128::from))
+}
+
+/// All bounds and times as other numbers, if they can be that.
+fn in_terms<W>(
+    drafts: &[Draft<Rational>],
+    times: &Schedule,
+    number: &dyn Fn(&Rational) -> Option<W>,
+) -> Option<(Vec<Draft<W>>, Vec<W>)> {
     let draft = |draft: &Draft<Rational>| {
         let constraint = &draft.constraint;
         Some(Draft {
             constraint: elbowroom_stn::Constraint {
                 from: constraint.from,
                 to: constraint.to,
-                bound: whole(&constraint.bound)?,
+                bound: number(&constraint.bound)?,
             },
             stays: draft.stays,
         })
     };
     Some((
         drafts.iter().map(draft).collect::<Option<_>>()?,
-        times.iter().map(whole).collect::<Option<_>>()?,
+        times.iter().map(number).collect::<Option<_>>()?,
     ))
 }
 
