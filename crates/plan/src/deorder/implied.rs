@@ -21,13 +21,12 @@ pub fn without_implied(mut plan: StnPlan, times: &Schedule) -> StnPlan {
     let Drafted { drafts, bounds } = drafted(&plan);
     // Whole numbers are several times faster. The others are those that envelopes compute with, too, so that the
     // search is compiled for these two alone.
-    let implied = match whole(&drafts, times) {
-        Some((drafts, times)) => implied_in(plan.nodes.len(), drafts, times),
-        None => {
-            let in_delta = |number: &Rational| Some(Delta::from(number.clone()));
-            let (drafts, times) = in_terms(&drafts, times, &in_delta).expect("each number is one");
-            implied_in(plan.nodes.len(), drafts, times)
-        }
+    let implied = if let Some((drafts, times)) = whole(&drafts, times) {
+        implied_in(plan.nodes.len(), drafts, times)
+    } else {
+        let in_delta = |number: &Rational| Some(Delta::from(number.clone()));
+        let (drafts, times) = in_terms(&drafts, times, &in_delta).expect("each number is one");
+        implied_in(plan.nodes.len(), drafts, times)
     };
     let Some(is_implied) = implied else {
         return plan;
