@@ -96,6 +96,8 @@ pub(crate) struct Refiner<'a> {
     durations: Vec<u32>,
     /// What other orders have taken so far, and what repairs have.
     work: Spent,
+    /// How much memory a repair may take, in bytes.
+    most_memory: usize,
 }
 
 /// Work, by what it was spent on.
@@ -131,6 +133,7 @@ impl<'a> Refiner<'a> {
         let durations = numbers().map(|action| (4.0 * least(action) / mean).min(32.0) as u32);
         Self {
             work: Spent::default(),
+            most_memory: usize::MAX,
             durations: durations.collect(),
             compiled,
             stepper: Stepper::new(compiled),
@@ -143,6 +146,11 @@ impl<'a> Refiner<'a> {
             fruitless: 0,
             base_costs,
         }
+    }
+
+    /// From now on a repair gives up when its nodes take more than so many bytes.
+    pub(crate) fn limit_memory(&mut self, most: usize) {
+        self.most_memory = most;
     }
 
     /// What one estimate comes to.
@@ -321,6 +329,7 @@ impl<'a> Refiner<'a> {
             compresses: self.compresses,
             most_states: tuning.repair_states
                 + tuning.repair_states_per_action * removed.len() as u64,
+            most_memory: self.most_memory,
             latest_end: &latest_end,
         };
         let tail = repair.run(&begin, ticker)?;

@@ -8,6 +8,9 @@
 //! one after the other as soon as each is possible, while the rest goes on as it was; only where
 //! something was passed over, or nothing goes on, is there another estimate.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
@@ -25,6 +28,9 @@ use super::sequence::{Item, Kind, Scene};
 /// How many nodes are looked at for each state that may be estimated.
 const NODES_PER_STATE: u64 = 8;
 
+/// The bytes that a node takes in the queue and among those known, beside its own.
+const PLACE_SIZE: usize = 96;
+
 /// A search for a repair.
 pub(super) struct Repair<'a, 'b> {
     pub(super) compiled: &'a Compiled,
@@ -40,6 +46,8 @@ pub(super) struct Repair<'a, 'b> {
     pub(super) compresses: Option<Compressibility>,
     /// How many states are looked at.
     pub(super) most_states: u64,
+    /// How much memory the nodes may take, in bytes.
+    pub(super) most_memory: usize,
     pub(super) latest_end: &'b dyn Fn(&State) -> Option<Ticks>,
 }
 
@@ -53,6 +61,18 @@ struct Node {
     item: Option<Item>,
     /// What is still to be put in, as far as that is known from the nodes before.
     intent: Option<Intent>,
+}
+
+impl Node {
+    /// An estimate of the memory it takes, in bytes.
+    fn size(&self) -> usize {
+        let intent = self.intent.as_ref();
+        size_of::<Self>()
+            + PLACE_SIZE
+            + self.scene.state.size()
+            + size_of::<u32>()
+                * (self.scene.open.len() + intent.map_or(0, |intent| intent.actions.len()))
+    }
 }
 
 /// What a relaxed plan puts in, without what is left of the plan.
@@ -76,15 +96,39 @@ impl Intent {
 /// What a search knows.
 #[derive(Default)]
 struct Tree {
-    nodes: Vec<Node>,
+    /// Of the nodes whose turn it was, each one's parent, and the item that led there.
+    nodes: Vec<(usize, Option<Item>)>,
     queue: BTreeMap<(u32, u64), Node>,
     known: Map<(u64, usize), Vec<Ticks>>,
+    /// What the nodes take that wait, in bytes, and what is known of the others.
+    memory: usize,
     /// How often each action is among what is left, from where the estimates stand on.
     left: BTreeMap<u32, u32>,
     standing: usize,
 }
 
 impl Tree {
+    /// Lets a node wait for its turn.
+    fn wait(&mut self, key: (u32, u64), node: Node) {
+        self.memory += node.size();
+        if let Some(other) = self.queue.insert(key, node) {
+            self.memory -= other.size();
+        }
+    }
+
+    /// The node whose turn it is.
+    fn next(&mut self) -> Option<Node> {
+        let (_, node) = self.queue.pop_first()?;
+        self.memory -= node.size();
+        Some(node)
+    }
+
+    /// Keeps of a node what is needed when one that follows from it leads to a plan.
+    fn keep(&mut self, node: &Node) {
+        self.memory += PLACE_SIZE;
+        self.nodes.push((node.parent, node.item));
+    }
+
     /// Whether a node differs from all before it, as far as that is looked at.
     fn is_new(&mut self, node: &Node) -> bool {
         let state = &node.scene.state;
@@ -108,9 +152,9 @@ impl Tree {
     /// The items that lead to a node.
     fn items_to(&self, mut number: usize) -> Vec<Item> {
         let mut items = Vec::new();
-        while let Some(node) = self.nodes.get(number) {
-            items.extend(node.item);
-            number = node.parent;
+        while let Some(&(parent, item)) = self.nodes.get(number) {
+            items.extend(item);
+            number = parent;
         }
         items.reverse();
         items
@@ -120,7 +164,15 @@ impl Tree {
 impl Repair<'_, '_> {
     /// The items from `begin` on, of a plan that reaches the goal in time.
     pub(super) fn run(&mut self, begin: &Scene, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
-        let mut tree = Tree::default();
+        self.search(begin, &mut Tree::default(), ticker)
+    }
+
+    fn search(
+        &mut self,
+        begin: &Scene,
+        tree: &mut Tree,
+        ticker: &mut Ticker<'_>,
+    ) -> Option<Vec<Item>> {
         for item in self.rest.iter().filter(|item| item.block != NONE) {
             *tree.left.entry(item.action).or_default() += 1;
         }
@@ -133,11 +185,12 @@ impl Repair<'_, '_> {
             item: None,
             intent: None,
         };
-        tree.queue.insert((0, 0), root);
+        tree.wait((0, 0), root);
         let (mut evaluated, mut seen) = (0, 0);
         while evaluated < self.most_states
             && seen < NODES_PER_STATE * self.most_states
-            && let Some((_, mut node)) = tree.queue.pop_first()
+            && tree.memory <= self.most_memory
+            && let Some(mut node) = tree.next()
         {
             let latest = (self.latest_end)(&node.scene.state);
             let is_in_time = latest.is_some_and(|l| node.scene.state.earliest_end() <= l);
@@ -151,13 +204,13 @@ impl Repair<'_, '_> {
             if let Some(intent) = node.intent.clone() {
                 if intent.actions.is_empty() {
                     if let Some(tail) = self.follow(&node, ticker) {
-                        tree.nodes.push(node);
+                        tree.keep(&node);
                         return Some(tree.plan_to(number, tail));
                     }
                 } else {
-                    self.put_in(&node, &intent, &[], &mut tree);
-                    if self.go_on(&node, &intent, &mut tree) {
-                        tree.nodes.push(node);
+                    self.put_in(&node, &intent, &[], tree);
+                    if self.go_on(&node, &intent, tree) {
+                        tree.keep(&node);
                         continue;
                     }
                 }
@@ -166,7 +219,7 @@ impl Repair<'_, '_> {
             if !ticker.evaluated() {
                 return None;
             }
-            self.move_to(node.place, &mut tree);
+            self.move_to(node.place, tree);
             self.relaxed.horizon = latest;
             let Some(estimate) = self.relaxed.evaluate(&node.scene.state) else {
                 continue;
@@ -181,12 +234,12 @@ impl Repair<'_, '_> {
             };
             node.intent = Some(intent.clone());
             if is_done && let Some(tail) = self.follow(&node, ticker) {
-                tree.nodes.push(node);
+                tree.keep(&node);
                 return Some(tree.plan_to(number, tail));
             }
-            self.put_in(&node, &intent, &estimate.preferred, &mut tree);
-            self.go_on(&node, &intent, &mut tree);
-            tree.nodes.push(node);
+            self.put_in(&node, &intent, &estimate.preferred, tree);
+            self.go_on(&node, &intent, tree);
+            tree.keep(&node);
         }
         None
     }
@@ -200,6 +253,10 @@ impl Repair<'_, '_> {
             .copied()
             .filter(|step| matches!(step, Step::End(_)));
         for step in starts.chain(ends) {
+            // Each step makes a state, and a relaxed plan may have thousands of them.
+            if tree.memory > self.most_memory {
+                return;
+            }
             let next = match step {
                 Step::Start(action) | Step::Compressed(action) => {
                     intent.without(action, self.costs[action as usize])
@@ -225,7 +282,7 @@ impl Repair<'_, '_> {
                     intent: (item.kind == Kind::Whole).then_some(next),
                     item: Some(item),
                 };
-                tree.queue.insert(key, next);
+                tree.wait(key, next);
             }
         }
     }
@@ -248,7 +305,7 @@ impl Repair<'_, '_> {
                 item: Some(next),
                 intent: Some(intent.clone()),
             };
-            tree.queue.insert(key, next);
+            tree.wait(key, next);
         }
         let is_end = next.kind == Kind::End;
         let is_due = match next.kind {
@@ -273,7 +330,7 @@ impl Repair<'_, '_> {
             // The end of what has been passed over is nothing new.
             intent: is_end.then(|| intent.clone()),
         };
-        tree.queue.insert(key, next);
+        tree.wait(key, next);
         is_possible || is_end
     }
 

@@ -19,6 +19,9 @@ use super::side_by_side::{Job, Tell};
 use super::strand::{Allowance, Frame, Outcome, Strand};
 use super::{Planner, share};
 
+/// Of the memory that the searches leave, the repair of each of two strands may take this part: half of it stays.
+const REPAIRS_SHARE: usize = 4;
+
 /// A search and its strategy; it is made when its first turn comes.
 pub(super) struct Entrant<'a> {
     pub(super) strategy: Strategy,
@@ -238,6 +241,12 @@ impl<'a> Planner<'a> {
         let has_second = self.improved_for >= tuning.second_strand_after;
         if has_second && refiners.len() == 1 {
             refiners.push(Nearby::new(compiled, 2));
+        }
+        // What a repair takes is free again when it is over, so it is no part of what is counted.
+        let room = frame.settings.max_memory;
+        let room = room.saturating_sub(self.progress.counts.memory) / REPAIRS_SHARE;
+        for refiner in &mut refiners {
+            refiner.limit_memory(room);
         }
         let doubled = tuning.first_leg.saturating_add(self.improved_for);
         let length = doubled.min(tuning.leg);

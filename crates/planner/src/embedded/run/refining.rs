@@ -25,6 +25,11 @@ impl<'a> Nearby<'a> {
         }
     }
 
+    /// From now on it takes no more than so many bytes at once.
+    pub(super) fn limit_memory(&mut self, most: usize) {
+        self.refiner.limit_memory(most);
+    }
+
     /// What one estimate comes to.
     pub(super) fn weight(&self) -> u64 {
         1 + self.refiner.weight()
