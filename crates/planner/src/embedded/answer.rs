@@ -11,8 +11,8 @@ use super::tuning::Tuning;
 /// Settings of the planner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// About how many bytes the search may keep. When they are used up, the search ends as if it
-    /// had been interrupted.
+    /// About how many bytes the searches may keep. When they are used up, the one that has taken the most
+    /// gives its up, and the others go on; the run ends, as if it had been interrupted, when none is left.
     pub max_memory: usize,
     /// Whether to stop at the first plan, or to go on for better ones until interrupted or until
     /// there is none.

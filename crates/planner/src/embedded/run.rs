@@ -2,6 +2,7 @@
 
 mod improve;
 mod refining;
+mod room;
 mod side_by_side;
 mod strand;
 
@@ -20,6 +21,7 @@ use super::symmetry::Symmetry;
 use super::tuning::{Member, Technique};
 use improve::Entrant;
 use refining::Nearby;
+use room::taken;
 use side_by_side::{Job, Tell, side_by_side};
 pub(super) use strand::Frame;
 use strand::{Allowance, Best, Outcome, Report, Strand};
@@ -56,6 +58,10 @@ pub(super) struct Planner<'a> {
     unreported: u64,
     /// How much work each strand has had for better plans.
     improved_for: u64,
+    /// How much of it there is at least after searches have given way to others.
+    least_work: u64,
+    /// Whether a search that had something left to look at has given way, because the memory was used up.
+    has_given_up: bool,
     /// What makes better plans of the best one.
     refiners: Vec<Nearby<'a>>,
     /// The task of the second strand.
@@ -83,6 +89,8 @@ impl<'a> Planner<'a> {
             stopped: None,
             unreported: 0,
             improved_for: 0,
+            least_work: 0,
+            has_given_up: false,
             refiners: Vec::new(),
             own_task: None,
         }
@@ -170,7 +178,7 @@ impl<'a> Planner<'a> {
         while self.is_looking() {
             turn = self.round(entrants, turn, (budget, left.filter(|_| turn == 0)));
             if entrants.iter().all(|entrant| entrant.is_over) {
-                self.stopped = self.stopped.or(Some(Stopped::Exhausted));
+                self.stopped = self.stopped.or(Some(self.all_over()));
             }
             if self.is_looking() {
                 budget = budget.saturating_mul(2);
@@ -184,6 +192,15 @@ impl<'a> Planner<'a> {
             budget = budget.min(tuning.improving_round);
         }
         First::Found { turn, budget }
+    }
+
+    /// Why a run ends whose searches are all over.
+    fn all_over(&self) -> Stopped {
+        if self.has_given_up {
+            Stopped::OutOfMemory
+        } else {
+            Stopped::Exhausted
+        }
     }
 
     fn is_looking(&self) -> bool {
@@ -238,8 +255,7 @@ impl<'a> Planner<'a> {
             .own_task
             .take()
             .unwrap_or_else(|| frame.task.with_own_table());
-        let kept = |entrant: &Entrant<'_>| entrant.search.as_ref().map_or(0, |s| s.counts().memory);
-        let memory: Vec<usize> = entrants.iter().map(kept).collect();
+        let memory: Vec<usize> = entrants.iter().map(taken).collect();
         let mut numbers = Vec::new();
         let mut jobs: Vec<Job<'_, (u64, bool)>> = Vec::new();
         for (number, entrant) in entrants.iter_mut().enumerate().skip(from) {
@@ -275,6 +291,16 @@ impl<'a> Planner<'a> {
             },
         );
         self.own_task = Some(own_task);
+        if self.stopped == Some(Stopped::OutOfMemory) && self.best.is_none() {
+            let grown = self.progress.counts.memory - base.memory;
+            let mut sizes = memory;
+            if let Some(&number) = numbers.get(last) {
+                sizes[number] += grown;
+            }
+            self.make_room(entrants, &numbers[last..], sizes);
+            (self.stopped, self.unreported) = (None, 0);
+            return 0;
+        }
         if !self.is_looking() {
             // With one thread, those that come later have not begun, and with several nobody knows how
             // far they are.

@@ -12,6 +12,7 @@ mod concurrency;
 mod course;
 mod course_twin;
 mod features;
+mod memory;
 mod metric;
 mod portfolio;
 mod refinement;

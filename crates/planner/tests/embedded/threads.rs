@@ -102,6 +102,24 @@ fn memory_ends_at_the_same_state() {
 }
 
 #[test]
+fn searches_give_way_to_the_same_one() {
+    let (domain, problem) = shelf(6);
+    let make = || task(&domain, &problem);
+    for megabytes in [2, 5] {
+        let adapt = |settings: &mut Settings| {
+            settings.max_memory = megabytes << 20;
+            settings.first_plan_only = true;
+        };
+        assert_eq!(agree(&make, &adapt, usize::MAX), 1, "{megabytes} MB");
+    }
+    let make = || shop(&made_up(1, 8, 4), true);
+    for megabytes in [1, 2] {
+        let adapt = |settings: &mut Settings| settings.max_memory = megabytes << 20;
+        assert!(agree(&make, &adapt, 60) > 0, "{megabytes} MB");
+    }
+}
+
+#[test]
 fn our_own_cases_have_the_same_plans() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");
     let mut names: Vec<_> = std::fs::read_dir(cases)

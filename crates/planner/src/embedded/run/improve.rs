@@ -51,10 +51,10 @@ impl<'a> Entrant<'a> {
 }
 
 /// Searches that take turns.
-struct Contest<'a> {
+pub(super) struct Contest<'a> {
     frame: Frame<'a>,
     symmetry: &'a Symmetry,
-    entrants: Vec<Entrant<'a>>,
+    pub(super) entrants: Vec<Entrant<'a>>,
     /// Whose turn it is.
     current: usize,
     /// What each is given in this round.
@@ -85,6 +85,11 @@ enum Rest {
 }
 
 impl<'a> Contest<'a> {
+    /// Whose turn it is may no longer be there: what it had left does not count.
+    pub(super) fn forget_turn(&mut self) {
+        (self.left, self.is_finding) = (None, false);
+    }
+
     /// Lets searches take turns for so much work. The work done, and what is left.
     fn go_on(&mut self, strand: &mut Strand<'a, '_>, most: u64) -> (u64, Rest) {
         let compiled = self.frame.compiled;
@@ -181,6 +186,7 @@ impl<'a> Planner<'a> {
             is_finding: false,
         };
         loop {
+            self.keep_room(&mut contest);
             let rest = self.leg(&mut contest);
             if let Some(stopped) = self.stopped {
                 return stopped;
@@ -189,10 +195,10 @@ impl<'a> Planner<'a> {
                 Rest::Something => false,
                 // What the searches lose may be found near the best plan.
                 Rest::OutOfReach => !self.is_refining() || self.improved_for >= self.least(),
-                Rest::Nothing => true,
+                Rest::Nothing => return Stopped::Exhausted,
             };
             if is_over {
-                return Stopped::Exhausted;
+                return self.all_over();
             }
         }
     }
@@ -205,6 +211,7 @@ impl<'a> Planner<'a> {
             .improving_round
             .saturating_mul(tuning.refining_share_later)
             .saturating_mul(weight)
+            .max(self.least_work)
     }
 
     /// Whether better plans are looked for near the best one.

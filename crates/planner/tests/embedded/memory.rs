@@ -1,0 +1,96 @@
+//! What happens when the memory is used up: searches give way to others.
+
+use std::ops::ControlFlow;
+
+use elbowroom_model::Situation;
+use elbowroom_planner::{Answer, Settings, Stopped, plan};
+
+use crate::portfolio::shelf;
+use crate::refinement::{made_up, shop};
+use crate::world::{describe, task};
+
+/// Deep shelves need a search for what is new; the others, which come first, would use up all memory.
+#[test]
+fn the_search_that_takes_most_gives_way_to_one_that_finds_a_plan() {
+    let (domain, problem) = shelf(6);
+    let task = task(&domain, &problem);
+    let run = |max_memory| {
+        let settings = Settings {
+            max_memory,
+            first_plan_only: true,
+            ..Settings::default()
+        };
+        let mut most = 0;
+        let answer = plan(
+            &task,
+            &Situation::initial(&task),
+            &settings,
+            &mut |progress| {
+                most = most.max(progress.counts.memory);
+                ControlFlow::Continue(())
+            },
+        );
+        (answer, most)
+    };
+    let (answer, needed) = run(usize::MAX);
+    assert!(answer.found().is_some(), "{}", describe(&answer));
+    for limit in [needed * 3 / 4, needed / 2, needed / 4] {
+        let (answer, most) = run(limit);
+        assert!(
+            answer.found().is_some(),
+            "{limit} of {needed}: {}",
+            describe(&answer)
+        );
+        assert!(most > limit, "nothing had to give way at {limit}");
+        assert!(most < limit + needed / 8, "{most} at {limit}");
+    }
+    let (answer, _) = run(needed / 100);
+    let Answer::NoneFound { stopped, .. } = answer else {
+        panic!("{}", describe(&answer));
+    };
+    assert_eq!(stopped, Stopped::OutOfMemory);
+}
+
+/// How many reports there are at most.
+const MOST_REPORTS: usize = 150;
+
+/// How many reports there are about better plans of a shop, what the searches took at most, and why it ended.
+fn better_plans(max_memory: usize) -> (usize, usize, Stopped) {
+    let task = shop(&made_up(1, 8, 4), true);
+    let mut settings = Settings {
+        max_memory,
+        ..Settings::default()
+    };
+    settings.tuning.first_leg = 2_000;
+    settings.tuning.leg = 20_000;
+    let (mut reports, mut most) = (0, 0);
+    let answer = plan(
+        &task,
+        &Situation::initial(&task),
+        &settings,
+        &mut |progress| {
+            reports += 1;
+            most = most.max(progress.counts.memory);
+            if reports < MOST_REPORTS {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        },
+    );
+    let Answer::Plan { stopped, .. } = answer else {
+        panic!("{}", describe(&answer));
+    };
+    (reports, most, stopped)
+}
+
+#[test]
+fn better_plans_are_looked_for_near_the_best_one_when_the_searches_have_no_room() {
+    let (reports, needed, stopped) = better_plans(usize::MAX);
+    assert_eq!((reports, stopped), (MOST_REPORTS, Stopped::Interrupted));
+    let limit = needed / 4;
+    // As long as with all the memory that there is, and the searches have less of it.
+    let (others, most, stopped) = better_plans(limit);
+    assert_eq!((others, stopped), (reports, Stopped::Interrupted));
+    assert!(most <= limit, "{most} of {limit}");
+}
