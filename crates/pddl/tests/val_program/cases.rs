@@ -319,6 +319,29 @@ fn the_document_tells_where_val_misses_events_and_divides_by_zero() {
         "{theirs:?} {ours:?}"
     );
 
+    // The flow ends at 9. After any happening meanwhile, VAL lets it go on until an event.
+    let bounded = basin
+        .replace(
+            ":precondition (open)\n          :effect (increase",
+            ":precondition (and (open) (< (level) 9))\n          :effect (increase",
+        )
+        .replace(
+            "(:action turn-on",
+            "(:action look :parameters () :precondition (open) :effect (and))\n(:action turn-on",
+        );
+    assert!(bounded.contains("(< (level) 9)"));
+    let (theirs, ours) = judged(&bounded, dry, "1.0: (turn-on)\n20.0: (turn-off)\n");
+    assert!(
+        theirs.agrees_with(&ours) && matches!(ours, Said::Valid(_)),
+        "{theirs:?} {ours:?}"
+    );
+    let looked = "1.0: (turn-on)\n6.0: (look)\n20.0: (turn-off)\n";
+    let (theirs, ours) = judged(&bounded, dry, looked);
+    assert!(
+        theirs == Said::Invalid && matches!(ours, Said::Valid(_)),
+        "{theirs:?} {ours:?}"
+    );
+
     let share = "(define (domain share) (:requirements :strips :fluents)
         (:predicates (done)) (:functions (each) (people))
         (:action divide :parameters () :precondition (and)
