@@ -10,7 +10,7 @@ fuzz_target!(|bytes: &[u8]| {
     let domain = Source::new("domain.pddl", include_str!("../fixed/domain.pddl"));
     let problem = Source::new("problem.pddl", include_str!("../fixed/problem.pddl"));
     let (problem, _) = read_problem(&domain, &problem).expect("the fixed texts are right");
-    let mut task = Task::new(problem);
+    let task = Task::new(problem);
     match read_plan(&Source::from_bytes("plan", bytes), &task) {
         Ok((mut plan, _)) => {
             let written = write_plan(&task, &plan);

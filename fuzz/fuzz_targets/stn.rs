@@ -11,7 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
     let domain = Source::new("domain.pddl", include_str!("../fixed/domain.pddl"));
     let problem = Source::new("problem.pddl", include_str!("../fixed/problem.pddl"));
     let (problem, _) = read_problem(&domain, &problem).expect("the fixed texts are right");
-    let mut task = Task::new(problem);
+    let task = Task::new(problem);
     match format::read(bytes, &task) {
         Ok(plan) => {
             let written = format::write(&task, &plan).expect("what was read can be written");

@@ -291,7 +291,7 @@ impl<'a> Planner<'a> {
             },
         );
         self.own_task = Some(own_task);
-        if self.stopped == Some(Stopped::OutOfMemory) && self.best.is_none() {
+        if self.stopped == Some(Stopped::OutOfMemory) {
             let grown = self.progress.counts.memory - base.memory;
             let mut sizes = memory;
             if let Some(&number) = numbers.get(last) {
