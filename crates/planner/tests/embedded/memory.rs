@@ -52,7 +52,7 @@ fn the_search_that_takes_most_gives_way_to_one_that_finds_a_plan() {
 }
 
 /// How many reports there are at most.
-const MOST_REPORTS: usize = 150;
+const MOST_REPORTS: usize = 50;
 
 /// How many reports there are about better plans of a shop, what the searches took at most, and why it ended.
 fn better_plans(max_memory: usize) -> (usize, usize, Stopped) {
@@ -63,6 +63,8 @@ fn better_plans(max_memory: usize) -> (usize, usize, Stopped) {
     };
     settings.tuning.first_leg = 2_000;
     settings.tuning.leg = 20_000;
+    // It would end some time after the last search has given way.
+    settings.tuning.improving_round = u64::MAX;
     let (mut reports, mut most) = (0, 0);
     let answer = plan(
         &task,
@@ -92,5 +94,5 @@ fn better_plans_are_looked_for_near_the_best_one_when_the_searches_have_no_room(
     // As long as with all the memory that there is, and the searches have less of it.
     let (others, most, stopped) = better_plans(limit);
     assert_eq!((others, stopped), (reports, Stopped::Interrupted));
-    assert!(most <= limit, "{most} of {limit}");
+    assert!(most < needed / 2, "{most} of {limit}");
 }

@@ -87,7 +87,7 @@ enum Rest {
 impl<'a> Contest<'a> {
     /// Whose turn it is may no longer be there: what it had left does not count.
     pub(super) fn forget_turn(&mut self) {
-        (self.left, self.is_finding) = (None, false);
+        (self.left, self.is_finding, self.credit) = (None, false, 0);
     }
 
     /// Lets searches take turns for so much work. The work done, and what is left.
@@ -188,6 +188,9 @@ impl<'a> Planner<'a> {
         loop {
             self.keep_room(&mut contest);
             let rest = self.leg(&mut contest);
+            if self.clear_room(&mut contest) {
+                continue;
+            }
             if let Some(stopped) = self.stopped {
                 return stopped;
             }

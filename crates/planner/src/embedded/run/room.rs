@@ -4,6 +4,7 @@
 //! Which one that is must not depend on the number of threads. So it is told by what has been heard
 //! of them: those whose turn had not come, and the one that was stopped, may be further.
 
+use super::super::answer::Stopped;
 use super::Planner;
 use super::improve::{Contest, Entrant};
 
@@ -61,6 +62,27 @@ impl<'a> Planner<'a> {
             contest.forget_turn();
             self.least_work = self.least_work.max(self.improved_for.saturating_mul(2));
         }
+    }
+
+    /// The memory was used up in a leg all the same, and what was stopped there may be anywhere: all searches
+    /// give way, and the search near the best plan begins anew. Whether that is possible.
+    pub(super) fn clear_room(&mut self, contest: &mut Contest<'a>) -> bool {
+        let mut entrants = contest.entrants.iter();
+        if self.stopped != Some(Stopped::OutOfMemory)
+            || !self.is_refining()
+            || entrants.all(|entrant| entrant.is_over)
+        {
+            return false;
+        }
+        for entrant in &mut contest.entrants {
+            self.give_way(entrant);
+        }
+        contest.forget_turn();
+        self.refiners.clear();
+        self.progress.counts.memory = 0;
+        self.stopped = None;
+        self.least_work = self.least_work.max(self.improved_for.saturating_mul(2));
+        true
     }
 
     fn give_way(&mut self, entrant: &mut Entrant<'a>) {
