@@ -163,7 +163,7 @@ struct Room<'a> {
     /// How much of the room around what is planned; 1 is all of it.
     share: &'a Rational,
     overrun: Overrun,
-    /// Whether what is under way has all of its interval, which it has not left.
+    /// Whether nothing has left the envelope, what is under way included.
     is_inside: bool,
     /// For how long an instance has been under way.
     elapsed: &'a dyn Fn(InstanceId) -> Option<Rational>,
@@ -191,9 +191,12 @@ impl Room<'_> {
         let Some(elapsed) = (self.elapsed)(instance) else {
             return Reading::Contingent { lower, upper };
         };
-        let upper = match self.is_inside {
-            true => self.interval(parameter, &Rational::ONE).1,
-            false => upper,
+        // Inside the envelope it may still be where it has had its share.
+        let has_had_it = upper.as_ref().is_some_and(|upper| *upper < elapsed);
+        let upper = if self.is_inside && has_had_it {
+            self.interval(parameter, &Rational::ONE).1
+        } else {
+            upper
         };
         let has_room = |upper: &Rational| *upper > elapsed || self.is_inside && *upper == elapsed;
         let has_room = upper.as_ref().is_none_or(has_room);
