@@ -65,9 +65,15 @@ fn cut(path: &Path) -> Result<Cut, Failure> {
     let mut journal = Journal::read(text.text())
         .map_err(|why| unreadable(&name, &why, crate::journal::DAMAGED))?;
     if journal.text.is_empty() {
-        let why =
-            "it ends before its first record does, so that nothing was ever told to the world";
-        return Err(unreadable(&name, why, "remove it, and begin the run again"));
+        let is_cut_off = !text.text().contains('\n');
+        let (why, advice) = if is_cut_off {
+            let why =
+                "it ends before its first record does, so that nothing was ever told to the world";
+            (why, "remove it, and begin the run again")
+        } else {
+            ("its first record is damaged", crate::journal::DAMAGED)
+        };
+        return Err(unreadable(&name, why, advice));
     }
     let read = |journal: &Journal| {
         let stored = Stored::read(&journal.text);
