@@ -115,7 +115,9 @@ pub(super) fn branch(
                 continue;
             }
             Learnt::Cuts(cuts) if !search.is_known(&cuts[0], &values) => {
-                cuts.into_iter().for_each(|cut| search.learn(cut));
+                for cut in cuts {
+                    search.learn(cut);
+                }
             }
             _ => {
                 if let Some(cut) = search.shrink(&candidate)? {

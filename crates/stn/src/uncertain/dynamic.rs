@@ -89,6 +89,9 @@ pub(super) struct Search<'a, W> {
     keeps_edges: bool,
 }
 
+/// Hears of a cycle, its ways in order, and says whether to look for more.
+type OnCycle<'a, W> = dyn FnMut(&Graph<W>, &[WayId]) -> ControlFlow<()> + 'a;
+
 /// A negative node being dealt with.
 struct Frame<W> {
     node: NodeId,
@@ -147,7 +150,7 @@ impl<'a, W: Weight> Search<'a, W> {
     pub(super) fn settle_all(
         &mut self,
         node: NodeId,
-        on_cycle: &mut dyn FnMut(&Graph<W>, &[WayId]) -> ControlFlow<()>,
+        on_cycle: &mut OnCycle<'_, W>,
     ) -> ControlFlow<()> {
         self.begin(node);
         while let Some(node) = self.go_on() {
