@@ -1,10 +1,10 @@
 """How soon a plan is begun, and with how much memory, by the number of its time points.
 
-    python3 testing/large_plans.py target/release/elbowroom [--executor stn] [--numbers] [TIME POINTS…]
+    python3 testing/large_plans.py target/release/elbowroom [--executor stn] [--numbers | --shape NAME] [TIME POINTS…]
 
 *Begun* is when the trace has its first command, everything before that included: reading, judging, relaxing the
-plan, and making the network ready. *Run* is the whole process. With --numbers, conditions read numbers. Standard
-library only; memory is read from /proc.
+plan, and making the network ready. *Run* is the whole process. With --numbers, conditions read numbers; with
+--shape, robots limit each other in one of the ways of `shapes.py`. Standard library only; memory is read from /proc.
 """
 
 import argparse
@@ -15,6 +15,7 @@ import tempfile
 import time
 
 import rounds
+import shapes
 
 ROBOTS, DOCKS = 20, 4
 
@@ -57,13 +58,16 @@ def processor(process):
     return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def row(program, executor, points, patience, has_numbers):
+def row(program, executor, points, patience, has_numbers, shape=None):
     """Measures one plan."""
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        problem = rounds.problem(ROBOTS, DOCKS, has_numbers)
-        texts = {"d.pddl": rounds.domain(has_numbers), "p.pddl": problem}
-        texts["plan"] = rounds.plan(ROBOTS, DOCKS, points // 2)
+        if shape:
+            domain, problem, plan = shapes.files(shape, points // 2)
+        else:
+            domain, problem = rounds.domain(has_numbers), rounds.problem(ROBOTS, DOCKS, has_numbers)
+            plan = rounds.plan(ROBOTS, DOCKS, points // 2)
+        texts = {"d.pddl": domain, "p.pddl": problem, "plan": plan}
         for name, text in texts.items():
             (folder / name).write_text(text)
         line = [pathlib.Path(program).resolve(), "run", "d.pddl", "p.pddl", "plan", "--executor", executor]
@@ -94,11 +98,12 @@ def main():
     parser.add_argument("--executor", default="stn")
     parser.add_argument("--patience", type=float, default=300)
     parser.add_argument("--numbers", action="store_true", help="driving takes charge")
+    parser.add_argument("--shape", choices=shapes.SHAPES, help="how robots limit each other")
     chosen = parser.parse_intermixed_args()
     print("| time points | executor | begun | memory | run | memory |")
     print("|---:|---|---:|---:|---:|---:|", flush=True)
     for points in chosen.points:
-        row(chosen.program, chosen.executor, points, chosen.patience, chosen.numbers)
+        row(chosen.program, chosen.executor, points, chosen.patience, chosen.numbers, chosen.shape)
 
 
 if __name__ == "__main__":

@@ -126,8 +126,10 @@ pub(crate) fn record(path: &Path, what: &str) -> Result<Source, Failure> {
     if !crate::journal::is_journal(text.text()) {
         return Ok(text);
     }
-    let journal = Journal::read(text.text())
-        .map_err(|why| Failure::new(format!("the journal {}: {why}", path.display()), ""))?;
+    let journal = Journal::read(text.text()).map_err(|why| {
+        let message = format!("the journal {}: {why}", path.display());
+        Failure::new(message, crate::journal::DAMAGED)
+    })?;
     Ok(Source::new(text.name(), journal.text))
 }
 

@@ -23,6 +23,10 @@ const HEAD: usize = 9;
 /// The checksum before the first record.
 const BEGINNING: &str = "00000000";
 
+/// What to do about a journal that is damaged in the middle.
+pub(crate) const DAMAGED: &str = "what comes behind the damage may not be all that happened: put a copy of the file in \
+                                  its place, or see to the robot and begin a new run with another journal";
+
 /// A journal that is being written.
 pub(crate) struct JournalFile {
     file: File,

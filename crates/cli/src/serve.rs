@@ -43,7 +43,7 @@ impl Control {
             .map_err(|error| {
                 Failure::new(
                     format!("cannot read the token in {name}: {}", plain(&error)),
-                    "`--control` names a file with a token in it",
+                    "the option names a file with a token in it, for example one that `openssl rand -hex 16` has made",
                 )
             })?;
         let token = text.trim().to_owned();
@@ -113,7 +113,10 @@ impl Address {
         let found = text
             .to_socket_addrs()
             .or_else(|_| (text, 0).to_socket_addrs());
-        let found = found.ok().and_then(|mut all| all.next());
+        // A number alone is meant as a port; as a name it would be an address in one number.
+        let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
+        let found = found.ok().filter(|_| !is_number);
+        let found = found.and_then(|mut all| all.next());
         found.map(Self).ok_or_else(|| {
             "it is no address; write a port such as 8080, or host and port such as 0.0.0.0:8080"
                 .to_owned()

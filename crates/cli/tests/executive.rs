@@ -525,7 +525,8 @@ fn what_was_asked_survives_kill_9() {
 #[test]
 fn what_is_wrong_with_the_command_line_is_told_before_anything_is_done() {
     let nowhere = PathBuf::from("/nowhere/at/all").display().to_string();
-    let tests: [(&[&str], &str); 5] = [
+    let tests: [(&[&str], &str); 6] = [
+        (&[DOMAIN, PROBLEM, "--http", "99999"], "write a port"),
         (
             &[DOMAIN, PROBLEM, "--token", &nowhere],
             "cannot read the token",

@@ -390,6 +390,7 @@ fn a_journal_is_neither_overwritten_nor_gone_on_with_after_its_end() {
     assert!(report.status.success(), "{report:?}");
     // Damage is not taken for a torn end.
     let text = fs::read_to_string(&journal).expect("the journal");
+    let header = format!("{}\n", text.lines().next().expect("a record"));
     fs::write(
         &journal,
         text.replacen("\"event\":\"decided\"", "\"event\":\"Decided\"", 1),
@@ -398,5 +399,20 @@ fn a_journal_is_neither_overwritten_nor_gone_on_with_after_its_end() {
     let damaged = elbowroom(&["run", "--resume", &journal]);
     let text = String::from_utf8_lossy(&damaged.stderr).into_owned();
     assert!(text.contains("damaged in the middle"), "{text}");
+    assert!(text.contains("help: what comes behind"), "{text}");
+    // Only where not even one record is whole can nobody have been told anything.
+    for (kept, expected) in [
+        (header.replace('\n', "\r\n"), "its first record is damaged"),
+        (
+            header[..60].to_owned(),
+            "remove it, and begin the run again",
+        ),
+    ] {
+        fs::write(&journal, kept).expect("written");
+        let refused = elbowroom(&["run", "--resume", &journal]);
+        let text = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{text}");
+        assert!(text.contains(expected), "{text}");
+    }
     fs::remove_dir_all(&folder).expect("the folder is there");
 }

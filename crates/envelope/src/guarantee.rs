@@ -154,7 +154,7 @@ impl Controllability {
         }
     }
 
-    /// What stands against the box, in terms of other boxes.
+    /// What stands against the box, in terms of other boxes: `most` cuts at most.
     ///
     /// # Errors
     /// When there are too many cases to tell apart.
@@ -162,6 +162,7 @@ impl Controllability {
         &mut self,
         plan: &ParametrizedPlan,
         envelope: &DecoupledEnvelope,
+        most: usize,
     ) -> Result<Learnt, Refusal> {
         match self {
             Self::Weak(feasibility) => {
@@ -171,7 +172,7 @@ impl Controllability {
                     without_schedule(plan, &values, envelope)
                 }))
             }
-            Self::Dynamic(..) => Ok(without_strategy(plan, envelope)),
+            Self::Dynamic(..) => Ok(without_strategy(plan, envelope, most)),
             Self::Strong(_) => Ok(without_fixed_times(plan, envelope)),
         }
     }

@@ -25,6 +25,8 @@ pub(crate) struct Known {
     finite: BTreeSet<BoxEnd>,
     /// The present box, if it is known.
     looked_at: Option<DecoupledEnvelope>,
+    /// The room of rows before it was changed, in order, since the present box was settled.
+    before: Vec<(usize, usize, Option<Rational>)>,
 }
 
 /// A cut that an end counts in.
@@ -36,7 +38,7 @@ struct Mention {
 }
 
 impl Known {
-    /// One more cut.
+    /// One more cut. The present box, which is settled, is this one.
     pub(crate) fn add(&mut self, cut: Cut, envelope: &DecoupledEnvelope) {
         self.looked_at = None;
         let index = self.cuts.len();
@@ -68,10 +70,24 @@ impl Known {
     }
 
     /// The present box is this one.
-    pub(crate) fn reset(&mut self, envelope: &DecoupledEnvelope) {
-        self.looked_at = None;
+    fn reset(&mut self, envelope: &DecoupledEnvelope) {
+        self.before.clear();
         for (cut, left) in self.cuts.iter().zip(&mut self.room) {
             *left = room(cut, envelope);
+        }
+    }
+
+    /// The present box is the one to come back to.
+    pub(crate) fn settle(&mut self) {
+        self.before.clear();
+    }
+
+    /// The present box is the one that was settled last; at first, that of the cut that was added
+    /// first.
+    pub(crate) fn undo(&mut self) {
+        self.looked_at = None;
+        for (cut, place, room) in self.before.drain(..).rev() {
+            self.room[cut][place] = room;
         }
     }
 
@@ -111,10 +127,12 @@ impl Known {
         for mention in self.mentions.get(&end).into_iter().flatten() {
             for (place, factor) in &mention.rows {
                 let room = &mut self.room[mention.cut][*place];
-                *room = match (room.take(), to) {
-                    (Some(room), Some(to)) => Some(room - factor * &(to - from)),
+                let less = match (&*room, to) {
+                    (Some(room), Some(to)) => Some(room - &(factor * &(to - from))),
                     _ => None,
                 };
+                let before = std::mem::replace(room, less);
+                self.before.push((mention.cut, *place, before));
             }
         }
     }

@@ -14,7 +14,9 @@ use elbowroom_plan::{
     Valuation, network_node,
 };
 use elbowroom_stn::ConstraintId;
-use elbowroom_stn::uncertain::{Ground as StepGround, LinkId, Part, Refuted, StrongConflict, Way};
+use elbowroom_stn::uncertain::{
+    Ground as StepGround, LinkId, Part, Refutation, Refuted, StrongConflict, Way,
+};
 
 use crate::cut::{Cut, Ends, Ground, ProofPart, ProofWay};
 
@@ -26,8 +28,8 @@ const MOST_ROWS: usize = 64;
 pub(crate) enum Learnt {
     /// Nothing is against it.
     Nothing,
-    /// It is refused, and others with it.
-    Cut(Cut),
+    /// It is refused, and others with it: at least one cut.
+    Cuts(Vec<Cut>),
     /// It is refused, but nothing linear can be said about others.
     Unknown,
 }
@@ -78,48 +80,38 @@ pub(crate) fn without_schedule(
     learnt(vec![ends], Ground::Cycle(cycle), envelope)
 }
 
-/// The conflict that prevents dynamic controllability in the box.
-pub(crate) fn without_strategy(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Learnt {
+/// The conflicts that prevent dynamic controllability in the box: so many at most, of those that come up
+/// when its network is gone through once.
+pub(crate) fn without_strategy(
+    plan: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+    most: usize,
+) -> Learnt {
     let Ok(network) = plan.uncertain_network(envelope) else {
         return Learnt::Unknown;
     };
     let refuted = match network.network.whole() {
-        Some(whole) => whole.network.refutation(),
-        None => network.network.refutation(),
+        Some(whole) => whole.network.refutations(most),
+        None => network.network.refutations(most),
     };
-    let refutation = match refuted {
+    let refutations = match refuted {
         Refuted::No => return Learnt::Nothing,
         Refuted::TooLong => return Learnt::Unknown,
-        Refuted::Because(refutation) => refutation,
+        Refuted::Because(refutations) => refutations,
     };
     let reader = Reader {
         plan,
         network: &network,
     };
-    let Some(whole) = reader.flat(&refutation.cycle) else {
-        return Learnt::Unknown;
-    };
-    let ways = refutation.cycle.iter().map(|way| reader.way(way));
-    let Some(ways) = ways.collect::<Option<Vec<ProofWay>>>() else {
-        return Learnt::Unknown;
-    };
-    if !whole.tears() {
-        // At these ends, one for each parameter, there is no schedule at all.
-        return learnt(vec![whole], Ground::Semireducible(ways), envelope);
+    let cuts = refutations.iter();
+    let cuts: Vec<Cut> = cuts
+        .filter_map(|refutation| reader.cut(refutation, envelope))
+        .collect();
+    if cuts.is_empty() {
+        Learnt::Unknown
+    } else {
+        Learnt::Cuts(cuts)
     }
-    let mut rows = Vec::new();
-    let mut total = vec![Ends::default()];
-    for way in &refutation.cycle {
-        let Some(lengths) = reader.lengths(way, &mut rows) else {
-            return Learnt::Unknown;
-        };
-        total = sums(total, &lengths);
-        if total.len() + rows.len() > MOST_ROWS {
-            return Learnt::Unknown;
-        }
-    }
-    rows.extend(total);
-    learnt(rows, Ground::Semireducible(ways), envelope)
 }
 
 /// The conflict that prevents strong controllability in the box.
@@ -163,8 +155,15 @@ pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledE
     learnt(vec![total], Ground::Fixed(parts), envelope)
 }
 
-/// One of these is not negative; in the box all are.
 fn learnt(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope) -> Learnt {
+    match cut(alternatives, ground, envelope) {
+        Some(cut) => Learnt::Cuts(vec![cut]),
+        None => Learnt::Unknown,
+    }
+}
+
+/// One of these is not negative; in the box all are, or it is no cut.
+fn cut(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope) -> Option<Cut> {
     let mut rows = Vec::new();
     for ends in alternatives {
         let row = ends.not_negative();
@@ -173,11 +172,7 @@ fn learnt(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope)
         }
     }
     let cut = Cut { rows, ground };
-    if cut.holds_in(envelope) {
-        Learnt::Unknown
-    } else {
-        Learnt::Cut(cut)
-    }
+    (!cut.holds_in(envelope)).then_some(cut)
 }
 
 /// All sums of one of these and one of those.
@@ -202,6 +197,27 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// What a conflict in the box says about others.
+    fn cut(&self, refutation: &Refutation, envelope: &DecoupledEnvelope) -> Option<Cut> {
+        let whole = self.flat(&refutation.cycle)?;
+        let ways = refutation.cycle.iter().map(|way| self.way(way));
+        let ground = Ground::Semireducible(ways.collect::<Option<Vec<ProofWay>>>()?);
+        if !whole.tears() {
+            // At these ends, one for each parameter, there is no schedule at all.
+            return cut(vec![whole], ground, envelope);
+        }
+        let mut rows = Vec::new();
+        let mut total = vec![Ends::default()];
+        for way in &refutation.cycle {
+            total = sums(total, &self.lengths(way, &mut rows)?);
+            if total.len() + rows.len() > MOST_ROWS {
+                return None;
+            }
+        }
+        rows.extend(total);
+        cut(rows, ground, envelope)
+    }
+
     /// The constraint that leaves a link's duration open.
     fn constraint(&self, link: LinkId) -> &Constraint {
         &self.plan.plan.constraints[self.network.links[link.index()]]

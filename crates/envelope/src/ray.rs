@@ -118,15 +118,17 @@ impl Ray {
             if on_step(oracle, &reached.inside).is_break() {
                 break;
             }
-            let halve = match oracle.learn(&self.at(&plan, &next))? {
+            let halve = match oracle.learn(&self.at(&plan, &next), 1)? {
                 Learnt::Nothing => {
                     reached.inside = next;
                     true
                 }
-                Learnt::Cut(cut) => {
+                Learnt::Cuts(found) => {
                     let before = reached.outside.clone();
-                    self.lower(&mut reached, &cut, cuts.len());
-                    cuts.push(cut);
+                    for cut in found {
+                        self.lower(&mut reached, &cut, cuts.len());
+                        cuts.push(cut);
+                    }
                     // A bound that is not reached itself, or one that was known before.
                     let is_stuck = reached.outside == before && next == before;
                     if reached.outside > next {

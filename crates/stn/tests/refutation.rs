@@ -62,40 +62,45 @@ fn changed(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNet
 #[test]
 fn a_network_that_a_refutation_still_fits_is_not_controllable() {
     let mut random = Random(7);
-    let (mut refuted, mut fits, mut waits) = (0, 0, 0);
+    let (mut refuted, mut further, mut fits, mut waits) = (0, 0, 0, 0);
     for _ in 0..20_000 {
         let network = Board::random(&mut random).network();
-        let refutation = match network.refutation() {
+        let refutations = match network.refutations(usize::MAX) {
             Refuted::No => {
                 assert!(network.is_dynamically_controllable());
                 continue;
             }
-            Refuted::Because(refutation) => refutation,
+            Refuted::Because(refutations) => refutations,
             Refuted::TooLong => continue,
         };
         assert!(!network.is_dynamically_controllable());
-        assert!(refutes(&refutation, &network), "{network:?} {refutation:?}");
+        let first = Refuted::Because(refutations[..1].to_vec());
+        assert_eq!(network.refutations(1), first);
         refuted += 1;
-        let is_wait = |part: &Part| matches!(part, Part::Way(way) if way.unlabelled.is_some());
-        waits += usize::from(
-            refutation
-                .cycle
-                .iter()
-                .any(|way| way.parts.iter().any(is_wait)),
-        );
-        for _ in 0..10 {
-            let other = changed(&network, &mut random);
-            if refutes(&refutation, &other) {
-                fits += 1;
-                assert!(
-                    !other.is_dynamically_controllable(),
-                    "{network:?} {other:?} {refutation:?}"
-                );
+        further += refutations.len() - 1;
+        for refutation in &refutations {
+            assert!(refutes(refutation, &network), "{network:?} {refutation:?}");
+            let is_wait = |part: &Part| matches!(part, Part::Way(way) if way.unlabelled.is_some());
+            waits += usize::from(
+                refutation
+                    .cycle
+                    .iter()
+                    .any(|way| way.parts.iter().any(is_wait)),
+            );
+            for _ in 0..10 {
+                let other = changed(&network, &mut random);
+                if refutes(refutation, &other) {
+                    fits += 1;
+                    assert!(
+                        !other.is_dynamically_controllable(),
+                        "{network:?} {other:?} {refutation:?}"
+                    );
+                }
             }
         }
     }
     assert!(
-        refuted > 1_000 && fits > 1_000 && waits > 30,
-        "{refuted} {fits} {waits}"
+        refuted > 1_000 && further > 1_000 && fits > 1_000 && waits > 30,
+        "{refuted} {further} {fits} {waits}"
     );
 }

@@ -236,7 +236,7 @@ fn socket(path: &Path) -> Result<Listener, Failure> {
     let cannot = |why: &dyn fmt::Display| {
         Failure::new(
             format!("cannot listen at {}: {why}", path.display()),
-            "choose a path in a folder that exists and that you may write to",
+            "choose a path at which there is nothing, in a folder that exists and that you may write to",
         )
     };
     let is_socket = std::fs::symlink_metadata(path)

@@ -100,6 +100,42 @@ fn what_no_plan_can_bear_has_failed_and_the_next_plan_does_without() {
     );
 }
 
+/// The envelope takes all of the six seconds that there are: the walk would have to start at once. On a
+/// clock no start is on time to the millisecond.
+#[test]
+fn a_start_that_is_late_takes_from_the_room_and_needs_no_new_plan() {
+    let (scene, _) = walker(Rational::from(10));
+    let run = |delay: &str| {
+        let model = format!("[[delay]]\naction = \"walk\"\nconstant = {delay}\n");
+        let report = scene.run("guarded", &scene.world(&model), 1);
+        assert_eq!(report.verdict, Verdict::GoalReached, "{delay}: {report:#?}");
+        report
+    };
+    for delay in ["0.1", "0.5", "4"] {
+        let report = run(delay);
+        assert_eq!(report.replans, 0, "{delay}: {report:#?}");
+        assert_eq!(done(&report), ["(walk)", "(climb)"]);
+        assert!(scene.judged(&report).is_valid());
+    }
+    // With a sixteenth of the room it would go on.
+    assert!(run("5.8").replans > 0);
+}
+
+/// What is left of the envelope counts: who takes longer than that is given up.
+#[test]
+fn after_a_start_that_is_late_the_envelope_still_counts() {
+    let (scene, _) = walker(Rational::from(10));
+    let run = |duration: &str| {
+        let model = format!(
+            "[[delay]]\naction = \"walk\"\nconstant = 1\n\
+             [[duration]]\naction = \"walk\"\nconstant = {duration}\n"
+        );
+        scene.run("guarded", &scene.world(&model), 1)
+    };
+    assert_eq!(run("12.5").replans, 0);
+    assert!(run("15.5").replans > 0);
+}
+
 /// In worlds without a clock, as in the papers' experiments, that is the end.
 #[test]
 fn where_room_is_not_watched_a_run_ends_when_no_plan_can_bear_what_is_late() {

@@ -104,7 +104,7 @@ pub(super) fn branch(
         steps += 1;
         let values = search.leaves[at].values.clone();
         let candidate = variables.envelope(plan, &values);
-        match search.oracle.learn(&candidate)? {
+        match search.oracle.learn(&candidate, 1)? {
             Learnt::Nothing => {
                 search.take(values);
                 if search.leaves[at].bound > &search.best.0 + &tolerance && !search.divide(at) {
@@ -114,7 +114,11 @@ pub(super) fn branch(
                 }
                 continue;
             }
-            Learnt::Cut(cut) if !search.is_known(&cut, &values) => search.learn(cut),
+            Learnt::Cuts(cuts) if !search.is_known(&cuts[0], &values) => {
+                for cut in cuts {
+                    search.learn(cut);
+                }
+            }
             _ => {
                 if let Some(cut) = search.shrink(&candidate)? {
                     search.learn(cut);

@@ -14,12 +14,16 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
 use super::own_bounds::OwnBounds;
 use super::{MOST_UNDECIDED, Settings, StopReason, Widening, farthest};
+use crate::cut::Cut;
 use crate::frontier::Frontier;
 use crate::known::Known;
 use crate::learn::Learnt;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
+
+/// So many cuts at once are taken for most of what there is to know.
+const MANY: usize = 2;
 
 /// A search in progress.
 pub(super) struct Ahead<'a> {
@@ -101,13 +105,11 @@ impl<'a> Ahead<'a> {
         self.bounds = Some(OwnBounds::of(&self.plan));
         let leap = self.leap();
         (self.length, self.bounds) = (length, None);
-        if let Confirmed::No(cut) = self.confirmed(&leap) {
-            self.known.reset(&self.envelope);
-            if let Some(cut) = cut {
-                self.known.add(cut, &self.envelope);
-            }
+        if let Confirmed::No(cuts) = self.confirmed(&leap) {
+            self.refused(cuts);
             return None;
         }
+        self.known.settle();
         self.frontier = leap.frontier.clone();
         let flow = self.tell(&leap, on_step);
         if flow.is_break() {
@@ -141,21 +143,24 @@ impl<'a> Ahead<'a> {
             let mut end = leap.end;
             let flow = match self.confirmed(&leap) {
                 Confirmed::Yes => {
+                    self.known.settle();
                     self.length = self.length.saturating_mul(2);
                     self.frontier = leap.frontier.clone();
                     self.tell(&leap, on_step)
                 }
-                Confirmed::No(cut) => {
+                Confirmed::No(cuts) => {
                     end = None;
-                    self.length = (leap.steps.len() / 2).max(1);
-                    self.known.reset(&self.envelope);
-                    match cut {
-                        Some(cut) => {
-                            self.known.add(cut, &self.envelope);
-                            ControlFlow::Continue(())
-                        }
-                        None if is_one => self.step(on_step),
-                        None => ControlFlow::Continue(()),
+                    // What is known now may be most of what there is to know; where one thing comes up
+                    // after the other, it is found sooner in narrower boxes.
+                    if cuts.len() < MANY {
+                        self.length = (leap.steps.len() / 2).max(1);
+                    }
+                    let is_unknown = cuts.is_empty();
+                    self.refused(cuts);
+                    if is_unknown && is_one {
+                        self.step(on_step)
+                    } else {
+                        ControlFlow::Continue(())
                     }
                 }
             };
@@ -167,6 +172,14 @@ impl<'a> Ahead<'a> {
                 Some(reason) => return reason,
                 None => {}
             }
+        }
+    }
+
+    /// The box after a leap is refused, and that is what is known now.
+    fn refused(&mut self, cuts: Vec<Cut>) {
+        self.known.undo();
+        for cut in cuts {
+            self.known.add(cut, &self.envelope);
         }
     }
 
@@ -252,8 +265,8 @@ impl<'a> Ahead<'a> {
         };
         match answer {
             Ok(Learnt::Nothing) => Confirmed::Yes,
-            Ok(Learnt::Cut(cut)) => Confirmed::No(Some(cut)),
-            Ok(Learnt::Unknown) | Err(_) => Confirmed::No(None),
+            Ok(Learnt::Cuts(cuts)) => Confirmed::No(cuts),
+            Ok(Learnt::Unknown) | Err(_) => Confirmed::No(Vec::new()),
         }
     }
 
@@ -314,6 +327,7 @@ impl<'a> Ahead<'a> {
             self.frontier.finish(end);
         }
         self.known.moved(end, &from, reach.as_ref());
+        self.known.settle();
         self.envelope.set_reach(end, reach);
         on_step(Some(&Widening {
             envelope: &self.envelope,
@@ -347,7 +361,7 @@ impl<'a> Ahead<'a> {
 enum Confirmed {
     Yes,
     /// What is known now about other boxes, if anything.
-    No(Option<crate::cut::Cut>),
+    No(Vec<Cut>),
 }
 
 /// How far an end would reach after a step; `None` if that is outside its parameter's range.

@@ -18,7 +18,11 @@ impl Oracle {
     ///
     /// # Errors
     /// When there are too many cases to tell apart.
-    pub(crate) fn learn(&mut self, envelope: &DecoupledEnvelope) -> Result<Learnt, Refusal> {
+    pub(crate) fn learn(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        most: usize,
+    ) -> Result<Learnt, Refusal> {
         self.checks += 1;
         self.remembers_accepted = false;
         self.proofs_hold_in_last = false;
@@ -28,7 +32,7 @@ impl Oracle {
             return Ok(Learnt::Unknown);
         }
         // What a condition says about other boxes counts where all values have a schedule.
-        let learnt = self.controllability.learn(&self.plan, envelope)?;
+        let learnt = self.controllability.learn(&self.plan, envelope, most)?;
         if learnt != Learnt::Nothing || self.asked == Asked::Times {
             self.proofs_hold_in_last = learnt == Learnt::Nothing;
             return Ok(learnt);
@@ -43,10 +47,10 @@ impl Oracle {
         };
         let row = soundness.row(&self.plan, &broken, envelope);
         Ok(row.map_or(Learnt::Unknown, |row| {
-            Learnt::Cut(Cut {
+            Learnt::Cuts(vec![Cut {
                 rows: vec![row],
                 ground: Ground::Condition(broken),
-            })
+            }])
         }))
     }
 
@@ -73,7 +77,7 @@ impl Oracle {
         {
             return Ok(Learnt::Nothing);
         }
-        let learnt = self.learn(envelope)?;
+        let learnt = self.learn(envelope, usize::MAX)?;
         if learnt == Learnt::Nothing {
             self.accepted = Some(envelope.clone());
             self.remembers_accepted = true;

@@ -16,7 +16,8 @@ pub(super) const REGISTERED: Registered = Registered {
     is_optional: false,
     summary: "Dispatches so that the plan works whatever happens within its envelope, and replans as \
               soon as an observed quantity leaves its interval, a running action outlives its \
-              upper end, or too little time is left.",
+              upper end, or too little time is left. Where only a start is late, it goes on with a \
+              smaller envelope, if there is one.",
     paper: "DREEX, Algorithm 2 in Cashmore et al. (2020)",
     need: Need::Envelope,
     make: |_, _| Box::new(Guarded { state: None }),
@@ -36,6 +37,8 @@ struct Guard {
     /// The box that dispatching keeps: smaller than the envelope, if that requires knowing values
     /// in advance.
     promise: Promise,
+    /// The weakest promise with which it goes on.
+    least: Promise,
     /// The values observed, and the nominal ones of the rest.
     values: Valuation,
 }
@@ -59,6 +62,10 @@ impl Executor for Guarded {
         self.state = Some(Guard {
             dispatch,
             promise,
+            least: match promise {
+                Promise::Envelope => Promise::PartOfEnvelope,
+                _ => Promise::Luck,
+            },
             values: mission.plan.nominal(),
             mission: mission.clone(),
             envelope,
@@ -76,8 +83,7 @@ impl Executor for Guarded {
         {
             return replan(*reason);
         }
-        if guard.promise != Promise::Envelope
-            && let Some(reason) = guard.dispatch.overdue(moment)
+        if let Some(reason) = guard.dispatch.overdue(moment)
             && let Some(reason) = guard.outlast(moment.now, reason)
         {
             return replan(*reason);
@@ -114,26 +120,45 @@ impl Executor for Guarded {
 
 impl Guard {
     /// Why the plan is to be given up, if something happened at another time than dispatching
-    /// reckoned with. Where it never reckoned with all of the envelope, and the quantity is still
-    /// inside, it may go on with the rest.
+    /// reckoned with. It may go on with the rest where every quantity is still inside the envelope: if
+    /// dispatching never reckoned with all of that, or if a start is late, as on any clock, which takes
+    /// room from what comes after. Envelopes take all the room that there is, so that there may be none
+    /// to spare for that.
     fn outlast(&mut self, now: &Rational, reason: Reason) -> Option<Box<Reason>> {
+        let local = self.dispatch.local(now);
+        let mut has_outlived = false;
         for (parameter, instance) in duration_parameters(&self.mission.plan) {
             let [start, end] = self.dispatch.nodes_of(instance);
-            let happened = |node| self.dispatch.happened(node);
-            if let (Some(start), Some(end)) = (happened(start), happened(end)) {
+            let Some(start) = self.dispatch.happened(start) else {
+                continue;
+            };
+            if let Some(end) = self.dispatch.happened(end) {
                 self.values[parameter] = end - start;
+            } else if let Some(most) = self.envelope.interval(parameter).upper.value() {
+                has_outlived |= &local - start > *most;
             }
         }
+        let was_whole = self.least == Promise::PartOfEnvelope;
+        let is_borne = if was_whole {
+            reason.cause == Cause::Unreachable || self.promise != Promise::Envelope && !has_outlived
+        } else {
+            true
+        };
         let stays_inside = self.envelope.contains(&self.values);
-        if self.promise == Promise::Envelope || !stays_inside || !promise::is_about_time(&reason) {
+        if !stays_inside || !is_borne || !promise::is_about_time(&reason) {
             return Some(Box::new(reason));
         }
-        let (mission, values) = (&self.mission, &self.values);
-        match promise::weaken(&mut self.dispatch, mission, values, now, reason) {
-            Ok(promise) => {
+        let rest = promise::Rest {
+            mission: &self.mission,
+            values: &self.values,
+            is_inside: was_whole,
+        };
+        match promise::weaken(&mut self.dispatch, &rest, now, reason.clone()) {
+            Ok(promise) if promise <= self.least => {
                 self.promise = promise.max(Promise::PartOfEnvelope);
                 None
             }
+            Ok(_) => Some(Box::new(reason)),
             Err(reason) => Some(reason),
         }
     }

@@ -149,8 +149,12 @@ impl Executor for Live {
 impl Rest {
     /// Something was not as promised: makes the most of what is left.
     fn weaken(&mut self, now: &Rational, reason: Reason) -> Result<(), Box<Reason>> {
-        let (mission, values) = (&self.mission, &self.values);
-        let weaker = promise::weaken(&mut self.dispatch, mission, values, now, reason)?;
+        let rest = promise::Rest {
+            mission: &self.mission,
+            values: &self.values,
+            is_inside: false,
+        };
+        let weaker = promise::weaken(&mut self.dispatch, &rest, now, reason)?;
         self.promise = self.promise.max(weaker);
         Ok(())
     }

@@ -37,6 +37,7 @@ pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason
             values: &values,
             share,
             overrun,
+            is_inside: false,
             elapsed: &|instance| runs(instance).then_some(Rational::ZERO),
         };
         let reading = |constraint: &Constraint| room.reading(constraint);
@@ -56,18 +57,31 @@ pub(super) fn is_about_time(reason: &Reason) -> bool {
     )
 }
 
-/// Something was not as promised: makes the most of what is left. `values` are what was observed,
-/// and for the rest what is planned.
+/// What is left of a plan.
+pub(super) struct Rest<'a> {
+    pub(super) mission: &'a Mission,
+    /// The values observed, and for the rest the planned ones.
+    pub(super) values: &'a Valuation,
+    /// Whether nothing has left the envelope, what is under way included: what numbers bear is known
+    /// of all of it then.
+    pub(super) is_inside: bool,
+}
+
+/// Something was not as promised: makes the most of what is left.
 ///
 /// # Errors
 /// When the rest does not work even if nothing deviates any more.
 pub(super) fn weaken(
     dispatch: &mut Dispatch,
-    mission: &Mission,
-    values: &Valuation,
+    rest: &Rest<'_>,
     now: &Rational,
     reason: Reason,
 ) -> Result<Promise, Box<Reason>> {
+    let Rest {
+        mission,
+        values,
+        is_inside,
+    } = *rest;
     let local = dispatch.local(now);
     let elapsed: Vec<Option<Rational>> = (0..dispatch.plan().instances.len())
         .map(|index| {
@@ -83,6 +97,7 @@ pub(super) fn weaken(
             values,
             share,
             overrun,
+            is_inside,
             elapsed: &|instance| elapsed[instance.index()].clone(),
         };
         let reading = |constraint: &Constraint| room.reading(constraint);
@@ -91,8 +106,8 @@ pub(super) fn weaken(
             .map_err(|against| behind = against)
     };
     // What numbers bear is known only where nothing has left the envelope.
-    let reads_more_than_facts = mission.plan.reads_more_than_facts(&mission.task);
-    if let Ok(((), promise)) = most(reads_more_than_facts, !reads_more_than_facts, &mut attempt) {
+    let is_unknown = !is_inside && mission.plan.reads_more_than_facts(&mission.task);
+    if let Ok(((), promise)) = most(is_unknown, !is_unknown, &mut attempt) {
         return Ok(promise);
     }
     if reason.cause == Cause::Unreachable {
@@ -148,6 +163,8 @@ struct Room<'a> {
     /// How much of the room around what is planned; 1 is all of it.
     share: &'a Rational,
     overrun: Overrun,
+    /// Whether nothing has left the envelope, what is under way included.
+    is_inside: bool,
     /// For how long an instance has been under way.
     elapsed: &'a dyn Fn(InstanceId) -> Option<Rational>,
 }
@@ -167,14 +184,22 @@ impl Room<'_> {
                 upper: constraint.upper.at(self.values),
             };
         };
-        let (lower, upper) = self.interval(parameter);
+        let (lower, upper) = self.interval(parameter, self.share);
         let ParameterKind::Duration(instance) = plan.parameter(parameter).kind else {
             return Reading::Contingent { lower, upper };
         };
         let Some(elapsed) = (self.elapsed)(instance) else {
             return Reading::Contingent { lower, upper };
         };
-        let has_room = upper.as_ref().is_none_or(|upper| *upper > elapsed);
+        // Inside the envelope it may still be where it has had its share.
+        let has_had_it = upper.as_ref().is_some_and(|upper| *upper < elapsed);
+        let upper = if self.is_inside && has_had_it {
+            self.interval(parameter, &Rational::ONE).1
+        } else {
+            upper
+        };
+        let has_room = |upper: &Rational| *upper > elapsed || self.is_inside && *upper == elapsed;
+        let has_room = upper.as_ref().is_none_or(has_room);
         let lower = lower.max(elapsed.clone());
         match self.overrun {
             _ if has_room => Reading::Contingent { lower, upper },
@@ -195,25 +220,25 @@ impl Room<'_> {
         }
     }
 
-    /// The share of the envelope around what is planned.
-    fn interval(&self, id: ParameterId) -> (Rational, Option<Rational>) {
+    /// A share of the envelope around what is planned.
+    fn interval(&self, id: ParameterId, share: &Rational) -> (Rational, Option<Rational>) {
         let planned = &self.values[id];
-        if self.share.is_zero() {
+        if share.is_zero() {
             return (planned.clone(), Some(planned.clone()));
         }
         let Some(envelope) = &self.mission.envelope else {
             // Without an envelope as much again as is planned is taken for all the room.
-            let room = planned * self.share;
+            let room = planned * share;
             return (planned - &room, Some(planned + room));
         };
         let interval = envelope.interval(id);
-        let within = |end: &Rational| planned + (end - planned) * self.share;
+        let within = |end: &Rational| planned + (end - planned) * share;
         let lower = interval.lower.value().map_or(Rational::ZERO, within);
         let upper = match interval.upper.value() {
             Some(upper) => Some(within(upper)),
             // A share of infinitely much room is in proportion to what is planned.
-            None if *self.share == Rational::ONE => None,
-            None => Some(planned + planned * self.share * Rational::from(16)),
+            None if *share == Rational::ONE => None,
+            None => Some(planned + planned * share * Rational::from(16)),
         };
         (lower.max(Rational::ZERO), upper)
     }

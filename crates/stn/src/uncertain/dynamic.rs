@@ -23,6 +23,7 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
+use std::ops::ControlFlow;
 
 use super::conflict::Conflict;
 use super::dispatchable::Dispatchable;
@@ -86,9 +87,10 @@ pub(super) struct Search<'a, W> {
     frames: Vec<Frame<W>>,
     /// Whether negative edges found are kept, for the sake of dispatching.
     keeps_edges: bool,
-    /// The ways of the conflict that was found.
-    cycle: Vec<WayId>,
 }
+
+/// Hears of a cycle, its ways in order, and says whether to look for more.
+type OnCycle<'a, W> = dyn FnMut(&Graph<W>, &[WayId]) -> ControlFlow<()> + 'a;
 
 /// A negative node being dealt with.
 struct Frame<W> {
@@ -130,18 +132,37 @@ impl<'a, W: Weight> Search<'a, W> {
             regions: vec![Vec::new(); count],
             frames: Vec::new(),
             keeps_edges,
-            cycle: Vec::new(),
         }
-    }
-
-    /// The ways of the conflict that was found, each from where the one before ends.
-    pub(super) fn into_cycle(self) -> Vec<WayId> {
-        self.cycle
     }
 
     /// Deals with a node, and with those that have to be dealt with before.
     pub(super) fn settle(&mut self, node: NodeId) -> Result<(), Conflict<W>> {
         self.begin(node);
+        match self.go_on() {
+            None => Ok(()),
+            Some(node) => Err(self.conflict(node)),
+        }
+    }
+
+    /// Deals with a node, and with those that have to be dealt with before, whatever conflicts there
+    /// are: `on_cycle` hears of each, way by way, each from where the one before ends, and says whether to
+    /// look for more. Where a way has led to a conflict, it is not followed any further.
+    pub(super) fn settle_all(
+        &mut self,
+        node: NodeId,
+        on_cycle: &mut OnCycle<'_, W>,
+    ) -> ControlFlow<()> {
+        self.begin(node);
+        while let Some(node) = self.go_on() {
+            let cycle = self.cycle(node);
+            on_cycle(self.graph, &cycle)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Deals with all that is under way, or until a cycle closes: at which node. Whoever goes on then
+    /// goes on without it.
+    fn go_on(&mut self) -> Option<NodeId> {
         while let Some(frame) = self.frames.last_mut() {
             let Some(Reverse((distance, node))) = frame.queue.pop() else {
                 if !self.next_pass() {
@@ -160,7 +181,7 @@ impl<'a, W: Weight> Search<'a, W> {
                 continue;
             }
             match self.stage[node.index()] {
-                Stage::Underway => return Err(self.conflict(node)),
+                Stage::Underway => return Some(node),
                 Stage::New => {
                     // It comes back to this one when that node has been dealt with.
                     frame.queue.push(Reverse((distance, node)));
@@ -174,7 +195,7 @@ impl<'a, W: Weight> Search<'a, W> {
                 }
             }
         }
-        Ok(())
+        None
     }
 
     fn begin(&mut self, node: NodeId) {
@@ -304,21 +325,27 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// The shortest way from a node to the last frame's.
+    /// The shortest way from a node to the last frame's, from now on.
     fn way(&mut self, node: NodeId) -> WayId {
-        let frame = self.frames.last_mut().expect("a way leads to a frame");
+        let way = self.way_to(self.frames.len() - 1, node);
+        let frame = self.frames.last_mut();
+        if let Some(reached) = frame.and_then(|frame| frame.reached.get_mut(&node)) {
+            reached.way = Some(way);
+        }
+        way
+    }
+
+    /// The shortest way from a node to that frame's, as far as it is known.
+    fn way_to(&mut self, frame: usize, node: NodeId) -> WayId {
+        let frame = &self.frames[frame];
         let edge = frame.reached[&node].edge;
         let next = self.graph.edges[edge].to;
         let rest = match frame.reached.get(&next) {
             Some(reached) if next != frame.node => reached.way,
             _ => None,
         };
-        let id = self.graph.ways.len();
         self.graph.ways.push(Way { edge, rest });
-        if let Some(reached) = frame.reached.get_mut(&node) {
-            reached.way = Some(id);
-        }
-        id
+        self.graph.ways.len() - 1
     }
 
     /// Follows the edges that end at a node.
@@ -339,19 +366,35 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// The ways from each frame's node to the one before, from `node`'s frame on, are a cycle.
-    fn conflict(&mut self, node: NodeId) -> Conflict<W> {
+    /// The ways from `node` to the last frame's, and from each frame's node to the one before, down to
+    /// `node` again, are a cycle.
+    fn cycle(&mut self, node: NodeId) -> Vec<WayId> {
+        let first = self.first_of(node);
+        let mut from = node;
+        let ways = (first..self.frames.len()).rev().map(|index| {
+            let way = self.way_to(index, from);
+            from = self.frames[index].node;
+            way
+        });
+        ways.collect()
+    }
+
+    fn first_of(&self, node: NodeId) -> usize {
         let first = self.frames.iter().position(|frame| frame.node == node);
-        let first = first.expect("a node under way has a frame");
+        first.expect("a node under way has a frame")
+    }
+
+    /// The cycle that closes at a node, step by step.
+    fn conflict(&mut self, node: NodeId) -> Conflict<W> {
         let mut total = Extended::zero();
+        let mut from = node;
+        for frame in self.frames[self.first_of(node)..].iter().rev() {
+            total = total.plus(&frame.reached[&from].distance);
+            from = frame.node;
+        }
         let mut steps = Vec::new();
         let mut is_whole = true;
-        let mut from = node;
-        while self.frames.len() > first {
-            let way = self.way(from);
-            self.cycle.push(way);
-            let frame = self.frames.pop().expect("there are more frames than that");
-            total = total.plus(&frame.reached[&from].distance);
+        for way in self.cycle(node) {
             let mut edges = Vec::new();
             let mut next = Some(way);
             while let Some(way) = next {
@@ -366,7 +409,6 @@ impl<'a, W: Weight> Search<'a, W> {
                     is_whole = false;
                 }
             }
-            from = frame.node;
         }
         Conflict {
             steps,

@@ -1,6 +1,8 @@
 //! The rules by which a conflict follows from a network, so that it can be checked again with other
 //! bounds.
 
+use std::ops::ControlFlow;
+
 use super::dynamic::Search;
 use super::graph::{EdgeId, Graph, Kind, Origin, WayId};
 use super::{LinkId, UncertainNetwork};
@@ -8,6 +10,9 @@ use crate::{ConstraintId, Weight};
 
 /// The limit on the parts of a refutation: what is shared is spelt out each time.
 const MOST_PARTS: usize = 10_000;
+
+/// The limit on the parts of all refutations of a network, for each of its nodes.
+const MOST_PARTS_A_NODE: usize = 8;
 
 /// One part of a way through the graph of a network, from its beginning to its end.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,35 +51,52 @@ pub struct Refutation {
     pub cycle: Vec<Way>,
 }
 
-/// A refutation, if there is one that is not too long to be told.
+/// Refutations, if there are any that are not too long to be told.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refuted {
     /// The network is dynamically controllable.
     No,
-    /// It is not, and this is why.
-    Because(Refutation),
+    /// It is not, and each of these is a reason.
+    Because(Vec<Refutation>),
     /// It is not, but to say why takes too many words.
     TooLong,
 }
 
 impl<W: Weight> UncertainNetwork<W> {
-    /// Why the network is not dynamically controllable, rule by rule.
-    pub fn refutation(&self) -> Refuted {
+    /// Why the network is not dynamically controllable, rule by rule: as many reasons, at most, as
+    /// come up when it is gone through once, and no more than `most`. The first one does not depend
+    /// on how many are wanted.
+    pub fn refutations(&self, most: usize) -> Refuted {
         let mut graph = Graph::new(self);
         let mut search = Search::new(self, &mut graph, false);
-        let is_refuted = self
-            .requirements
-            .nodes()
-            .any(|node| search.settle(node).is_err());
-        if !is_refuted {
-            return Refuted::No;
+        let mut found = Vec::new();
+        let mut is_refuted = false;
+        let most_parts = MOST_PARTS.max(MOST_PARTS_A_NODE * self.requirements.node_count());
+        let mut all_parts = 0;
+        let mut on_cycle = |graph: &Graph<W>, cycle: &[WayId]| {
+            is_refuted = true;
+            let mut parts = 0;
+            let ways = cycle.iter().map(|&way| spelt_out(graph, way, &mut parts));
+            found.extend(
+                ways.collect::<Option<_>>()
+                    .map(|cycle| Refutation { cycle }),
+            );
+            all_parts += parts + cycle.len();
+            if found.len() < most && all_parts < most_parts {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        };
+        for node in self.requirements.nodes() {
+            if search.settle_all(node, &mut on_cycle).is_break() {
+                break;
+            }
         }
-        let cycle = search.into_cycle();
-        let mut parts = 0;
-        let ways = cycle.iter().map(|&way| spelt_out(&graph, way, &mut parts));
-        match ways.collect() {
-            Some(cycle) => Refuted::Because(Refutation { cycle }),
-            None => Refuted::TooLong,
+        match (is_refuted, found.is_empty()) {
+            (false, _) => Refuted::No,
+            (true, true) => Refuted::TooLong,
+            (true, false) => Refuted::Because(found),
         }
     }
 }

@@ -62,10 +62,22 @@ fn cut(path: &Path) -> Result<Cut, Failure> {
             "`elbowroom run --journal` writes them; a trace can be played back with --replay",
         ));
     }
-    let mut journal = Journal::read(text.text()).map_err(|why| unreadable(&name, &why))?;
+    let mut journal = Journal::read(text.text())
+        .map_err(|why| unreadable(&name, &why, crate::journal::DAMAGED))?;
+    if journal.text.is_empty() {
+        let is_cut_off = !text.text().contains('\n');
+        let (why, advice) = if is_cut_off {
+            let why =
+                "it ends before its first record does, so that nothing was ever told to the world";
+            (why, "remove it, and begin the run again")
+        } else {
+            ("its first record is damaged", crate::journal::DAMAGED)
+        };
+        return Err(unreadable(&name, why, advice));
+    }
     let read = |journal: &Journal| {
         let stored = Stored::read(&journal.text);
-        stored.map_err(|error| unreadable(&name, &error.to_string()))
+        stored.map_err(|error| unreadable(&name, &error.to_string(), OTHER_VERSION))
     };
     let mut stored = read(&journal)?;
     // A world that has died may be there again.
@@ -83,10 +95,9 @@ fn cut(path: &Path) -> Result<Cut, Failure> {
             "there is nothing to go on with; `elbowroom report` shows what was done",
         ));
     }
-    let spec: RunSpec = stored.header().map_err(|error| {
-        let hint = "the journal may be of another version of this program";
-        Failure::new(format!("{name}, {error}"), hint)
-    })?;
+    let spec = stored.header();
+    let spec: RunSpec =
+        spec.map_err(|error| Failure::new(format!("{name}, {error}"), OTHER_VERSION))?;
     Ok(Cut {
         journal,
         length,
@@ -95,8 +106,12 @@ fn cut(path: &Path) -> Result<Cut, Failure> {
     })
 }
 
-fn unreadable(name: &str, message: &str) -> Failure {
-    Failure::new(format!("the journal {name}: {message}"), "")
+/// What to do about a journal that is whole and is not understood.
+const OTHER_VERSION: &str = "it may be of another version of this program: go on with that one, or begin a new \
+                             run with another journal";
+
+fn unreadable(name: &str, message: &str, advice: &str) -> Failure {
+    Failure::new(format!("the journal {name}: {message}"), advice)
 }
 
 fn leads_elsewhere(name: &str, line: usize) -> Failure {
@@ -105,7 +120,7 @@ fn leads_elsewhere(name: &str, line: usize) -> Failure {
             "the journal {name} does not lead to the same decisions, from line {line} on; nothing was \
              told to the world"
         ),
-        "it may be of another version of this program",
+        OTHER_VERSION,
     )
 }
 
@@ -169,14 +184,14 @@ pub(in crate::commands) fn run(
     } = cut(path)?;
     spec.threads = super::spec::threads_of(arguments, &spec.planner)?;
     let Some(command) = spec.world_process.clone() else {
-        return Err(unreadable(&name, "its world was no process"));
+        return Err(unreadable(&name, "its world was no process", OTHER_VERSION));
     };
     let task = Arc::new(super::task(&spec, output)?);
     // Before anything else is mentioned: the table of facts is as it was.
-    let wrong = |error: &dyn fmt::Display| unreadable(&name, &error.to_string());
+    let wrong = |error: &dyn fmt::Display| unreadable(&name, &error.to_string(), OTHER_VERSION);
     let snapshot = stored.snapshot().map_err(|error| wrong(&error))?;
     let stand = snapshot.as_ref().map(|it| it.stand(&task)).transpose();
-    let stand = stand.map_err(|why| unreadable(&name, &format!("line 2: {why}")))?;
+    let stand = stand.map_err(|why| unreadable(&name, &format!("line 2: {why}"), OTHER_VERSION))?;
     let now = snapshot.as_ref().map(|it| it.now().clone());
     let first = spec.has_plan.then(|| stored.first_plan(&task)).transpose();
     let first = first.map_err(|error| wrong(&error))?.flatten();
