@@ -10,6 +10,10 @@
 //! available at any time, and deciding takes no time, so no executor, however it plans, does
 //! better.
 //!
+//! **Numbers.** Of a number that actions change the state knows between which values it lies
+//! (`numbers`). A comparison counts as one more fact: from above it holds if some of the values meet it,
+//! from below if all do. What is drawn is cut where that decides a comparison.
+//!
 //! What the process leaves out: interfering happenings may be as close as one likes (ε is nothing),
 //! and happenings that coincide take place one after the other. Whether an action has broken down and
 //! can no longer be cancelled is not seen either: the bound from below never cancels one of which that
@@ -30,6 +34,9 @@
 //! Neither takes for granted that being earlier never hurts. Where it does not (no condition asks
 //! for something to be false), fewer cases are looked at.
 //!
+//! Where everything happens at known times, if it happens, there is no grid: states are only where something
+//! happens or gets ready to (`moments`).
+//!
 //! Where plans are known, the value is bounded from below by whoever keeps to the actions of one of them
 //! and acts only when something has happened, too (`within`): that takes far fewer states.
 //!
@@ -41,13 +48,19 @@
 //! adds up to.
 
 mod above;
+mod act;
+mod available;
 mod below;
 mod chances;
 mod compile;
 mod failures;
 mod graph;
 mod kinder;
+mod moments;
+mod numbers;
 mod policy;
+mod projection;
+mod state;
 mod within;
 mod world;
 
@@ -56,10 +69,11 @@ use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
+pub(crate) use act::{Act, Event, Needs};
 pub(crate) use chances::{Chances, Ends};
 pub use policy::Policy;
 pub use within::Within;
-pub(crate) use world::{Act, Event, Facts, Needs, TimedWorld};
+pub(crate) use world::{Facts, TimedWorld};
 
 /// How far to go.
 #[derive(Clone, Debug, PartialEq)]
@@ -182,10 +196,18 @@ pub fn optimum(
         });
     }
     let world = world?;
-    let known = TimedOptimum {
+    let mut known = TimedOptimum {
         lower: search.lower(),
         ..TimedOptimum::unknown()
     };
+    if let Some(grid) = moments::bounds(&world, settings, goes_on)? {
+        known.lower = known.lower.max(grid.lower);
+        known.upper = grid.upper;
+        known.grids.push(grid);
+        if known.upper - known.lower <= settings.gap {
+            return Ok(known);
+        }
+    }
     let mut found = refined(&world, known, settings, &|_| true, goes_on)?;
     if found.stop == Stop::TooManyStates
         && let Some(kinder) = world.without_chances_of_harm()
@@ -317,17 +339,15 @@ fn bound(
     goes_on: &dyn Fn() -> bool,
 ) -> Result<Result<f64, Stop>, NotTabulated> {
     let chances = chances(world, cells, side)?;
+    let world = &world.seen_from(side);
     Ok(match side {
         Side::Above => {
             let value = graph::value(&above::Above::new(world, &chances), left, goes_on);
             value.map(|value| (value + SLACK).min(1.0))
         }
         Side::Below => {
-            let value = graph::value(
-                &below::Below::new(world, &chances, below::ALWAYS),
-                left,
-                goes_on,
-            );
+            let below = below::Below::new(world, &chances, below::ALWAYS);
+            let value = graph::value(&below, left, goes_on);
             value.map(|value| (value - SLACK).max(0.0))
         }
     })

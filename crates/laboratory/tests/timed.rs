@@ -243,6 +243,63 @@ fn bounds_enclose_what_a_plain_recursion_finds_where_failures_leave_something_be
     );
 }
 
+/// With numbers that vary; in half of the worlds everything happens at known times.
+#[test]
+fn bounds_enclose_what_a_plain_recursion_finds_where_numbers_change() {
+    let (mut close, mut matters) = ([0; 2], 0);
+    for number in 0..worlds(200) {
+        let mut rng = ChaCha8Rng::seed_from_u64(6000 + number);
+        let world = SmallWorld::with_numbers(&mut rng, number % 2 == 0);
+        let plain = world.without_numbers().best();
+        for world in [world.clone(), world.with_known_times()] {
+            let (worst, best) = world.best();
+            for first_cells in [twin::ENDS / 2, twin::ENDS] {
+                let found = enclosing(&world, first_cells, [worst, best], 1e-9);
+                let is_open = best > 0.0 && worst < 1.0;
+                if first_cells == twin::ENDS && is_open && found.upper - found.lower < 0.3 {
+                    close[usize::from(world.has_known_times())] += 1;
+                    matters += usize::from((plain.0 - worst).abs() > 0.01);
+                }
+            }
+        }
+    }
+    assert!(
+        close.iter().all(|close| *close >= 8) && matters >= 5,
+        "only {close:?} worlds with close bounds, and in {matters} of them numbers matter: too few \
+         to mean something"
+    );
+}
+
+/// Facts and failures, where everything happens at known times.
+#[test]
+fn bounds_enclose_what_a_plain_recursion_finds_at_known_times() {
+    let mut close = 0;
+    for number in 0..worlds(200) {
+        let mut rng = ChaCha8Rng::seed_from_u64(7000 + number);
+        let asks_for_less = number % 2 == 0;
+        let world = if number % 3 == 0 {
+            SmallWorld::with_outcomes(&mut rng, asks_for_less)
+        } else {
+            SmallWorld::random(&mut rng, asks_for_less)
+        };
+        let world = world.with_known_times();
+        let (worst, best) = world.best();
+        let found = enclosing(&world, twin::ENDS, [worst, best], 1e-9);
+        let is_open = best > 0.0 && worst < 1.0;
+        close += usize::from(is_open && found.upper - found.lower < 0.2);
+    }
+    assert!(
+        close >= 12,
+        "only {close} worlds with close bounds: too few to mean something"
+    );
+}
+
+/// So many worlds, or as many as the environment asks for.
+fn worlds(count: u64) -> u64 {
+    let asked_for = std::env::var("ELBOWROOM_WORLDS").ok();
+    asked_for.map_or(count, |text| text.parse().expect("a number of worlds"))
+}
+
 #[test]
 fn bounds_enclose_what_a_plain_recursion_finds_where_facts_change_at_rates() {
     // More than twice in a second, which the recursion leaves out.

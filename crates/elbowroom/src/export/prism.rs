@@ -50,6 +50,12 @@ pub enum PrismError {
          knows rates"
     )]
     Rates,
+    /// Numbers change that conditions compare.
+    #[error(
+        "the problem has numbers that change and that matter, and only facts are written as a process; \
+         `elbowroom compare` with `optimum = true` knows numbers"
+    )]
+    Numbers,
     /// Failures have several outcomes, or take time.
     #[error(
         "the world has failures with several outcomes or with delays ([[failure.outcome]]), and only \

@@ -3,7 +3,8 @@
 use indexmap::IndexSet;
 
 use super::chances::Chances;
-use super::graph::{Choice, Expansion, Hopes, Nodes, Phase, State, Target};
+use super::graph::{Choice, Expansion, Hopes, Layers, Nodes, Target};
+use super::state::{Phase, State};
 use super::world::TimedWorld;
 
 pub(super) struct Above<'a> {
@@ -16,9 +17,9 @@ type Moment = (State, Coming);
 
 /// The events of a cell, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-struct Coming {
+pub(super) struct Coming {
     /// Those that still have to happen.
-    must: u32,
+    pub(super) must: u32,
     /// Those that may happen as often as one likes.
     may: u32,
 }
@@ -34,7 +35,7 @@ enum Times {
 
 impl Coming {
     /// What is left when that event has happened once.
-    fn without(self, event: usize) -> Self {
+    pub(super) fn without(self, event: usize) -> Self {
         Self {
             must: self.must & !(1 << event),
             ..self
@@ -50,7 +51,7 @@ struct Cell<'c> {
     /// After the nodes of the cell's beginning.
     moments: IndexSet<Moment>,
     first: usize,
-    next: &'c mut IndexSet<State>,
+    later: &'c mut Layers,
     hopes: &'c mut Hopes,
 }
 
@@ -58,45 +59,51 @@ impl<'a> Above<'a> {
     pub(super) fn new(world: &'a TimedWorld, chances: &'a Chances) -> Self {
         Self { world, chances }
     }
+}
 
-    /// What the cell brings: which of the actions under way may end, and which events happen.
-    fn revealed(&self, cell: usize, state: &State) -> Vec<(f64, Moment)> {
-        let mut moments = vec![(1.0, (state.clone(), Coming::default()))];
-        for (place, running) in state.running.iter().enumerate() {
-            let age = cell - usize::from(running.since);
-            let ends = match running.phase {
-                Phase::Goes => &self.chances.ends[usize::from(running.act)][age],
-                Phase::Ready(_) | Phase::Due(_) => continue,
-            };
-            let ways: Vec<_> = ends.ways().collect();
-            moments = split(moments, &ways, |moment, ending| {
-                if let Some(ending) = ending {
-                    moment.0.running[place].phase = Phase::Ready(*ending);
-                }
+/// What the cell brings: which of the actions under way may end, and which events happen.
+pub(super) fn revealed(
+    world: &TimedWorld,
+    chances: &Chances,
+    cell: usize,
+    state: &State,
+) -> Vec<(f64, Moment)> {
+    let mut moments = vec![(1.0, (state.clone(), Coming::default()))];
+    for (place, running) in state.running.iter().enumerate() {
+        let age = cell - usize::from(running.since);
+        let ends = match running.phase {
+            Phase::Goes => &chances.ends[usize::from(running.act)][age],
+            Phase::Ready(_) | Phase::Due(_) => continue,
+        };
+        let act = &world.acts[usize::from(running.act)];
+        let ways: Vec<_> = ends.ways(act).collect();
+        moments = split(moments, &ways, |moment, ending| {
+            if let Some(ending) = ending {
+                moment.0.running[place].phase = Phase::Ready(*ending);
+            }
+        });
+    }
+    for (event, hazards) in chances.events.iter().enumerate() {
+        if state.happened & (1 << event) == 0 {
+            let p = hazards[cell];
+            let often = p * chances.again[event][cell];
+            let ways = [
+                (p - often, Times::Once),
+                (often, Times::Often),
+                (1.0 - p, Times::Never),
+            ];
+            moments = split(moments, &ways, |moment, times| {
+                let (must, may) = match times {
+                    Times::Never => (0, 0),
+                    Times::Once => (1, 0),
+                    Times::Often => (1, 1),
+                };
+                moment.1.must |= must << event;
+                moment.1.may |= may << event;
             });
         }
-        for (event, hazards) in self.chances.events.iter().enumerate() {
-            if state.happened & (1 << event) == 0 {
-                let p = hazards[cell];
-                let often = p * self.chances.again[event][cell];
-                let ways = [
-                    (p - often, Times::Once),
-                    (often, Times::Often),
-                    (1.0 - p, Times::Never),
-                ];
-                moments = split(moments, &ways, |moment, times| {
-                    let (must, may) = match times {
-                        Times::Never => (0, 0),
-                        Times::Once => (1, 0),
-                        Times::Often => (1, 1),
-                    };
-                    moment.1.must |= must << event;
-                    moment.1.may |= may << event;
-                });
-            }
-        }
-        moments
     }
+    moments
 }
 
 /// Each moment in each way, with what then is different.
@@ -130,7 +137,7 @@ impl Expansion for Above<'_> {
         &self,
         cell: usize,
         states: &IndexSet<State>,
-        next: &mut IndexSet<State>,
+        later: &mut Layers,
         hopes: &mut Hopes,
         most: usize,
     ) -> Option<Nodes> {
@@ -139,12 +146,12 @@ impl Expansion for Above<'_> {
             number: cell,
             moments: IndexSet::new(),
             first: states.len(),
-            next,
+            later,
             hopes,
         };
-        let mut nodes: Nodes = Vec::with_capacity(states.len());
+        let mut nodes = Nodes::of(cell);
         for state in states {
-            let revealed = self.revealed(cell, state).into_iter();
+            let revealed = revealed(self.world, self.chances, cell, state).into_iter();
             nodes.push(vec![
                 revealed
                     .map(|(p, moment)| (p, vec![here.target(moment)]))
@@ -182,7 +189,7 @@ impl Cell<'_> {
         if !moment.0.is_hopeful(world, self.hopes) {
             return Target::Lost;
         }
-        Target::Here(self.first + self.moments.insert_full(moment).0)
+        Target::here(self.first + self.moments.insert_full(moment).0)
     }
 
     fn choices(&mut self, moment: &Moment) -> Vec<Choice> {
@@ -238,7 +245,9 @@ impl Cell<'_> {
     fn start(&mut self, state: &State, coming: Coming, act: usize) -> Choice {
         let world = self.bound.world;
         let ways: Vec<_> = match world.acts[act].rest {
-            Some(_) => self.bound.chances.ends[act][0].ways().collect(),
+            Some(_) => self.bound.chances.ends[act][0]
+                .ways(&world.acts[act])
+                .collect(),
             None => vec![(1.0, None)],
         };
         let mut choice = Choice::new();
@@ -260,12 +269,12 @@ impl Cell<'_> {
         if !state.is_hopeful(world, self.hopes) {
             return Target::Lost;
         }
-        Target::Next(self.next.insert_full(state).0)
+        Target::later(self.later, self.number + 1, state)
     }
 }
 
 /// What is best done at once.
-fn forced(world: &TimedWorld, mut moment: Moment) -> Moment {
+pub(super) fn forced(world: &TimedWorld, mut moment: Moment) -> Moment {
     loop {
         let (state, coming) = &moment;
         let event = (0..world.events.len())

@@ -3,9 +3,11 @@
 
 use indexmap::IndexSet;
 
+use super::Side;
 use super::chances::Chances;
 use super::failures::Ending;
-use super::graph::{Choice, Expansion, Hopes, Nodes, Phase, State, Target};
+use super::graph::{Choice, Expansion, Hopes, Layers, Nodes, Target};
+use super::state::{Phase, State};
 use super::world::TimedWorld;
 
 /// What more than so many happenings in one cell lead to is taken to be lost.
@@ -22,6 +24,10 @@ pub(super) struct Below<'a> {
     chances: &'a Chances,
     /// After how many cells in which nothing happens the agent may do something all the same.
     stride: usize,
+    /// The actions that are not left undone, as bits.
+    must: u64,
+    /// Whether everything happens at [known times](super::moments).
+    by_moments: bool,
 }
 
 /// Something that happens in a cell.
@@ -67,8 +73,9 @@ fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
 }
 
 /// Who acts only when something has happened does not wait, or let anything go, while there is something to
-/// start that breaks nothing off that is under way, and starts nothing that does.
-fn leave_nothing_undone(world: &TimedWorld, state: &State, moves: &mut Vec<Move>) {
+/// start that breaks nothing off that is under way, and starts nothing that does. Where not all actions are ones
+/// that have to be done, those that need not be may be started, too.
+fn leave_nothing_undone(world: &TimedWorld, state: &State, must: u64, moves: &mut Vec<Move>) {
     let breaks_nothing = |choice: &Move| match choice {
         Move::Start(act) => {
             let under_way = usize::from(world.acts[*act].rest.is_some());
@@ -77,10 +84,13 @@ fn leave_nothing_undone(world: &TimedWorld, state: &State, moves: &mut Vec<Move>
         }
         Move::Cancel(_) | Move::Wait => false,
     };
-    if moves.iter().any(&breaks_nothing) {
+    let is_undone = |choice: &Move| {
+        matches!(choice, Move::Start(act) if must & (1 << act) != 0) && breaks_nothing(choice)
+    };
+    if moves.iter().any(is_undone) {
         moves.retain(breaks_nothing);
     } else {
-        moves.retain(|choice| !matches!(choice, Move::Start(_)));
+        moves.retain(|choice| !matches!(choice, Move::Start(_)) || breaks_nothing(choice));
     }
 }
 
@@ -91,7 +101,7 @@ struct Cell<'c> {
     number: usize,
     /// The states in which the agent decides, those at the boundary first.
     moments: IndexSet<State>,
-    next: &'c mut IndexSet<State>,
+    later: &'c mut Layers,
     hopes: &'c mut Hopes,
 }
 
@@ -102,14 +112,31 @@ impl<'a> Below<'a> {
             world,
             chances,
             stride,
+            must: u64::MAX,
+            by_moments: false,
+        }
+    }
+
+    /// Whoever acts when something has happened, where everything happens at [known times](super::moments).
+    /// It leaves none of the actions undone that are bits of `must`.
+    pub(super) fn by_moments(world: &'a TimedWorld, chances: &'a Chances, must: u64) -> Self {
+        Self {
+            world,
+            chances,
+            stride: WHEN_SOMETHING_HAPPENS,
+            must,
+            by_moments: true,
         }
     }
 
     /// All that whoever acts so looks at in a state, as [`moves`].
     pub(super) fn moves(&self, state: &State) -> Vec<Move> {
         let mut moves = moves(self.world, state);
+        if self.by_moments {
+            moves.retain(|choice| !matches!(choice, Move::Cancel(_)));
+        }
         if self.stride == WHEN_SOMETHING_HAPPENS {
-            leave_nothing_undone(self.world, state, &mut moves);
+            leave_nothing_undone(self.world, state, self.must, &mut moves);
         }
         moves
     }
@@ -131,7 +158,8 @@ impl<'a> Below<'a> {
         for running in &state.running {
             let age = cell - usize::from(running.since);
             let ends = &self.chances.ends[usize::from(running.act)][age];
-            let ways = ends.ways().map(|(p, ending)| {
+            let act = &self.world.acts[usize::from(running.act)];
+            let ways = ends.ways(act).map(|(p, ending)| {
                 let end = ending.map(|ending| Happening::End(running.act, ending));
                 (p, end)
             });
@@ -266,7 +294,7 @@ impl Expansion for Below<'_> {
         &self,
         cell: usize,
         states: &IndexSet<State>,
-        next: &mut IndexSet<State>,
+        later: &mut Layers,
         hopes: &mut Hopes,
         most: usize,
     ) -> Option<Nodes> {
@@ -274,10 +302,10 @@ impl Expansion for Below<'_> {
             bound: self,
             number: cell,
             moments: states.clone(),
-            next,
+            later,
             hopes,
         };
-        let mut nodes = Nodes::with_capacity(states.len());
+        let mut nodes = Nodes::of(cell);
         while let Some(state) = here.moments.get_index(nodes.len()).cloned() {
             if nodes.len() >= most {
                 return None;
@@ -301,7 +329,7 @@ impl Cell<'_> {
         if !state.is_hopeful(world, self.hopes) {
             return Target::Lost;
         }
-        Target::Here(self.moments.insert_full(state).0)
+        Target::here(self.moments.insert_full(state).0)
     }
 
     fn choices(&mut self, state: &State) -> Vec<Choice> {
@@ -333,20 +361,32 @@ impl Cell<'_> {
         }
     }
 
-    /// What comes of doing nothing until the next boundary.
+    /// What comes of doing nothing until the next boundary, or until something has happened.
     fn wait(&mut self, state: &State) -> Choice {
         let world = self.bound.world;
+        let chances = self.bound.chances;
+        let cell = if self.bound.stride == WHEN_SOMETHING_HAPPENS {
+            match chances.next(state, self.number) {
+                Some(cell) => cell,
+                None => return vec![(1.0, vec![Target::Lost])],
+            }
+        } else {
+            self.number
+        };
         let mut choice = Choice::new();
-        for (p, happenings) in self.bound.happenings(self.number, state) {
+        for (p, happenings) in self.bound.happenings(cell, state) {
             let outcomes = self.bound.outcomes(state, &happenings).unwrap_or_default();
-            let may_act =
-                !happenings.is_empty() || (self.number + 1).is_multiple_of(self.bound.stride);
+            let may_act = !happenings.is_empty() || (cell + 1).is_multiple_of(self.bound.stride);
             let targets = outcomes.into_iter().map(|mut outcome| {
                 outcome.may_act = may_act;
                 if outcome.is_won(world) {
-                    Target::Won
-                } else if outcome.is_hopeful(world, self.hopes) {
-                    Target::Next(self.next.insert_full(outcome).0)
+                    return Target::Won;
+                }
+                let is_hopeful = outcome.is_hopeful(world, self.hopes)
+                    && (!self.bound.by_moments
+                        || chances.is_in_time(world, &outcome, cell + 1, Side::Below));
+                if is_hopeful {
+                    Target::later(self.later, cell + 1, outcome)
                 } else {
                     Target::Lost
                 }

@@ -3,8 +3,9 @@
 
 use elbowroom_sim::{Side as Part, rounding_edge};
 
+use super::act::{Act, Occurs};
 use super::failures::Ending;
-use super::world::{Act, Occurs, TimedWorld, unknown_shape};
+use super::world::{TimedWorld, unknown_shape};
 use super::{NotTabulated, Side};
 
 /// How likely it is that something happens in a cell, given that it has not before.
@@ -20,7 +21,14 @@ pub(crate) struct Chances {
     pub(crate) again: Vec<Vec<f64>>,
     /// By event: that it has happened before anybody could do something.
     pub(crate) before: Vec<f64>,
+    /// By action and number of cells since it began: after how many it may next end; and by event and
+    /// cell: in which it may next happen.
+    pub(super) next_end: Vec<Vec<u32>>,
+    pub(super) next_event: Vec<Vec<u32>>,
 }
+
+/// It may not happen any more.
+pub(super) const NEVER: u32 = u32::MAX;
 
 /// How likely an action ends in a cell, given that it has not before.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,13 +48,16 @@ impl Ends {
         self.badly.iter().sum()
     }
 
-    /// That it ends in each way, and that it does not.
-    pub(super) fn ways(&self) -> impl Iterator<Item = (f64, Option<Ending>)> {
+    /// That an action ends in each way, and that it does not.
+    pub(super) fn ways(&self, act: &Act) -> impl Iterator<Item = (f64, Option<Ending>)> {
         let badly = (0_u8..).zip(&self.badly);
         let badly = badly.map(|(way, p)| (*p, Some(Ending::Badly(way))));
-        let well = (self.well, Some(Ending::Well));
+        let draws = act.rest.iter().flat_map(|(_, end)| &end.draws);
+        let well = (0_u16..).zip(draws);
+        let well = well.map(|(draw, (p, _))| (self.well * p, Some(Ending::Well(draw))));
         let not = ((1.0 - self.in_all()).max(0.0), None);
-        std::iter::once(well).chain(badly).chain([not])
+        let all: Vec<_> = well.chain(badly).chain([not]).collect();
+        all.into_iter()
     }
 }
 
@@ -66,9 +77,9 @@ impl Chances {
             Side::Above => Part::Below,
             Side::Below => Part::UpTo,
         };
-        #[allow(clippy::cast_precision_loss, reason = "at most 65,535 cells")]
-        let boundary = |cell: usize| step * cell as f64;
         let resolution = world.model.resolution.to_f64();
+        #[allow(clippy::cast_precision_loss, reason = "at most 65,535 cells")]
+        let boundary = |cell: usize| earlier(step * cell as f64, 0.0, resolution);
         let mut ends = Vec::new();
         for act in &world.acts {
             let mut hazards = Vec::new();
@@ -126,14 +137,35 @@ impl Chances {
             }
             events.push(hazards);
         }
+        let next_end = ends
+            .iter()
+            .map(|hazards: &Vec<Ends>| next(hazards.iter().map(|ends| ends.in_all() > 0.0)));
+        let next_event = events
+            .iter()
+            .map(|hazards| next(hazards.iter().map(|p| *p > 0.0)));
         Ok(Self {
             cells,
+            next_end: next_end.collect(),
+            next_event: next_event.collect(),
             ends,
             events,
             again,
             before,
         })
     }
+}
+
+/// By place: the first from there on that is so.
+fn next(is_so: impl DoubleEndedIterator<Item = bool> + ExactSizeIterator) -> Vec<u32> {
+    let mut next = NEVER;
+    let mut all = vec![NEVER; is_so.len()];
+    for (place, is_so) in is_so.enumerate().rev() {
+        if is_so {
+            next = u32::try_from(place).unwrap_or(NEVER);
+        }
+        all[place] = next;
+    }
+    all
 }
 
 /// How likely something happens that happens so many times on average, without a memory; and that
@@ -203,7 +235,11 @@ fn ended(
     let resolution = world.model.resolution.to_f64();
     let mut badly = Vec::with_capacity(act.failures.len());
     for failed in &act.failures {
-        let until = earlier(until, failed.delay, resolution);
+        let until = if failed.delay > 0.0 {
+            earlier(until, failed.delay, resolution)
+        } else {
+            until
+        };
         let mut p = act.at_end * over(until)?;
         for (share, weight) in shares {
             let has_failed = if *share > 0.0 {
@@ -227,9 +263,6 @@ fn ended(
 
 /// So much earlier than a time; a multiple of the resolution stays one, whatever is rounded.
 fn earlier(time: f64, by: f64, resolution: f64) -> f64 {
-    if by <= 0.0 {
-        return time;
-    }
     let steps = (time - by) / resolution;
     let whole = steps.round();
     if (steps - whole).abs() < 1e-6 {

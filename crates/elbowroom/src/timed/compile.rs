@@ -1,150 +1,30 @@
 //! From a task and a world file to facts as bits, actions and events.
 
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use elbowroom_model::ground::{
-    Action, Body, Change, Condition, DurativeBody, Effect, Expression, FactId, SnapAction,
+    Action, Body, Change, Condition, DurativeBody, Effect, Expression, FactId, FluentId, SnapAction,
 };
-use elbowroom_model::problem::{self, Comparison, TimedChange, TimedInitial};
-use elbowroom_model::reachability::{self, Answer};
+use elbowroom_model::problem::{Comparison, UpdateOperator};
 use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
-use elbowroom_sim::{Becoming, Distribution, ExogenousChange, Failure, WorldModel};
+use elbowroom_sim::{Distribution, ExogenousChange, Failure, WorldModel};
 
-use super::world::{Act, Event, Facts, Needs, Occurs, Snap};
-use super::{NotTabulated, Settings};
+use super::NotTabulated;
+use super::act::{Act, Event, Needs, Occurs, Snap};
+use super::available::left_by_failures;
+use super::numbers::{Amount, By, Changed, Number, Test, units};
+use super::world::Facts;
 
-/// All actions that can start, whatever happens by itself, or those that are asked for. One that
-/// can never end is in no plan, but what its start does may still be of use.
-pub(super) fn actions(
-    task: &Task,
-    model: &WorldModel,
-    settings: &Settings,
-) -> Result<Vec<Action>, NotTabulated> {
-    let mut problem = task.problem().clone();
-    for event in &model.exogenous {
-        if let ExogenousChange::Fact(name, truth) = &event.change
-            && let Some(fact) = task.fact_named(name)
-        {
-            let (predicate, objects) = task.atom(fact);
-            let change = if *truth {
-                TimedChange::Add
-            } else {
-                TimedChange::Delete
-            };
-            problem.timed.push(TimedInitial {
-                time: Rational::ONE,
-                change: change(predicate, objects),
-            });
-        }
-    }
-    for (name, hazard) in model.hazardous(task.problem()) {
-        let Some(fact) = task.fact_named(&name) else {
-            continue;
-        };
-        let (predicate, objects) = task.atom(fact);
-        let mut add = |change| {
-            problem.timed.push(TimedInitial {
-                time: Rational::ONE,
-                change,
-            });
-        };
-        if hazard.becomes_true > 0.0 {
-            add(TimedChange::Add(predicate, objects.clone()));
-        }
-        if hazard.becomes_false > 0.0 {
-            add(TimedChange::Delete(predicate, objects));
-        }
-    }
-    for schema in &mut problem.schemas {
-        if let problem::Body::Durative {
-            over_all, at_end, ..
-        } = &mut schema.body
-        {
-            *over_all = problem::Condition::TRUE;
-            *at_end = problem::Condition::TRUE;
-        }
-    }
-    // What failures leave behind may be what other actions need.
-    let mut left: BTreeSet<(FactId, bool)> = BTreeSet::new();
-    loop {
-        let actions = grounded(task, &problem, settings)?;
-        let mut is_news = false;
-        for action in &actions {
-            for (fact, truth) in left_by_failures(task, model, &action.name) {
-                if left.insert((fact, truth)) {
-                    is_news = true;
-                    let (predicate, objects) = task.atom(fact);
-                    let change = if truth {
-                        TimedChange::Add
-                    } else {
-                        TimedChange::Delete
-                    };
-                    problem.timed.push(TimedInitial {
-                        time: Rational::ONE,
-                        change: change(predicate, objects),
-                    });
-                }
-            }
-        }
-        if !is_news {
-            return Ok(actions);
-        }
-    }
-}
-
-/// The actions of a task that can start if the problem is this one.
-fn grounded(
-    task: &Task,
-    problem: &problem::Problem,
-    settings: &Settings,
-) -> Result<Vec<Action>, NotTabulated> {
-    let wider = Task::new(problem.clone());
-    let Answer::Complete(grounding) =
-        reachability::ground(&wider, &reachability::Settings::default())
-    else {
-        return Err(NotTabulated::new(
-            "there are more actions than can be listed",
-        ));
-    };
-    if !grounding.rules.is_empty() {
-        return Err(NotTabulated::new("the domain has derived predicates"));
-    }
-    let mut actions = Vec::new();
-    for (schema, arguments) in grounding.instances() {
-        let name = task.action_name(schema, &arguments);
-        let only = settings.only.as_ref();
-        if only.is_some_and(|only| !only.iter().any(|it| it.eq_ignore_ascii_case(&name))) {
-            continue;
-        }
-        let action = task.instantiate(schema, &arguments);
-        let refused = || NotTabulated::new(format!("{name} cannot be instantiated"));
-        actions.push(action.map_err(|_| refused())?);
-    }
-    Ok(actions)
-}
-
-/// The facts that failures of an action may change, and what they become.
-fn left_by_failures(task: &Task, model: &WorldModel, action: &str) -> Vec<(FactId, bool)> {
-    let outcomes = model.failing(action).into_iter();
-    let changes = outcomes
-        .flat_map(|failing| &failing.outcomes)
-        .flat_map(|outcome| &outcome.changes);
-    let facts = changes.filter_map(|change| match change.becomes {
-        Becoming::Truth(truth) => Some((task.fact_named(&change.what.of(action))?, truth)),
-        Becoming::Value(_) | Becoming::Grown(_) => None,
-    });
-    facts.collect()
-}
-
-/// The facts on which the goal depends, through whatever actions and their failures.
-pub(super) fn relevant(
+/// The facts and numbers on which the goal depends, through whatever actions and their failures.
+fn relevant(
     task: &Task,
     model: &WorldModel,
     actions: &[Action],
     goal: &Condition,
-) -> Vec<FactId> {
+) -> (BTreeSet<FactId>, BTreeSet<FluentId>) {
     let left: Vec<Vec<FactId>> = actions
         .iter()
         .map(|action| {
@@ -152,35 +32,51 @@ pub(super) fn relevant(
             left.into_iter().map(|(fact, _)| fact).collect()
         })
         .collect();
-    let mut facts = BTreeSet::new();
-    goal.visit_facts(&mut |fact| {
-        facts.insert(fact);
-    });
+    let (mut facts, mut numbers) = (BTreeSet::new(), BTreeSet::new());
+    read(goal, &mut facts, &mut numbers);
     loop {
-        let before = facts.len();
+        let before = facts.len() + numbers.len();
         for (action, left) in actions.iter().zip(&left) {
             let snaps = snaps(action);
             let mut effects = snaps.iter().flat_map(|snap| &snap.effects);
             let matters = effects.any(|effect| match &effect.change {
                 Change::Add(fact) | Change::Delete(fact) => facts.contains(fact),
-                Change::Update { .. } => false,
+                Change::Update { fluent, .. } => numbers.contains(fluent),
             });
             if matters || left.iter().any(|fact| facts.contains(fact)) {
-                let mut insert = |fact| {
-                    facts.insert(fact);
-                };
                 for snap in snaps {
-                    snap.condition.visit_facts(&mut insert);
+                    read(&snap.condition, &mut facts, &mut numbers);
                 }
                 if let Some(body) = action.durative() {
-                    body.over_all.visit_facts(&mut insert);
+                    read(&body.over_all, &mut facts, &mut numbers);
                 }
             }
         }
-        if facts.len() == before {
-            return facts.into_iter().collect();
+        if facts.len() + numbers.len() == before {
+            return (facts, numbers);
         }
     }
+}
+
+/// Enters what a condition reads.
+fn read(condition: &Condition, facts: &mut BTreeSet<FactId>, numbers: &mut BTreeSet<FluentId>) {
+    condition.visit_facts(&mut |fact| {
+        facts.insert(fact);
+    });
+    condition.visit_fluents(&mut |fluent| {
+        numbers.insert(fluent);
+    });
+}
+
+/// The numbers that actions change.
+fn changing(actions: &[Action]) -> BTreeSet<FluentId> {
+    let snaps = actions.iter().flat_map(snaps);
+    let effects = snaps.flat_map(|snap| &snap.effects);
+    let changing = effects.filter_map(|effect| match &effect.change {
+        Change::Update { fluent, .. } => Some(*fluent),
+        Change::Add(_) | Change::Delete(_) => None,
+    });
+    changing.collect()
 }
 
 fn snaps(action: &Action) -> Vec<&SnapAction> {
@@ -193,11 +89,52 @@ fn snaps(action: &Action) -> Vec<&SnapAction> {
 /// A task, with numbers for the facts that matter.
 pub(super) struct Compiler<'t> {
     pub(super) task: &'t Task,
+    model: &'t WorldModel,
     /// Sorted.
     pub(super) facts: Vec<FactId>,
+    /// The numbers that matter and change, sorted by fluent.
+    pub(super) numbers: Vec<Number>,
+    /// All numbers that change.
+    changing: BTreeSet<FluentId>,
+    /// The comparisons that have been met so far.
+    pub(super) tests: RefCell<Vec<Test>>,
 }
 
-impl Compiler<'_> {
+impl<'t> Compiler<'t> {
+    pub(super) fn new(
+        task: &'t Task,
+        model: &'t WorldModel,
+        actions: &[Action],
+        goal: &Condition,
+    ) -> Result<Self, NotTabulated> {
+        let changing = changing(actions);
+        let (facts, numbers) = relevant(task, model, actions, goal);
+        let numbers = numbers.intersection(&changing).map(|fluent| {
+            let value = task.initial().values.get(fluent);
+            let initial = value.and_then(units).ok_or_else(|| {
+                NotTabulated::new(format!(
+                    "{} changes, and has no value to begin with, or one of more than six decimals",
+                    task.fluent_name(*fluent)
+                ))
+            })?;
+            Ok(Number::new(*fluent, initial))
+        });
+        let compiler = Self {
+            task,
+            model,
+            facts: facts.into_iter().collect(),
+            numbers: numbers.collect::<Result<_, _>>()?,
+            changing,
+            tests: RefCell::default(),
+        };
+        if compiler.facts.len() > 128 {
+            return Err(NotTabulated::new(format!(
+                "{} facts matter, and 128 is the most",
+                compiler.facts.len()
+            )));
+        }
+        Ok(compiler)
+    }
     /// 0 for what does not matter.
     pub(super) fn bit(&self, fact: FactId) -> Facts {
         self.facts
@@ -211,28 +148,118 @@ impl Compiler<'_> {
         };
         Ok(match condition {
             Condition::Fact(fact) => Needs::Fact(self.bit(*fact)),
-            Condition::Not(part) => Needs::Not(Box::new(self.needs(part)?)),
+            Condition::Not(part) => match &**part {
+                Condition::Compare(comparison, left, right) => {
+                    self.compare(*comparison, left, right, true)?
+                }
+                part => Needs::Not(Box::new(self.needs(part)?)),
+            },
             Condition::And(parts) => Needs::All(all(parts)?),
             Condition::Or(parts) => Needs::Any(all(parts)?),
-            // No action that is let in changes a number.
             Condition::Compare(comparison, left, right) => {
-                let value = |side| self.value(side);
-                let (Some(left), Some(right)) = (value(left), value(right)) else {
-                    return Err(NotTabulated::new(
-                        "a condition reads a number that has no value",
-                    ));
-                };
-                if comparison.holds(&left, &right) {
-                    Needs::All(Vec::new())
-                } else {
-                    Needs::Any(Vec::new())
-                }
+                self.compare(*comparison, left, right, false)?
             }
         })
     }
 
+    /// A comparison of known numbers, or of a number that changes with a known one.
+    fn compare(
+        &self,
+        comparison: Comparison,
+        left: &Expression,
+        right: &Expression,
+        is_negated: bool,
+    ) -> Result<Needs, NotTabulated> {
+        let (number, comparison, bound) = match (
+            self.number(left),
+            self.value(left),
+            self.number(right),
+            self.value(right),
+        ) {
+            (_, Some(left), _, Some(right)) => {
+                let parts = Vec::new();
+                return Ok(if comparison.holds(&left, &right) == is_negated {
+                    Needs::Any(parts)
+                } else {
+                    Needs::All(parts)
+                });
+            }
+            (Some(number), _, _, Some(bound)) => (number, comparison, bound),
+            (_, Some(bound), Some(number), _) => (number, turned(comparison), bound),
+            _ => {
+                return Err(NotTabulated::new(
+                    "a condition compares something else than a number that changes with one that \
+                         does not, or reads a number that has no value",
+                ));
+            }
+        };
+        let bound = units(&bound).ok_or_else(too_fine)?;
+        let test = Test::new(number, comparison, bound);
+        let test = if is_negated { test.negated() } else { test };
+        let mut tests = self.tests.borrow_mut();
+        let place = tests.iter().position(|known| *known == test);
+        let place = place.unwrap_or_else(|| {
+            tests.push(test);
+            tests.len() - 1
+        });
+        let bit = self.facts.len() + place;
+        // Of more than there are bits for nothing comes.
+        Ok(Needs::Fact(if bit < 128 { 1 << bit } else { 0 }))
+    }
+
+    /// The place of a number that changes.
+    fn number(&self, expression: &Expression) -> Option<usize> {
+        match expression {
+            Expression::Fluent(fluent) => {
+                let mut numbers = self.numbers.iter();
+                numbers.position(|number| number.fluent == *fluent)
+            }
+            _ => None,
+        }
+    }
+
+    /// What becomes of a number that matters.
+    fn amount(
+        &self,
+        name: &str,
+        fluent: FluentId,
+        operator: UpdateOperator,
+        value: &Expression,
+    ) -> Result<Option<Amount>, NotTabulated> {
+        let refuse = |what: &str| Err(NotTabulated::new(format!("{name} has {what}")));
+        let Some(number) = self.number(&Expression::Fluent(fluent)) else {
+            return Ok(None);
+        };
+        let change = match operator {
+            UpdateOperator::Assign => Changed::Set,
+            UpdateOperator::Increase => Changed::Added,
+            UpdateOperator::Decrease => Changed::Taken,
+            UpdateOperator::ScaleUp | UpdateOperator::ScaleDown => {
+                return refuse("effects that scale numbers");
+            }
+        };
+        let Some(planned) = self.value(value) else {
+            return refuse("an amount that depends on what changes, or on a duration");
+        };
+        let by = match self.model.amount(name, &self.task.fluent_name(fluent)) {
+            Some(rule) => By::Drawn {
+                rule: rule.clone(),
+                planned: planned.to_f64(),
+            },
+            None => By::Known(units(&planned).ok_or_else(too_fine)?),
+        };
+        if let By::Drawn { rule, planned } = &by
+            && rule.is_relative
+            && *planned <= 0.0
+        {
+            return refuse("an amount that is drawn in proportion to none");
+        }
+        Ok(Some(Amount { number, change, by }))
+    }
+
     fn value(&self, expression: &Expression) -> Option<Rational> {
         expression.evaluate(&mut |leaf| match leaf {
+            Expression::Fluent(fluent) if self.changing.contains(fluent) => None,
             Expression::Fluent(fluent) => self.task.initial().values.get(fluent).cloned(),
             _ => None,
         })
@@ -241,6 +268,7 @@ impl Compiler<'_> {
     fn snap(&self, snap: &SnapAction, name: &str) -> Result<Snap, NotTabulated> {
         let refuse = |what: &str| Err(NotTabulated::new(format!("{name} has {what}")));
         let (mut adds, mut deletes) = (0, 0);
+        let mut amounts = Vec::new();
         for Effect { guard, change } in &snap.effects {
             if !guard.is_trivial() {
                 return refuse("conditional effects");
@@ -248,14 +276,42 @@ impl Compiler<'_> {
             match change {
                 Change::Add(fact) => adds |= self.bit(*fact),
                 Change::Delete(fact) => deletes |= self.bit(*fact),
-                Change::Update { .. } => return refuse("effects on numbers"),
+                Change::Update {
+                    operator,
+                    fluent,
+                    value,
+                } => amounts.extend(self.amount(name, *fluent, *operator, value)?),
             }
+        }
+        let mut changed: Vec<usize> = amounts.iter().map(|amount| amount.number).collect();
+        changed.sort_unstable();
+        changed.dedup();
+        if changed.len() < amounts.len() {
+            return refuse("several effects on one number at once");
         }
         Ok(Snap {
             needs: self.needs(&snap.condition)?,
             adds,
             deletes,
+            amounts,
+            helps: 0,
+            draws: Vec::new(),
         })
+    }
+
+    /// Whether an action, or a failure of it, changes anything that matters.
+    fn matters(&self, action: &Action) -> bool {
+        let snaps = snaps(action).into_iter();
+        let mut effects = snaps.flat_map(|snap| &snap.effects);
+        let mut left = left_by_failures(self.task, self.model, &action.name).into_iter();
+        let is_number = |fluent: &FluentId| {
+            let mut numbers = self.numbers.iter();
+            numbers.any(|number| number.fluent == *fluent)
+        };
+        effects.any(|effect| match &effect.change {
+            Change::Add(fact) | Change::Delete(fact) => self.bit(*fact) != 0,
+            Change::Update { fluent, .. } => is_number(fluent),
+        }) || left.any(|(fact, _)| self.bit(fact) != 0)
     }
 
     /// `None` for what cannot matter, or never starts.
@@ -269,12 +325,17 @@ impl Compiler<'_> {
         if model.delay_rule(name).is_some() {
             return refuse("a delay");
         }
+        if let Some(body) = action.durative()
+            && !body.continuous.is_empty()
+        {
+            return refuse("continuous effects");
+        }
+        if !self.matters(action) {
+            return Ok(None);
+        }
         let (start, rest, planned) = match &action.body {
             Body::Instantaneous(snap) => (self.snap(snap, name)?, None, Rational::ZERO),
             Body::Durative(body) => {
-                if !body.continuous.is_empty() {
-                    return refuse("continuous effects");
-                }
                 let Some(planned) = self.duration(body) else {
                     return refuse("a duration that is to be chosen");
                 };
@@ -282,13 +343,10 @@ impl Compiler<'_> {
                 (self.snap(&body.start, name)?, Some(rest), planned)
             }
         };
-        let failures = self.failures(name, model, &start, rest.is_some())?;
-        let end = rest.as_ref().map_or(0, |(_, end)| end.adds | end.deletes);
-        let failed = failures.iter();
-        let failed = failed.fold(0, |all, failed| all | failed.adds | failed.deletes);
-        if start.adds | start.deletes | end | failed == 0 {
-            return Ok(None);
+        if start.amounts.iter().any(Amount::is_drawn) {
+            return refuse("an amount that is drawn at its start");
         }
+        let failures = self.failures(name, model, &start, rest.is_some())?;
         let (mut midway, mut at_end) = (0.0, 0.0);
         if let Some(failing) = model.failing(name) {
             let is_at_start = failing.when == Failure::AtStart || rest.is_none();
@@ -395,4 +453,19 @@ impl Compiler<'_> {
         events.retain(|event| event.adds | event.deletes != 0 && ever(event));
         Ok(events)
     }
+}
+
+/// The comparison with its sides exchanged.
+fn turned(comparison: Comparison) -> Comparison {
+    match comparison {
+        Comparison::Less => Comparison::Greater,
+        Comparison::AtMost => Comparison::AtLeast,
+        Comparison::Equal => Comparison::Equal,
+        Comparison::AtLeast => Comparison::AtMost,
+        Comparison::Greater => Comparison::Less,
+    }
+}
+
+fn too_fine() -> NotTabulated {
+    NotTabulated::new("there is a number of more than six decimals")
 }

@@ -3,8 +3,9 @@
 use elbowroom_sim::{Becoming, Failing, Failure, Outcome, WorldModel};
 
 use super::NotTabulated;
+use super::act::{Act, Snap};
 use super::compile::Compiler;
-use super::world::{Act, Facts, Snap};
+use super::world::Facts;
 
 /// A way to fail.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +22,8 @@ pub(crate) struct Failed {
 /// How an action ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Ending {
-    Well,
+    /// With amounts that come out in that one of the ways in which they can.
+    Well(u16),
     /// In that one of the ways in which it can fail.
     Badly(u8),
 }
@@ -48,7 +50,7 @@ impl Act {
     /// The way in which it fails, if it ends badly.
     pub(super) fn failed(&self, ending: Ending) -> Option<&Failed> {
         match ending {
-            Ending::Well => None,
+            Ending::Well(_) => None,
             Ending::Badly(way) => self.failures.get(usize::from(way)),
         }
     }

@@ -1,50 +1,25 @@
 //! What both bounds have in common: states, cell by cell, and their values backwards.
 
+use std::collections::BTreeMap;
+
 use indexmap::{IndexMap, IndexSet};
 
 use super::Stop;
-use super::failures::Ending;
-use super::world::{Facts, TimedWorld};
-
-/// A state at the beginning of a cell.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(super) struct State {
-    pub(super) facts: Facts,
-    /// Which events have happened, as bits; not those that happen again and again.
-    pub(super) happened: u32,
-    /// Sorted by action.
-    pub(super) running: Vec<Running>,
-    /// Whether the agent may do something before anything more happens.
-    pub(super) may_act: bool,
-}
-
-/// An action under way.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) struct Running {
-    pub(super) act: u8,
-    /// The cell in which it began.
-    pub(super) since: u16,
-    pub(super) phase: Phase,
-}
-
-/// What is known of an action's end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) enum Phase {
-    /// Nothing yet.
-    Goes,
-    /// It may end in this cell, or in the next one.
-    Ready(Ending),
-    /// It ends in this cell.
-    Due(Ending),
-}
+use super::state::State;
+use super::world::Facts;
 
 /// Where something leads.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Target {
-    /// To a state at the beginning of the next cell.
-    Next(usize),
+    /// To a state at the beginning of a later cell.
+    Later {
+        /// The cell.
+        cell: u32,
+        /// The place of the state among those of the cell.
+        state: u32,
+    },
     /// To another node of this cell.
-    Here(usize),
+    Here(u32),
     /// To the goal.
     Won,
     /// To where there is no hope.
@@ -55,8 +30,23 @@ pub(super) enum Target {
 /// more than one target, the worst counts.
 pub(super) type Choice = Vec<(f64, Vec<Target>)>;
 
-/// The states of one cell, those at its beginning first, with all choices of each.
-pub(super) type Nodes = Vec<Vec<Choice>>;
+/// The nodes of one cell, the states at its beginning first, with all choices of each. There are
+/// millions of them, so they are kept one after the other.
+#[derive(Debug, Default)]
+pub(super) struct Nodes {
+    /// The cell that they are of.
+    cell: u32,
+    /// By node: where its choices end.
+    ends: Vec<u32>,
+    /// By choice: where its ways end.
+    choices: Vec<u32>,
+    /// By way: how likely it is, and where its targets end.
+    ways: Vec<(f64, u32)>,
+    targets: Vec<Target>,
+}
+
+/// The states at the beginnings of cells; those of the end of the last cell come after it.
+pub(super) type Layers = BTreeMap<u32, IndexSet<State>>;
 
 /// One of the two bounds.
 pub(super) trait Expansion {
@@ -67,12 +57,12 @@ pub(super) trait Expansion {
     fn initial(&self) -> Vec<(f64, State)>;
 
     /// The nodes of a cell, which depend on nothing but these states; those to which they lead are
-    /// entered into `next`. `None` if there are more nodes than `most`.
+    /// entered into the layers of later cells. `None` if there are more nodes than `most`.
     fn expand(
         &self,
         cell: usize,
         states: &IndexSet<State>,
-        next: &mut IndexSet<State>,
+        later: &mut Layers,
         hopes: &mut Hopes,
         most: usize,
     ) -> Option<Nodes>;
@@ -84,130 +74,97 @@ pub(super) trait Expansion {
 /// Where there is hope, as far as that has been looked at.
 pub(super) type Hopes = IndexMap<(Facts, u64, u32), bool>;
 
-impl State {
-    /// The state before anything has been done, or has happened by itself.
-    pub(super) fn initial(world: &TimedWorld) -> Self {
-        Self {
-            facts: world.initial,
-            happened: 0,
-            running: Vec::new(),
-            may_act: true,
-        }
+/// There are fewer than 2^32 of anything: that many have no room.
+fn small(count: usize) -> u32 {
+    u32::try_from(count).expect("fewer than 2^32")
+}
+
+impl Target {
+    /// That node of this cell.
+    pub(super) fn here(node: usize) -> Self {
+        Self::Here(small(node))
     }
 
-    pub(super) fn under_way(&self) -> u64 {
-        self.running
-            .iter()
-            .fold(0, |set, running| set | 1 << running.act)
-    }
-
-    pub(super) fn is_hopeful(&self, world: &TimedWorld, hopes: &mut Hopes) -> bool {
-        let (facts, set, happened) = (self.facts, self.under_way(), self.happened);
-        *hopes
-            .entry((facts, set, happened))
-            .or_insert_with(|| world.is_hopeful(facts, set, happened))
-    }
-
-    /// Actions whose condition over all no longer holds fail.
-    pub(super) fn settle(&mut self, world: &TimedWorld) {
-        let facts = self.facts;
-        self.running.retain(|running| {
-            let rest = world.acts[usize::from(running.act)].rest.as_ref();
-            rest.is_some_and(|(over_all, _)| over_all.hold(facts))
-        });
-    }
-
-    /// An action starts, in that cell, with what is known of its end; an instantaneous one is over.
-    pub(super) fn started(
-        &self,
-        world: &TimedWorld,
-        act: usize,
-        since: usize,
-        phase: Phase,
-    ) -> Self {
-        let mut after = self.clone();
-        after.facts = world.acts[act].start.apply(after.facts);
-        if world.acts[act].rest.is_some() {
-            let running = Running {
-                act: u8::try_from(act).expect("at most 64 actions"),
-                since: u16::try_from(since).expect("fewer than 65,535 cells"),
-                phase,
-            };
-            let place = after.running.partition_point(|other| *other < running);
-            after.running.insert(place, running);
-        }
-        after.settle(world);
-        after
-    }
-
-    /// Whether the goal is reached for good: it holds, and nothing is under way that nobody might be
-    /// able to let go, and that could spoil it.
-    pub(super) fn is_won(&self, world: &TimedWorld) -> bool {
-        let holds_up = |running: &Running| world.acts[usize::from(running.act)].may_hold_up();
-        world.goal.hold(self.facts) && !self.running.iter().any(holds_up)
-    }
-
-    /// The action at that place in the list ends, well or badly. It fails, too, if what its end
-    /// needs does not hold; then nothing is left behind or undone, nor is it where it breaks off.
-    pub(super) fn ended(&self, world: &TimedWorld, place: usize, ending: Ending) -> Self {
-        let mut after = self.clone();
-        let running = after.running.remove(place);
-        let act = &world.acts[usize::from(running.act)];
-        if let Some(failed) = act.failed(ending) {
-            after.facts = failed.apply(after.facts);
-            after.settle(world);
-        } else if let Some((_, end)) = &act.rest
-            && end.needs.hold(after.facts)
-        {
-            after.facts = end.apply(after.facts);
-            after.settle(world);
-        }
-        after
-    }
-
-    /// An event happens.
-    pub(super) fn changed(&self, world: &TimedWorld, event: usize) -> Self {
-        let mut after = self.clone();
-        if !world.events[event].is_recurrent() {
-            after.happened |= 1 << event;
-        }
-        after.facts = world.events[event].apply(after.facts);
-        after.settle(world);
-        after
-    }
-
-    /// The actions that can start and may do any good; the only one that needs looking at, where
-    /// nothing is ever better than to start it at once.
-    pub(super) fn startable(&self, world: &TimedWorld) -> Vec<usize> {
-        let under_way = self.under_way();
-        let can_start = |act: &usize| {
-            let is_idle = under_way & (1 << act) == 0;
-            is_idle
-                && world.acts[*act].start.needs.hold(self.facts)
-                && world.is_useful(*act, self.facts)
-        };
-        let acts: Vec<usize> = (0..world.acts.len()).filter(can_start).collect();
-        let is_eager = |act: &&usize| {
-            let Some((over_all, _)) = &world.acts[**act].rest else {
-                return false;
-            };
-            let facts = world.acts[**act].start.apply(self.facts);
-            world.acts[**act].is_eager && over_all.hold(facts)
-        };
-        match acts.iter().find(is_eager) {
-            Some(eager) => vec![*eager],
-            None => acts,
-        }
-    }
-
-    /// Whether the agent has nothing to think about but to start the first of these.
-    pub(super) fn must_start(&self, world: &TimedWorld, startable: &[usize]) -> bool {
-        matches!(startable, [only] if world.acts[*only].is_eager && {
-            let facts = world.acts[*only].start.apply(self.facts);
-            world.acts[*only].rest.as_ref().is_some_and(|(over_all, _)| over_all.hold(facts))
-        })
+    /// A state at the beginning of a later cell, which is entered there.
+    pub(super) fn later(layers: &mut Layers, cell: usize, state: State) -> Self {
+        let cell = small(cell);
+        let layer = layers.entry(cell).or_default();
+        let state = small(layer.insert_full(state).0);
+        Self::Later { cell, state }
     }
 }
+
+impl Nodes {
+    pub(super) fn of(cell: usize) -> Self {
+        Self {
+            cell: small(cell),
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// One more node, with its choices.
+    pub(super) fn push(&mut self, choices: Vec<Choice>) {
+        for choice in choices {
+            for (p, targets) in choice {
+                self.targets.extend(targets);
+                self.ways.push((p, small(self.targets.len())));
+            }
+            self.choices.push(small(self.ways.len()));
+        }
+        self.ends.push(small(self.choices.len()));
+    }
+
+    /// What each choice of a node is worth, given the values of the cell's nodes and of later states.
+    pub(super) fn worths<'n>(
+        &'n self,
+        node: usize,
+        here: &'n [f64],
+        later: &'n Values,
+        tolls: Tolls,
+    ) -> impl DoubleEndedIterator<Item = f64> + 'n {
+        span(&self.ends, node).map(move |choice| {
+            let ways = span(&self.choices, choice);
+            let parts = ways.map(|way| {
+                let first = way.checked_sub(1).map_or(0, |way| self.ways[way].1);
+                let (p, end) = self.ways[way];
+                let targets = &self.targets[first as usize..end as usize];
+                let of = targets
+                    .iter()
+                    .map(|target| self.worth(*target, here, later, tolls));
+                let worst = of.fold(f64::INFINITY, f64::min);
+                p * if worst.is_finite() { worst } else { 0.0 }
+            });
+            parts.sum()
+        })
+    }
+
+    fn worth(&self, target: Target, here: &[f64], later: &Values, tolls: Tolls) -> f64 {
+        match target {
+            Target::Later { cell, state } => {
+                let values = later.0.get(&cell);
+                let value = values.map_or(0.0, |values| values[state as usize]);
+                value * tolls.of_cells(cell - self.cell)
+            }
+            Target::Here(node) => here[node as usize] * tolls.step,
+            Target::Won => 1.0,
+            Target::Lost => 0.0,
+        }
+    }
+}
+
+/// From where to where the parts of one thing are, if those are where the parts of each end.
+fn span(ends: &[u32], place: usize) -> std::ops::Range<usize> {
+    let first = place.checked_sub(1).map_or(0, |before| ends[before]);
+    first as usize..ends[place] as usize
+}
+
+/// What states at the beginnings of cells are worth, by cell.
+#[derive(Debug, Default)]
+pub(super) struct Values(pub(super) BTreeMap<u32, Vec<f64>>);
 
 /// The value at time 0. `left` is how many states there may still be.
 pub(super) fn value(
@@ -215,27 +172,46 @@ pub(super) fn value(
     left: &mut usize,
     goes_on: &dyn Fn() -> bool,
 ) -> Result<f64, Stop> {
-    let mut hopes = Hopes::new();
+    let (layers, values) = backwards(bound, left, Tolls::NONE, goes_on)?;
+    let of = |state: &State| {
+        let place = layers.get(&0)?.get_index_of(state)?;
+        Some(values.0.get(&0)?[place])
+    };
     let initial = bound.initial();
+    let parts = initial
+        .iter()
+        .map(|(p, state)| p * of(state).unwrap_or(0.0));
+    Ok(parts.sum())
+}
+
+/// All states, and what each is worth, from the last to the first.
+pub(super) fn backwards(
+    bound: &impl Expansion,
+    left: &mut usize,
+    tolls: Tolls,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<(Layers, Values), Stop> {
+    let mut hopes = Hopes::new();
     let mut layers = explored(bound, &mut hopes, left, goes_on)?;
-    let last = layers.pop().unwrap_or_default();
-    let mut values: Vec<f64> = last.iter().map(|state| bound.last(state)).collect();
-    for (cell, states) in layers.iter().enumerate().rev() {
+    let mut found = Values::default();
+    let cells: Vec<u32> = layers.keys().copied().collect();
+    for cell in cells.into_iter().rev() {
         if !goes_on() {
             return Err(Stop::Interrupted);
         }
-        let mut next = IndexSet::new();
-        let nodes = bound.expand(cell, states, &mut next, &mut hopes, usize::MAX);
-        let nodes = nodes.unwrap_or_default();
-        let mut here = settled(&nodes, &values, Tolls::NONE);
-        here.truncate(states.len());
-        values = here;
+        let states = layers.remove(&cell).unwrap_or_default();
+        let values = if cell as usize >= bound.cells() {
+            states.iter().map(|state| bound.last(state)).collect()
+        } else {
+            let nodes = bound.expand(cell as usize, &states, &mut layers, &mut hopes, usize::MAX);
+            let mut values = settled(&nodes.unwrap_or_default(), &found, tolls);
+            values.truncate(states.len());
+            values
+        };
+        layers.insert(cell, states);
+        found.0.insert(cell, values);
     }
-    let value = initial.iter().map(|(p, state)| {
-        let place = layers.first().and_then(|layer| layer.get_index_of(state));
-        p * place.map_or(0.0, |place| values[place])
-    });
-    Ok(value.sum())
+    Ok((layers, found))
 }
 
 /// A cell may have so many nodes for each state that there may be in all cells together: within a cell
@@ -243,34 +219,44 @@ pub(super) fn value(
 const NODES: usize = 4;
 
 /// The states at the beginning of each cell, and at the end of the last.
-pub(super) fn explored(
+fn explored(
     bound: &impl Expansion,
     hopes: &mut Hopes,
     left: &mut usize,
     goes_on: &dyn Fn() -> bool,
-) -> Result<Vec<IndexSet<State>>, Stop> {
-    let initial = bound.initial();
-    let mut layers: Vec<IndexSet<State>> =
-        vec![initial.iter().map(|(_, state)| state.clone()).collect()];
+) -> Result<Layers, Stop> {
+    let initial = bound.initial().into_iter();
+    let mut layers = Layers::from([(0, initial.map(|(_, state)| state).collect())]);
     let most_nodes = left.saturating_mul(NODES);
-    for cell in 0..bound.cells() {
+    let mut cell = 0;
+    loop {
         if !goes_on() {
             return Err(Stop::Interrupted);
         }
-        let mut next = IndexSet::new();
-        let nodes = bound.expand(cell, &layers[cell], &mut next, hopes, most_nodes);
+        let states = layers.remove(&cell).unwrap_or_default();
+        let nodes = bound.expand(cell as usize, &states, &mut layers, hopes, most_nodes);
         nodes.ok_or(Stop::TooManyStates)?;
-        *left = left.checked_sub(next.len()).ok_or(Stop::TooManyStates)?;
-        layers.push(next);
+        let new = layers.range(cell..).map(|(_, states)| states.len());
+        if new.sum::<usize>() > *left {
+            return Err(Stop::TooManyStates);
+        }
+        layers.insert(cell, states);
+        let Some((next, states)) = layers.range(cell + 1..).next() else {
+            return Ok(layers);
+        };
+        *left -= states.len();
+        cell = *next;
+        if cell as usize >= bound.cells() {
+            return Ok(layers);
+        }
     }
-    Ok(layers)
 }
 
 /// By which factors a value shrinks on the way, so that of two ways that are equally likely to
 /// reach the goal the shorter one is worth more.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tolls {
-    /// From one cell to the next.
+    /// For each cell that passes.
     pub(super) cell: f64,
     /// For each thing that the agent does.
     pub(super) step: f64,
@@ -282,38 +268,31 @@ impl Tolls {
         cell: 1.0,
         step: 1.0,
     };
+
+    /// For so many cells.
+    fn of_cells(self, cells: u32) -> f64 {
+        match cells {
+            1 => self.cell,
+            _ => self.cell.powf(f64::from(cells)),
+        }
+    }
 }
 
 /// The values of a cell's nodes. Nodes lead to later ones, or back through instantaneous actions
 /// and such as take less than a cell; so they are gone through from the last to the first, until
 /// nothing changes any more.
-pub(super) fn settled(nodes: &Nodes, next: &[f64], tolls: Tolls) -> Vec<f64> {
+pub(super) fn settled(nodes: &Nodes, later: &Values, tolls: Tolls) -> Vec<f64> {
     let mut values = vec![0.0_f64; nodes.len()];
     loop {
         let mut greatest: f64 = 0.0;
-        for (index, choices) in nodes.iter().enumerate().rev() {
-            let of = |choice: &Choice| worth(choice, &values, next, tolls);
-            let best = choices.iter().map(of).fold(0.0, f64::max);
-            greatest = greatest.max(best - values[index]);
-            values[index] = best;
+        for node in (0..nodes.len()).rev() {
+            let worths = nodes.worths(node, &values, later, tolls);
+            let best = worths.fold(0.0, f64::max);
+            greatest = greatest.max(best - values[node]);
+            values[node] = best;
         }
         if greatest < 1e-13 {
             return values;
         }
     }
-}
-
-/// The value of a choice, given those of the cell's nodes and of the next cell's states.
-pub(super) fn worth(choice: &Choice, here: &[f64], next: &[f64], tolls: Tolls) -> f64 {
-    let of = |target: &Target| match target {
-        Target::Next(state) => next[*state] * tolls.cell,
-        Target::Here(node) => here[*node] * tolls.step,
-        Target::Won => 1.0,
-        Target::Lost => 0.0,
-    };
-    let parts = choice.iter().map(|(p, targets)| {
-        let worst = targets.iter().map(of).fold(f64::INFINITY, f64::min);
-        p * if worst.is_finite() { worst } else { 0.0 }
-    });
-    parts.sum()
 }

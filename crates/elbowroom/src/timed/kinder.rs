@@ -2,7 +2,8 @@
 
 use elbowroom_sim::Distribution;
 
-use super::world::{Occurs, TimedWorld};
+use super::act::Occurs;
+use super::world::TimedWorld;
 use super::{Event, NotTabulated, Settings, Side, bound};
 
 impl TimedWorld {

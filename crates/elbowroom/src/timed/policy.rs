@@ -1,5 +1,7 @@
 //! The policy that reaches the bound from below: [`Policy`].
 
+use std::collections::BTreeMap;
+
 use elbowroom_execution::{Move as Choice, Outlook, Standing, Weighed};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -8,7 +10,9 @@ use indexmap::{IndexMap, IndexSet};
 
 use super::below::{ALWAYS, Below, Move, WHEN_SOMETHING_HAPPENS};
 use super::chances::Chances;
-use super::graph::{Expansion, Hopes, Phase, Running, State, Tolls, explored, settled, worth};
+use super::graph::{Expansion, Hopes, Layers, Tolls, Values, backwards, settled};
+use super::numbers::Span;
+use super::state::{Phase, Running, State};
 use super::within::Search;
 use super::world::{Facts, TimedWorld};
 use super::{Grid, NotTabulated, QUICK_SHARE, Settings, Side, TimedOptimum, grid, refined};
@@ -24,7 +28,7 @@ pub struct Policy {
     chances: Chances,
     step: Rational,
     /// By cell: what its states are worth.
-    values: Vec<IndexMap<State, f64>>,
+    values: BTreeMap<u32, IndexMap<State, f64>>,
     /// When it acts: see [`Below::new`].
     stride: usize,
     tolls: Tolls,
@@ -206,7 +210,7 @@ impl Policy {
         let count = cells as f64;
         Self {
             step,
-            values: Vec::new(),
+            values: BTreeMap::new(),
             stride,
             tolls: Tolls {
                 cell: 1.0 - HASTE / count,
@@ -220,7 +224,12 @@ impl Policy {
 
     fn filled(mut self, settings: &Settings, goes_on: &dyn Fn() -> bool) -> Option<Self> {
         let mut left = settings.most_states;
-        self.values = self.tabulated(&mut left, goes_on)?;
+        let bound = Below::new(&self.world, &self.chances, self.stride);
+        let (layers, values) = backwards(&bound, &mut left, self.tolls, goes_on).ok()?;
+        let tables = layers.into_iter().zip(values.0.into_values());
+        let tables =
+            tables.map(|((cell, states), values)| (cell, states.into_iter().zip(values).collect()));
+        self.values = tables.collect();
         Some(self)
     }
 
@@ -228,37 +237,6 @@ impl Policy {
     /// them.
     pub fn optimum(&self) -> &TimedOptimum {
         &self.optimum
-    }
-
-    /// Backwards, from the end of the last cell.
-    fn tabulated(
-        &self,
-        left: &mut usize,
-        goes_on: &dyn Fn() -> bool,
-    ) -> Option<Vec<IndexMap<State, f64>>> {
-        let bound = Below::new(&self.world, &self.chances, self.stride);
-        let mut hopes = Hopes::new();
-        let mut layers = explored(&bound, &mut hopes, left, goes_on).ok()?;
-        let last = layers.pop().unwrap_or_default().into_iter();
-        let mut tables: Vec<IndexMap<State, f64>> = vec![
-            last.map(|state| {
-                let value = bound.last(&state);
-                (state, value)
-            })
-            .collect(),
-        ];
-        while let Some(states) = layers.pop() {
-            if !goes_on() {
-                return None;
-            }
-            let mut next = IndexSet::new();
-            let nodes = bound.expand(layers.len(), &states, &mut next, &mut hopes, usize::MAX)?;
-            let after = tables.last().map(|table| of(table, &next));
-            let values = settled(&nodes, &after.unwrap_or_default(), self.tolls);
-            tables.push(states.into_iter().zip(values).collect());
-        }
-        tables.reverse();
-        Some(tables)
     }
 
     /// What each move is worth in a state at the beginning of a cell.
@@ -269,19 +247,36 @@ impl Policy {
             return Vec::new();
         }
         let bound = Below::new(world, &self.chances, self.stride);
-        let mut next = IndexSet::new();
+        let mut later = Layers::new();
         let only = IndexSet::from([state.clone()]);
-        let nodes = bound.expand(cell, &only, &mut next, &mut hopes, usize::MAX);
+        let nodes = bound.expand(cell, &only, &mut later, &mut hopes, usize::MAX);
         let nodes = nodes.unwrap_or_default();
-        let after = of(&self.values[cell + 1], &next);
+        let after = later.into_iter().map(|(cell, states)| {
+            let values = states.iter().map(|state| self.value(cell, state));
+            (cell, values.collect())
+        });
+        let after = Values(after.collect());
         let here = settled(&nodes, &after, self.tolls);
-        let choices = nodes.first().into_iter().flatten();
-        let worths = choices.map(|choice| worth(choice, &here, &after, self.tolls));
+        let worths = nodes.worths(0, &here, &after, self.tolls);
         bound.moves(state).into_iter().zip(worths).collect()
     }
 
+    /// What a state is worth at the beginning of a cell; one that nobody reckoned with, nothing.
+    fn value(&self, cell: u32, state: &State) -> f64 {
+        let table = self.values.get(&cell);
+        table
+            .and_then(|table| table.get(state))
+            .copied()
+            .unwrap_or(0.0)
+    }
+
     /// The state that someone stands in, if those events have happened.
-    fn state(&self, standing: &Standing<'_>, facts: Facts, happened: u32) -> State {
+    fn state(
+        &self,
+        standing: &Standing<'_>,
+        (facts, numbers): (Facts, &[Span]),
+        happened: u32,
+    ) -> State {
         let act_of = |name: &str| self.world.acts.iter().position(|act| act.name == name);
         let mut running: Vec<Running> = Vec::new();
         for (name, since) in &standing.running {
@@ -296,7 +291,9 @@ impl Policy {
         }
         running.sort_unstable();
         let state = State {
-            facts,
+            facts: self.world.tested(facts, numbers),
+            numbers: numbers.to_vec(),
+            is_doubtful: false,
             happened,
             running,
             may_act: true,
@@ -307,12 +304,20 @@ impl Policy {
         }
     }
 
+    /// The spans in which the numbers may lie; `None` if one has no value.
+    fn spans(&self, standing: &Standing<'_>) -> Option<Vec<Vec<Span>>> {
+        let numbers = self.world.numbers.iter();
+        let values = numbers.map(|number| standing.belief.value(number.fluent).cloned());
+        let values: Vec<Rational> = values.collect::<Option<_>>()?;
+        self.world.spans_of(&values)
+    }
+
     /// The events that have happened for certain, or as the changes that were seen tell.
     fn happened(&self, standing: &Standing<'_>) -> u32 {
         let now =
             (&self.step * &Rational::from(i64::try_from(standing.period).unwrap_or(0))).to_f64();
         let resolution = self.world.model.resolution.to_f64();
-        let share = |event: &super::world::Event| {
+        let share = |event: &super::act::Event| {
             let share = event.is_over_by(now, Part::UpTo, resolution);
             share.unwrap_or(0.0)
         };
@@ -362,12 +367,6 @@ impl Policy {
     }
 }
 
-/// What states are worth; those that nobody reckoned with, nothing.
-fn of(table: &IndexMap<State, f64>, states: &IndexSet<State>) -> Vec<f64> {
-    let value = |state| table.get(state).copied().unwrap_or(0.0);
-    states.iter().map(value).collect()
-}
-
 impl Outlook for Policy {
     fn period(&self) -> &Rational {
         &self.step
@@ -375,7 +374,7 @@ impl Outlook for Policy {
 
     fn weigh(&self, standing: &Standing<'_>) -> Option<Weighed> {
         let cell = standing.period;
-        if cell + 1 >= self.values.len() {
+        if cell >= self.chances.cells {
             return None;
         }
         // Of what is none of the plan's actions nothing is known.
@@ -395,9 +394,12 @@ impl Outlook for Policy {
             let is_so = changes_nothing && !event.is_recurrent();
             all | (u32::from(is_so) << index)
         });
+        let spans = self.spans(standing)?;
         let mut overdue = None;
-        for happened in [happened, happened | silent] {
-            let mut state = self.state(standing, facts, happened);
+        let ways = [happened, happened | silent].into_iter();
+        let ways = ways.flat_map(|happened| spans.iter().map(move |spans| (happened, spans)));
+        for (happened, spans) in ways {
+            let mut state = self.state(standing, (facts, spans), happened);
             if state.is_won(&self.world) {
                 return Some(Weighed {
                     moves: vec![(Choice::Wait, 1.0)],

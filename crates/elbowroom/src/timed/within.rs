@@ -12,9 +12,9 @@ use elbowroom_num::Rational;
 use elbowroom_sim::{Distribution, WorldModel};
 use serde::{Deserialize, Serialize};
 
+use super::act::Occurs;
 use super::below::{Below, WHEN_SOMETHING_HAPPENS};
 use super::chances::Chances;
-use super::world::Occurs;
 use super::{SLACK, Settings, Side, TimedWorld, graph};
 
 /// A bound from below, by whoever does nothing but certain actions, each when something has happened.
@@ -230,7 +230,7 @@ fn fitting(world: &TimedWorld, cells: usize) -> Option<Fit> {
 }
 
 /// How long an action takes, if that is known.
-fn constant(world: &TimedWorld, act: &super::Act) -> Option<f64> {
+pub(super) fn constant(world: &TimedWorld, act: &super::act::Act) -> Option<f64> {
     act.rest.as_ref()?;
     let planned = act.planned.to_f64();
     let time = match world.model.duration_rule(&act.name) {

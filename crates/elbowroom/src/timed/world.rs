@@ -1,73 +1,18 @@
 //! The world of the timed optimum: facts are bits, actions and events are numbered.
 
-use std::sync::Arc;
-
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Action, FactId};
-use elbowroom_num::Rational;
-use elbowroom_sim::{Distribution, Rule, Side, WorldModel};
+use elbowroom_model::ground::FactId;
+use elbowroom_sim::{Side, WorldModel};
 
-use super::compile::{Compiler, actions, relevant};
-use super::failures::{Ending, Failed};
-use super::{NotTabulated, Settings};
+use super::act::{Act, Event, Needs, Occurs};
+use super::available::actions;
+use super::compile::Compiler;
+use super::failures::Ending;
+use super::numbers::{Number, Span, Test};
+use super::{NotTabulated, Settings, Side as Bounding};
 
 /// Which facts are true.
 pub(crate) type Facts = u128;
-
-/// A condition on facts.
-#[derive(Clone, Debug)]
-pub(crate) enum Needs {
-    All(Vec<Needs>),
-    Any(Vec<Needs>),
-    Not(Box<Needs>),
-    Fact(Facts),
-}
-
-/// A start or an end.
-#[derive(Clone, Debug)]
-pub(crate) struct Snap {
-    pub(crate) needs: Needs,
-    pub(crate) adds: Facts,
-    pub(crate) deletes: Facts,
-}
-
-/// An action.
-#[derive(Clone, Debug)]
-pub(crate) struct Act {
-    pub(crate) name: String,
-    pub(crate) action: Arc<Action>,
-    pub(crate) start: Snap,
-    /// What is needed over all, and its end; `None` for instantaneous actions.
-    pub(crate) rest: Option<(Needs, Snap)>,
-    pub(crate) planned: Rational,
-    /// P(it fails midway), given that it starts.
-    pub(crate) midway: f64,
-    /// P(it fails at its end), given that it starts.
-    pub(crate) at_end: f64,
-    /// How things may stand when it has failed; the shares add up to 1.
-    pub(crate) failures: Vec<Failed>,
-    /// Whether it may do any good to cancel it.
-    pub(crate) may_be_cancelled: bool,
-    /// Whether nothing is ever better than to start it as soon as one can.
-    pub(crate) is_eager: bool,
-}
-
-/// Something that happens by itself.
-#[derive(Clone, Debug)]
-pub(crate) struct Event {
-    pub(crate) adds: Facts,
-    pub(crate) deletes: Facts,
-    pub(crate) occurs: Occurs,
-}
-
-/// How often something happens by itself.
-#[derive(Clone, Debug)]
-pub(crate) enum Occurs {
-    /// At most once: how likely, and when.
-    Once { probability: f64, time: Rule },
-    /// Again and again, so many times per second, whatever has been before.
-    Rate(f64),
-}
 
 /// See [`timed`](super).
 #[derive(Clone, Debug)]
@@ -75,6 +20,13 @@ pub(crate) struct TimedWorld {
     pub(crate) model: WorldModel,
     /// The facts that matter; the place of each is its bit.
     pub(crate) facts: Vec<FactId>,
+    pub(crate) numbers: Vec<Number>,
+    /// Comparisons of numbers; their bits come after those of the facts.
+    pub(super) tests: Vec<Test>,
+    /// Their bits.
+    pub(super) tested: Facts,
+    /// From which side comparisons are seen that may or may not hold.
+    side: Bounding,
     pub(crate) acts: Vec<Act>,
     pub(crate) events: Vec<Event>,
     pub(crate) initial: Facts,
@@ -92,6 +44,9 @@ pub(crate) struct TimedWorld {
 /// The most actions and events: they are bits of numbers.
 const MOST_ACTS: usize = 64;
 const MOST_EVENTS: usize = 32;
+
+/// The most facts, and comparisons of numbers, which count as facts.
+const MOST_FACTS: usize = 128;
 
 impl TimedWorld {
     pub(crate) fn new(
@@ -119,16 +74,7 @@ impl TimedWorld {
         }
         let actions = actions(task, model, settings)?;
         let goal = task.goal().clone();
-        let compiler = Compiler {
-            task,
-            facts: relevant(task, model, &actions, &goal),
-        };
-        if compiler.facts.len() > 128 {
-            return Err(NotTabulated::new(format!(
-                "{} facts matter, and 128 is the most",
-                compiler.facts.len()
-            )));
-        }
+        let compiler = Compiler::new(task, model, &actions, &goal)?;
         let events = compiler.events(model)?;
         if events.len() > MOST_EVENTS {
             return Err(NotTabulated::new(format!(
@@ -149,7 +95,18 @@ impl TimedWorld {
         let goal = compiler.needs(&goal)?;
         let initial = task.initial().facts.iter();
         let initial = initial.fold(0, |facts, fact| facts | compiler.bit(*fact));
+        let tests = compiler.tests.into_inner();
+        let known = compiler.facts.len() + tests.len();
+        if known > MOST_FACTS {
+            return Err(NotTabulated::new(format!(
+                "{known} facts and comparisons matter, and {MOST_FACTS} is the most"
+            )));
+        }
         let mut world = Self {
+            tested: (0..tests.len()).fold(0, |all, test| all | 1 << (compiler.facts.len() + test)),
+            tests,
+            numbers: compiler.numbers,
+            side: Bounding::Below,
             facts: compiler.facts,
             horizon: latest(&events, model)?,
             is_monotone: !goal.has_negation() && !acts.iter().any(Act::has_negation),
@@ -161,9 +118,25 @@ impl TimedWorld {
             initial,
             goal,
         };
+        world.cut()?;
+        world.see_what_helps();
         world.see_what_changes();
         world.horizon = world.end_of_runs(settings)?;
         Ok(world)
+    }
+
+    /// Enters which comparisons may come to hold by what happenings do to numbers.
+    fn see_what_helps(&mut self) {
+        let first = self.facts.len();
+        for act in &mut self.acts {
+            let ends = act.rest.iter_mut().map(|(_, end)| end);
+            for snap in ends.chain([&mut act.start]) {
+                let tests = self.tests.iter().enumerate();
+                let helped = tests
+                    .filter(|(_, test)| snap.amounts.iter().any(|amount| amount.may_help(test)));
+                snap.helps = helped.fold(0, |all, (place, _)| all | 1 << (first + place));
+            }
+        }
     }
 
     /// Enters what follows from the actions and events that there are.
@@ -176,10 +149,12 @@ impl TimedWorld {
             | events.iter().fold(0, |all, event| all | event.adds);
         if self.is_monotone {
             for act in &mut self.acts {
-                act.may_be_cancelled = act.may_gain_by_cancelling(&self.model);
+                act.may_be_cancelled =
+                    act.may_gain_by_cancelling(&self.model) || act.is_about_numbers(self.tested);
                 // It takes nothing away, and what it gives stays. Whoever starts it later could as
                 // well have it over earlier.
                 act.is_eager = act.ends_safely()
+                    && !act.is_about_numbers(self.tested)
                     && !act.may_hold_up()
                     && act.deletes() == 0
                     && act.adds() & self.deletable == 0;
@@ -190,7 +165,8 @@ impl TimedWorld {
     /// Whether the goal can be reached if deletions do nothing, from these facts, with what may
     /// still come about by itself and by what is under way.
     pub(super) fn is_hopeful(&self, facts: Facts, under_way: u64, happened: u32) -> bool {
-        let mut facts = facts;
+        // Numbers are what it takes.
+        let mut facts = facts | self.tested;
         for (index, event) in self.events.iter().enumerate() {
             if happened & (1 << index) == 0 {
                 facts |= event.adds;
@@ -231,7 +207,78 @@ impl TimedWorld {
     /// makes true is true and stays so.
     pub(super) fn is_useful(&self, act: usize, facts: Facts) -> bool {
         let adds = self.acts[act].adds();
-        !self.is_monotone || adds & !facts != 0 || adds & self.deletable != 0
+        !self.is_monotone
+            || adds & !facts != 0
+            || adds & self.deletable != 0
+            || self.acts[act].changes_numbers()
+    }
+
+    /// The actions that are in one of the plans, as bits.
+    pub(super) fn asked_for(&self, plans: &[Vec<String>]) -> u64 {
+        let acts = self.acts.iter().enumerate();
+        let is_asked_for = |act: &Act| plans.iter().flatten().any(|name| *name == act.name);
+        let asked_for = acts.filter(|(_, act)| is_asked_for(act));
+        asked_for.fold(0, |all, (index, _)| all | 1 << index)
+    }
+
+    /// For each of these plans, and once each: the world without the actions that are only in others; the world
+    /// itself if there are no plans.
+    pub(super) fn keeping_to(&self, plans: &[Vec<String>]) -> Vec<Self> {
+        let of_any = self.asked_for(plans);
+        let mut own: Vec<u64> = Vec::new();
+        for plan in plans {
+            let of_plan = self.asked_for(std::slice::from_ref(plan));
+            if of_plan != 0 && !own.contains(&of_plan) {
+                own.push(of_plan);
+            }
+        }
+        if own.is_empty() {
+            return vec![self.clone()];
+        }
+        let kept = own.into_iter().map(|own| {
+            let mut keeping = self.clone();
+            let acts = keeping.acts.into_iter().enumerate();
+            let is_kept = |index: usize| (own | !of_any) & (1 << index) != 0;
+            let acts = acts.filter(|(index, _)| is_kept(*index));
+            keeping.acts = acts.map(|(_, act)| act).collect();
+            keeping.see_what_changes();
+            keeping
+        });
+        kept.collect()
+    }
+
+    /// The same world, as a bound from that side sees comparisons that may or may not hold.
+    pub(super) fn seen_from(&self, side: Bounding) -> Self {
+        Self {
+            side,
+            ..self.clone()
+        }
+    }
+
+    /// The same world, in which no action is broken off because of a number.
+    pub(super) fn without_numbers_over_all(&self) -> Self {
+        let mut kinder = self.clone();
+        for act in &mut kinder.acts {
+            if let Some((over_all, _)) = &mut act.rest {
+                *over_all = over_all.without(self.tested, true);
+            }
+        }
+        kinder.see_what_changes();
+        kinder
+    }
+
+    /// Facts, with the comparisons that hold of numbers.
+    pub(super) fn tested(&self, facts: Facts, numbers: &[Span]) -> Facts {
+        self.with_tests(facts, numbers, self.side)
+    }
+
+    /// What an event makes false for certain, and nothing makes true.
+    pub(super) fn lost_for_good(&self, event: usize) -> Facts {
+        let event = &self.events[event];
+        match event.occurs {
+            Occurs::Once { probability, .. } if probability >= 1.0 => event.deletes & !self.addable,
+            _ => 0,
+        }
     }
 
     /// Whether an event is best over at once: more facts are never worse, and what it gives nothing
@@ -255,7 +302,10 @@ impl TimedWorld {
             return false;
         };
         let (gives, does_no_harm) = match act.failed(ending) {
-            None => (end.adds, act.ends_kindly() && end.needs.hold(facts)),
+            None => (
+                end.adds,
+                act.ends_kindly() && end.amounts.is_empty() && end.needs.hold(facts),
+            ),
             Some(failed) => (failed.adds, failed.deletes == 0),
         };
         self.is_monotone && does_no_harm && gives & self.deletable == 0
@@ -268,148 +318,6 @@ impl TimedWorld {
         let gives = act.rest.as_ref().map_or(0, |(_, end)| end.adds);
         act.may_be_cancelled || gives & self.deletable != 0
     }
-}
-
-impl Needs {
-    pub(super) fn hold(&self, facts: Facts) -> bool {
-        match self {
-            Self::All(parts) => parts.iter().all(|part| part.hold(facts)),
-            Self::Any(parts) => parts.iter().any(|part| part.hold(facts)),
-            Self::Not(part) => !part.hold(facts),
-            Self::Fact(fact) => facts & fact != 0,
-        }
-    }
-
-    /// Whether they may hold if more facts may be false than these.
-    fn is_possible(&self, facts: Facts) -> bool {
-        match self {
-            Self::All(parts) => parts.iter().all(|part| part.is_possible(facts)),
-            Self::Any(parts) => parts.iter().any(|part| part.is_possible(facts)),
-            Self::Not(part) => part.may_fail(facts),
-            Self::Fact(fact) => facts & fact != 0,
-        }
-    }
-
-    /// Whether they may be false if more facts may be false than these; any fact may be false.
-    fn may_fail(&self, facts: Facts) -> bool {
-        match self {
-            Self::All(parts) => parts.iter().any(|part| part.may_fail(facts)),
-            Self::Any(parts) => parts.iter().all(|part| part.may_fail(facts)),
-            Self::Not(part) => part.is_possible(facts),
-            Self::Fact(_) => true,
-        }
-    }
-
-    /// The facts that must all be true, if that is all there is to it.
-    fn conjunction(&self) -> Option<Facts> {
-        match self {
-            Self::All(parts) => parts
-                .iter()
-                .try_fold(0, |all, part| Some(all | part.conjunction()?)),
-            Self::Fact(fact) => Some(*fact),
-            Self::Any(_) | Self::Not(_) => None,
-        }
-    }
-
-    fn has_negation(&self) -> bool {
-        match self {
-            Self::All(parts) | Self::Any(parts) => parts.iter().any(Self::has_negation),
-            Self::Not(_) => true,
-            Self::Fact(_) => false,
-        }
-    }
-}
-
-impl Snap {
-    /// Additions win over deletions of the same happening.
-    pub(super) fn apply(&self, facts: Facts) -> Facts {
-        (facts & !self.deletes) | self.adds
-    }
-}
-
-impl Event {
-    pub(super) fn apply(&self, facts: Facts) -> Facts {
-        (facts & !self.deletes) | self.adds
-    }
-
-    /// Whether it happens again and again, so that nobody has to remember that it has.
-    pub(crate) fn is_recurrent(&self) -> bool {
-        matches!(self.occurs, Occurs::Rate(_))
-    }
-
-    /// How likely it is over at that time, in seconds; never for certain if it happens again.
-    pub(super) fn is_over_by(&self, time: f64, side: Side, resolution: f64) -> Option<f64> {
-        match &self.occurs {
-            Occurs::Once {
-                probability,
-                time: rule,
-            } => {
-                let share = rule.share(time, side, 0.0, resolution)?;
-                Some(share * probability)
-            }
-            Occurs::Rate(_) => Some(0.0),
-        }
-    }
-
-    /// Whether it only makes facts false.
-    pub(super) fn is_harmful(&self) -> bool {
-        self.adds == 0
-    }
-}
-
-impl Act {
-    fn has_negation(&self) -> bool {
-        let rest = self.rest.as_ref();
-        self.start.needs.has_negation()
-            || rest
-                .is_some_and(|(over_all, end)| over_all.has_negation() || end.needs.has_negation())
-    }
-
-    /// All that it may make true.
-    fn adds(&self) -> Facts {
-        let end = self.rest.as_ref().map_or(0, |(_, end)| end.adds);
-        self.start.adds | self.adds_by_failing() | end
-    }
-
-    /// All that it may make false.
-    fn deletes(&self) -> Facts {
-        let end = self.rest.as_ref().map_or(0, |(_, end)| end.deletes);
-        self.start.deletes | self.deletes_by_failing() | end
-    }
-
-    /// Whether its end deletes nothing that matters.
-    pub(super) fn ends_kindly(&self) -> bool {
-        self.rest
-            .as_ref()
-            .is_some_and(|(_, end)| end.deletes & !end.adds == 0)
-    }
-
-    /// Whether its end needs nothing but what it needs all the time anyway, so that no moment is
-    /// better for it to end than another.
-    fn ends_safely(&self) -> bool {
-        self.rest.as_ref().is_some_and(|(over_all, end)| {
-            let always = over_all.conjunction().unwrap_or(0);
-            end.needs
-                .conjunction()
-                .is_some_and(|needs| needs & !always == 0)
-        })
-    }
-
-    /// Whether there can be something in cancelling it where more facts are never worse: its end
-    /// may do harm, well or badly, or who begins anew may be done earlier than who goes on.
-    fn may_gain_by_cancelling(&self, model: &WorldModel) -> bool {
-        !self.ends_kindly()
-            || !self.ends_safely()
-            || self.deletes_by_failing() != 0
-            || self.may_hold_up()
-            || model
-                .duration_rule(&self.name)
-                .is_some_and(|rule| !is_fixed(rule))
-    }
-}
-
-fn is_fixed(rule: &Rule) -> bool {
-    matches!(rule.distribution, Distribution::Constant(_))
 }
 
 /// When all that happens at most once has happened, if it ever does.

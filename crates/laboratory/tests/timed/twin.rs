@@ -26,6 +26,36 @@ pub(crate) struct SmallWorld {
     changes: Vec<SmallChange>,
     initial: u32,
     goal: Vec<usize>,
+    /// What the number is to begin with, if there is one.
+    number: Option<i32>,
+    /// What it has to be in the end.
+    wanted: Option<Measure>,
+}
+
+/// What the number must be: at least so much, or at most.
+#[derive(Clone, Copy, Debug)]
+struct Measure {
+    at_least: bool,
+    bound: i32,
+}
+
+/// What an action has to do with the number.
+#[derive(Clone, Debug, Default)]
+struct SmallAmount {
+    start: Option<Measure>,
+    over_all: Option<Measure>,
+    end: Option<Measure>,
+    /// What its start takes.
+    taken: i32,
+    /// What its end does, with one of these amounts.
+    at_end: Option<(Change, Vec<i32>)>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Change {
+    Increase,
+    Decrease,
+    Assign,
 }
 
 #[derive(Clone, Debug)]
@@ -40,6 +70,7 @@ struct SmallAction {
     /// Whether a failure undoes what the start did.
     is_undone: bool,
     outcomes: Vec<SmallOutcome>,
+    amount: SmallAmount,
 }
 
 /// What a failure leaves behind.
@@ -64,7 +95,8 @@ struct Course {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Ending {
-    Well,
+    /// With that one of the amounts, if there is one.
+    Well(usize),
     /// With that outcome, if any.
     Badly(Option<usize>),
 }
@@ -169,6 +201,7 @@ impl SmallWorld {
             fails: if rng.random_bool(0.5) { 0.25 } else { 0.0 },
             is_undone: false,
             outcomes: Vec::new(),
+            amount: SmallAmount::default(),
         });
         let actions = actions.collect();
         let events = (0..2).map(|_| SmallEvent {
@@ -184,28 +217,106 @@ impl SmallWorld {
             changes: Vec::new(),
             initial,
             goal: vec![rng.random_range(0..FACTS), rng.random_range(0..FACTS)],
+            number: None,
+            wanted: None,
         }
+    }
+
+    /// The same kind of world, with a number that actions change by amounts that vary.
+    #[allow(dead_code, reason = "not all tests that share this have numbers")]
+    pub(crate) fn with_numbers(rng: &mut ChaCha8Rng, asks_for_less: bool) -> Self {
+        let mut world = Self::random(rng, asks_for_less);
+        let measure = |rng: &mut ChaCha8Rng, share: f64| {
+            let bound = rng.random_range(0..=3);
+            let at_least = !asks_for_less || rng.random_bool(0.7);
+            rng.random_bool(share)
+                .then_some(Measure { at_least, bound })
+        };
+        world.number = Some(rng.random_range(0..=3));
+        world.wanted = measure(rng, 0.5);
+        for action in &mut world.actions {
+            let count = rng.random_range(1..=3);
+            let amounts = (0..count).map(|_| rng.random_range(0..=3)).collect();
+            let change = match rng.random_range(0..4) {
+                0 => Some((Change::Increase, amounts)),
+                1 | 2 => Some((Change::Decrease, amounts)),
+                _ => Some((Change::Assign, amounts)),
+            };
+            let at_start = rng.random_bool(0.2);
+            action.amount = SmallAmount {
+                start: measure(rng, 0.3),
+                over_all: measure(rng, 0.2),
+                end: measure(rng, 0.2),
+                taken: i32::from(at_start),
+                at_end: change.filter(|_| !at_start && rng.random_bool(0.8)),
+            };
+        }
+        world
+    }
+
+    /// The same world, in which nothing asks for a number.
+    #[allow(dead_code, reason = "not all tests that share this have numbers")]
+    pub(crate) fn without_numbers(&self) -> Self {
+        let mut plain = self.clone();
+        plain.wanted = None;
+        for action in &mut plain.actions {
+            action.amount = SmallAmount::default();
+        }
+        plain
+    }
+
+    #[allow(dead_code, reason = "not all tests that share this have known times")]
+    pub(crate) fn has_known_times(&self) -> bool {
+        let mut durations = self.actions.iter().map(|action| action.durations.len());
+        durations.all(|count| count == 1) && self.events.iter().all(|event| event.times.len() == 1)
+    }
+
+    /// The same world, in which all that happens does so at known times.
+    #[allow(dead_code, reason = "not all tests that share this have known times")]
+    pub(crate) fn with_known_times(mut self) -> Self {
+        for action in &mut self.actions {
+            action.durations.truncate(1);
+        }
+        for event in &mut self.events {
+            event.times.truncate(1);
+        }
+        self
     }
 
     pub(crate) fn domain(&self) -> String {
         let mut text =
             "(define (domain small) (:requirements :durative-actions :negative-preconditions)
-            (:predicates (f0) (f1) (f2) (f3))\n"
+            (:predicates (f0) (f1) (f2) (f3)) (:functions (n))\n"
                 .to_owned();
         for (index, action) in self.actions.iter().enumerate() {
             let timed = |when: &str, what: Option<Literal>| {
                 what.map_or(String::new(), |what| format!("({when} {})", words(what)))
             };
+            let measured = |when: &str, what: Option<Measure>| {
+                what.map_or(String::new(), |what| format!("({when} {})", what.words()))
+            };
+            let amount = &action.amount;
+            let taken = match amount.taken {
+                0 => String::new(),
+                taken => format!("(at start (decrease (n) {taken}))"),
+            };
+            let changed = amount.at_end.as_ref().map(|(change, amounts)| {
+                format!("(at end ({} (n) {}))", change.word(), amounts[0])
+            });
             let _ = write!(
                 text,
                 "(:durative-action a{index} :parameters () :duration (= ?duration {})
-                   :condition (and {} {} {}) :effect (and {} {}))\n",
+                   :condition (and {} {} {} {} {} {}) :effect (and {} {} {taken} {}))\n",
                 action.durations[0],
                 timed("at start", action.start),
                 timed("over all", action.over_all),
                 timed("at end", action.end),
+                measured("at start", amount.start),
+                measured("over all", amount.over_all),
+                measured("at end", amount.end),
                 timed("at start", action.at_start),
                 timed("at end", Some(action.at_end)),
+                changed.unwrap_or_default(),
             );
         }
         text + ")"
@@ -219,14 +330,17 @@ impl SmallWorld {
         };
         let initial = listed(&mut facts.clone());
         let goal = listed(&mut self.goal.iter().copied());
+        let number = self.number.unwrap_or_default();
+        let wanted = self.wanted.map_or(String::new(), Measure::words);
         format!(
             "(define (problem p) (:domain small)
-               (:init {initial}) (:goal (and {goal})))"
+               (:init (= (n) {number}) {initial}) (:goal (and {goal} {wanted})))"
         )
     }
 
     pub(crate) fn world(&self) -> String {
         let mut text = "format = \"elbowroom-world\"\nversion = 1\n".to_owned();
+        let mut amount_of = String::new();
         for (index, action) in self.actions.iter().enumerate() {
             let _ = writeln!(
                 text,
@@ -238,6 +352,12 @@ impl SmallWorld {
                 "[[failure]]\naction = \"a{index}\"\nprobability = {}",
                 action.fails
             );
+            if let Some((_, amounts)) = &action.amount.at_end {
+                let _ = writeln!(
+                    amount_of,
+                    "[[amount]]\naction = \"a{index}\"\nfluent = \"n\"\nvalues = {amounts:?}"
+                );
+            }
             if action.is_undone {
                 text += "undone = true\n";
             }
@@ -254,6 +374,7 @@ impl SmallWorld {
                 }
             }
         }
+        text += &amount_of;
         for event in &self.events {
             let (fact, truth) = event.change;
             let _ = writeln!(
@@ -289,6 +410,7 @@ impl SmallWorld {
             running: Vec::new(),
             happened: 0,
             begun: 0,
+            number: self.number.unwrap_or_default(),
         };
         // What comes within half a second comes at once.
         let value = |choice: Choice| {
@@ -340,7 +462,9 @@ impl SmallWorld {
     fn is_won(&self, now: &Now) -> bool {
         let holds_up = |action: &SmallAction| action.outcomes.iter().any(|it| it.delay > 0);
         let mut running = now.running.iter();
-        self.goal.iter().all(|fact| now.facts & (1 << fact) != 0)
+        let is_enough = self.wanted.is_none_or(|wanted| wanted.holds(now.number));
+        is_enough
+            && self.goal.iter().all(|fact| now.facts & (1 << fact) != 0)
             && !running.any(|running| holds_up(&self.actions[running.action]))
     }
 
@@ -358,7 +482,11 @@ impl SmallWorld {
                     ending,
                 });
             };
-            add(1.0 - action.fails, 0, Ending::Well);
+            let amounts = action.amount.at_end.as_ref().map_or(1, |(_, of)| of.len());
+            for amount in 0..amounts {
+                let weight = (1.0 - action.fails) * share(1, amounts);
+                add(weight, 0, Ending::Well(amount));
+            }
             let mut plain = 1.0;
             for (index, outcome) in action.outcomes.iter().enumerate() {
                 plain -= outcome.share;
@@ -422,10 +550,11 @@ impl SmallWorld {
                 };
                 best = best.max(kept + gone);
                 continue;
-            } else if now.begun & (1 << index) == 0
+            } else if (now.begun >> (3 * index)) & 7 < action.most_begun()
                 && action.start.is_none_or(|it| holds(it, now.facts))
+                && action.amount.start.is_none_or(|it| it.holds(now.number))
             {
-                after.begun |= 1 << index;
+                after.begun += 1 << (3 * index);
                 after.running.push(Running {
                     action: index,
                     since: now.time,
@@ -433,6 +562,7 @@ impl SmallWorld {
                 });
                 after.running.sort_unstable();
                 after.facts = action.at_start.map_or(now.facts, |it| set(it, now.facts));
+                after.number -= action.amount.taken;
                 self.break_off(&mut after);
             } else {
                 continue;
@@ -507,10 +637,16 @@ impl SmallWorld {
                     };
                     after.running.remove(place);
                     let changes: Vec<Literal> = match ending {
-                        Ending::Well if action.end.is_none_or(|it| holds(it, after.facts)) => {
+                        Ending::Well(amount)
+                            if action.end.is_none_or(|it| holds(it, after.facts))
+                                && action.amount.end.is_none_or(|it| it.holds(after.number)) =>
+                        {
+                            if let Some((change, amounts)) = &action.amount.at_end {
+                                after.number = change.of(after.number, amounts[amount]);
+                            }
                             vec![action.at_end]
                         }
-                        Ending::Well => Vec::new(),
+                        Ending::Well(_) => Vec::new(),
                         Ending::Badly(outcome) => {
                             let undone = action.at_start.filter(|_| action.is_undone);
                             let undone = undone.map(|(fact, truth)| (fact, !truth));
@@ -551,12 +687,52 @@ impl SmallWorld {
     }
 
     fn break_off(&self, now: &mut Now) {
-        let facts = now.facts;
+        let (facts, number) = (now.facts, now.number);
         now.running.retain(|running| {
-            self.actions[running.action]
-                .over_all
-                .is_none_or(|it| holds(it, facts))
+            let action = &self.actions[running.action];
+            action.over_all.is_none_or(|it| holds(it, facts))
+                && action.amount.over_all.is_none_or(|it| it.holds(number))
         });
+    }
+}
+
+impl SmallAction {
+    /// How many times it may begin at one time: once is enough, if each start does not take more of the number.
+    fn most_begun(&self) -> u32 {
+        if self.amount.taken > 0 { 4 } else { 1 }
+    }
+}
+
+impl Measure {
+    fn holds(self, number: i32) -> bool {
+        if self.at_least {
+            number >= self.bound
+        } else {
+            number <= self.bound
+        }
+    }
+
+    fn words(self) -> String {
+        let word = if self.at_least { ">=" } else { "<=" };
+        format!("({word} (n) {})", self.bound)
+    }
+}
+
+impl Change {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Increase => "increase",
+            Self::Decrease => "decrease",
+            Self::Assign => "assign",
+        }
+    }
+
+    fn of(self, number: i32, amount: i32) -> i32 {
+        match self {
+            Self::Increase => number + amount,
+            Self::Decrease => number - amount,
+            Self::Assign => amount,
+        }
     }
 }
 
@@ -600,8 +776,9 @@ struct Now {
     facts: u32,
     running: Vec<Running>,
     happened: u32,
-    /// What began at this very time, as bits: nothing begins twice.
+    /// How many times each began at this very time, in three bits each.
     begun: u32,
+    number: i32,
 }
 
 /// What is won stays won.

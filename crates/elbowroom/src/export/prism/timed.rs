@@ -46,6 +46,9 @@ pub fn timed(
     if world.events.iter().any(Event::is_recurrent) {
         return Err(PrismError::Rates);
     }
+    if !world.numbers.is_empty() {
+        return Err(PrismError::Numbers);
+    }
     let has_outcomes =
         |act: &Act| act.failures.len() > 1 || act.failures.iter().any(|way| way.delay > 0.0);
     if world.acts.iter().any(has_outcomes) {
@@ -477,7 +480,7 @@ impl Process<'_> {
     /// matter to it.
     fn goes_on(&self, act: &Act, adds: Facts, deletes: Facts) -> Option<Formula> {
         let (over_all, _) = act.rest.as_ref()?;
-        (mentions(over_all) & (adds | deletes) != 0).then(|| self.after(over_all, adds, deletes))
+        (over_all.mentions() & (adds | deletes) != 0).then(|| self.after(over_all, adds, deletes))
     }
 
     /// An event: 0 still to come, 1 in this cell, 2 over.
@@ -618,17 +621,6 @@ fn ends_of(name: &str, hazard: &Ends, otherwise: &str) -> [(Rational, String); 3
         (badly, format!("({name}'=2)")),
         (rest, otherwise.to_owned()),
     ]
-}
-
-/// The facts that a condition reads.
-fn mentions(needs: &Needs) -> Facts {
-    match needs {
-        Needs::All(parts) | Needs::Any(parts) => {
-            parts.iter().fold(0, |all, part| all | mentions(part))
-        }
-        Needs::Not(part) => mentions(part),
-        Needs::Fact(fact) => *fact,
-    }
 }
 
 /// The first and the last place of each run of equal texts.

@@ -1,0 +1,279 @@
+//! Worlds in which everything happens at known times, if it happens: durations are known, and so is when
+//! something may happen by itself. What is not known is whether it does, whether actions fail, and
+//! what they draw.
+//!
+//! There whoever acts only when something happens, or gets ready to happen, loses nothing. Take any way to
+//! act, and keep the order of all that happens, but let each thing come as early as the order allows, where
+//! an action may last longer than it has to. What is after something that happens at a known time is not before
+//! that time; what is before it stays before. So everything comes at a time at which something
+//! happens by itself, or some action has lasted as long as it has to; nothing comes later than
+//! it did, and whoever decides knows as much as before.
+//!
+//! So the bound from above has a state only where something gets ready, and an action that is ready may end there
+//! or at any later such time. The bound from below acts when something has happened, and nothing lasts longer
+//! there. Cells are as long as all known times divide; between two states there may be any number of them.
+
+mod above;
+mod waiting;
+
+use elbowroom_sim::Distribution;
+
+use super::act::Occurs;
+use super::below::Below;
+use super::chances::{Chances, NEVER};
+use super::state::{Phase, State};
+use super::within::constant;
+use super::world::{Facts, TimedWorld};
+use super::{Grid, NotTabulated, SLACK, Settings, Side, Stop, graph, step};
+
+pub(super) use above::Stretched;
+
+/// Bounds from both sides where everything happens at known times; `None` where it does not.
+///
+/// Of the worlds in which more is possible that from above is sought in the one with the fewest states first.
+pub(super) fn bounds(
+    world: &TimedWorld,
+    settings: &Settings,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Option<Grid>, NotTabulated> {
+    let Some(cells) = cells(world) else {
+        return Ok(None);
+    };
+    let mut grid = Grid {
+        step: step(world, cells),
+        lower: 0.0,
+        upper: 1.0,
+        states: 0,
+    };
+    // There is more to look at where these bounds are not close.
+    let most_states = settings.most_states / SHARE;
+    for keeping in world.keeping_to(&settings.plans) {
+        let mut left = most_states;
+        let chances = super::chances(&keeping, cells, Side::Below)?;
+        let below = Below::by_moments(&keeping, &chances, keeping.asked_for(&settings.plans));
+        let value = graph::value(&below, &mut left, goes_on);
+        grid.states += most_states - left;
+        match value {
+            Ok(lower) => grid.lower = grid.lower.max(lower - SLACK),
+            Err(Stop::Interrupted) => return Ok(None),
+            Err(_) => {}
+        }
+    }
+    let above = world.seen_from(Side::Above);
+    let freer = above.without_numbers_over_all();
+    let chances = super::chances(&freer, cells, Side::Above)?;
+    let worlds = [
+        freer.without_certainties(&chances),
+        Some(freer),
+        Some(above),
+    ];
+    for world in worlds.into_iter().flatten() {
+        let mut left = most_states;
+        let chances = super::chances(&world, cells, Side::Above)?;
+        let value = graph::value(&Stretched::new(&world, &chances), &mut left, goes_on);
+        grid.states += most_states - left;
+        let Ok(value) = value else {
+            break;
+        };
+        grid.upper = grid.upper.min(value + SLACK);
+        if grid.upper - grid.lower <= settings.gap {
+            break;
+        }
+    }
+    Ok(Some(grid))
+}
+
+/// Each bound may have one in so many of all states that there may be.
+const SHARE: usize = 4;
+
+/// How many cells there are if all known times are whole numbers of cells; `None` if something may
+/// happen at any time, or if that takes too many.
+pub(super) fn cells(world: &TimedWorld) -> Option<usize> {
+    let resolution = world.model.resolution.to_f64();
+    let whole = |time: f64| {
+        let count = (time / resolution).round();
+        let is_whole = (count * resolution - time).abs() <= 1e-6 * resolution;
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "it is a whole number below 2^53"
+        )]
+        let count = (is_whole && (0.0..9e15).contains(&count)).then_some(count as u64);
+        count
+    };
+    let horizon = whole(world.horizon)?;
+    let mut step = horizon;
+    let mut divide = |time: u64| step = gcd(step, time);
+    for act in &world.acts {
+        if act.rest.is_some() {
+            divide(whole(constant(world, act)?)?);
+        }
+        if act.midway > 0.0 {
+            return None;
+        }
+        for failed in &act.failures {
+            divide(whole(failed.delay)?);
+        }
+    }
+    for event in &world.events {
+        match &event.occurs {
+            Occurs::Once { time, .. } => match time.distribution {
+                Distribution::Constant(time) => divide(whole(time)?),
+                _ => return None,
+            },
+            Occurs::Rate(_) => return None,
+        }
+    }
+    let cells = horizon.checked_div(step)?;
+    (0 < cells && cells < u64::from(u16::MAX)).then_some(usize::try_from(cells).ok()?)
+}
+
+fn gcd(one: u64, other: u64) -> u64 {
+    if other == 0 {
+        one
+    } else {
+        gcd(other, one % other)
+    }
+}
+
+impl Chances {
+    /// The first cell from that one on in which something may happen, or get ready to.
+    pub(super) fn next(&self, state: &State, cell: usize) -> Option<usize> {
+        let ends = state.running.iter().filter_map(|running| {
+            let age = cell - usize::from(running.since);
+            let next = *self.next_end[usize::from(running.act)].get(age)?;
+            let is_going = running.phase == Phase::Goes;
+            (is_going && next != NEVER).then_some(usize::from(running.since) + next as usize)
+        });
+        let events = self
+            .next_event
+            .iter()
+            .enumerate()
+            .filter_map(|(event, next)| {
+                let next = *next.get(cell)?;
+                let is_over = state.happened & (1 << event) != 0;
+                (!is_over && next != NEVER).then_some(next as usize)
+            });
+        ends.chain(events).min().filter(|next| *next < self.cells)
+    }
+
+    /// Whether the goal can be reached in time from a state at the beginning of a cell, as far as that is
+    /// [easily seen](Self::soonest).
+    pub(super) fn is_in_time(
+        &self,
+        world: &TimedWorld,
+        state: &State,
+        cell: usize,
+        side: Side,
+    ) -> bool {
+        self.soonest(world, state, cell, side).is_some()
+    }
+
+    /// The first cell at whose beginning the goal may hold, from a state at the beginning of one, if nothing is made
+    /// false but by what happens for certain, and is never made true again; `None` if it is
+    /// never.
+    pub(super) fn soonest(
+        &self,
+        world: &TimedWorld,
+        state: &State,
+        cell: usize,
+        side: Side,
+    ) -> Option<usize> {
+        // What ends in a cell is over at its beginning, seen from above, and at its end, seen from below.
+        let wait = usize::from(side == Side::Below);
+        let mut now = cell;
+        let mut facts = state.may_hold(world);
+        let mut started: u64 = 0;
+        let mut coming: Vec<(usize, Coming)> = Vec::new();
+        for running in &state.running {
+            let act = usize::from(running.act);
+            facts |= world.acts[act].adds_by_failing();
+            let age = cell - usize::from(running.since);
+            let ready = match running.phase {
+                Phase::Goes => match self.next_end[act].get(age) {
+                    Some(next) if *next != NEVER => {
+                        usize::from(running.since) + *next as usize + wait
+                    }
+                    _ => continue,
+                },
+                Phase::Ready(_) | Phase::Due(_) => cell,
+            };
+            coming.push((ready, Coming::End(act)));
+        }
+        for (event, next) in self.next_event.iter().enumerate() {
+            if state.happened & (1 << event) == 0
+                && let Some(next) = next.get(cell)
+                && *next != NEVER
+            {
+                coming.push((*next as usize + wait, Coming::Event(event)));
+            }
+        }
+        loop {
+            // All that can be done by now.
+            loop {
+                let before = (facts, started);
+                coming.retain(|(ready, what)| match what {
+                    Coming::End(act) if *ready <= now => {
+                        let Some((_, end)) = &world.acts[*act].rest else {
+                            return false;
+                        };
+                        let can_end = end.needs.is_possible(facts);
+                        if can_end {
+                            facts |= end.adds | end.helps;
+                        }
+                        !can_end
+                    }
+                    Coming::Event(event) if *ready <= now => {
+                        facts |= world.events[*event].adds;
+                        true
+                    }
+                    _ => true,
+                });
+                for (index, act) in world.acts.iter().enumerate() {
+                    if started & (1 << index) != 0 || !act.start.needs.is_possible(facts) {
+                        continue;
+                    }
+                    facts |= act.start.adds | act.start.helps;
+                    let Some((over_all, _)) = &act.rest else {
+                        started |= 1 << index;
+                        continue;
+                    };
+                    if over_all.is_possible(facts) {
+                        started |= 1 << index;
+                        facts |= act.adds_by_failing();
+                        if let Some(next) = self.next_end[index].first()
+                            && *next != NEVER
+                        {
+                            coming.push((now + *next as usize + wait, Coming::End(index)));
+                        }
+                    }
+                }
+                if world.goal.is_possible(facts) {
+                    return Some(now);
+                }
+                if (facts, started) == before {
+                    break;
+                }
+            }
+            // What happens last at this time.
+            let mut lost: Facts = 0;
+            coming.retain(|(ready, what)| match what {
+                Coming::Event(event) if *ready <= now => {
+                    lost |= world.lost_for_good(*event);
+                    false
+                }
+                _ => true,
+            });
+            facts &= !lost;
+            let later = coming.iter().map(|(ready, _)| *ready);
+            now = later.filter(|ready| *ready > now).min()?;
+        }
+    }
+}
+
+/// What will come about.
+#[derive(Clone, Copy, Debug)]
+enum Coming {
+    End(usize),
+    Event(usize),
+}

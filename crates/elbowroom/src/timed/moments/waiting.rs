@@ -1,0 +1,193 @@
+//! Whether an end may be better after something else: [`may_be_better_later`].
+
+use crate::timed::act::{Act, Needs, Snap};
+use crate::timed::failures::{Ending, Failed};
+use crate::timed::numbers::Amount;
+use crate::timed::world::{Facts, TimedWorld};
+
+/// What a happening changes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Footprint {
+    adds: Facts,
+    deletes: Facts,
+    /// The numbers that it changes, as bits.
+    numbers: u64,
+    /// Of these, those that it sets.
+    sets: u64,
+}
+
+/// An end that could come now.
+struct Waiting<'a> {
+    world: &'a TimedWorld,
+    act: usize,
+    own: Footprint,
+    /// What it needs.
+    reads: Facts,
+    /// The comparisons of the numbers that it changes.
+    tests: Facts,
+    /// What must hold until it comes.
+    kept: Facts,
+}
+
+/// Whether an end that could come now may be better after something that can come about while its action is under
+/// way: something that it would be in the way of, or that would undo what it does, or that it needs.
+/// Where more facts are never worse it is in nobody's way by what it gives.
+pub(super) fn may_be_better_later(
+    world: &TimedWorld,
+    (facts, under_way, happened, act, ending): (Facts, u64, u32, usize, Ending),
+) -> bool {
+    let Some((over_all, end)) = &world.acts[act].rest else {
+        return false;
+    };
+    let (own, reads) = match world.acts[act].failed(ending) {
+        Some(failed) => (Footprint::of_failed(failed), 0),
+        // It waits for what it needs.
+        None if !end.needs.hold(facts) => return true,
+        None => (Footprint::of(end), end.needs.mentions()),
+    };
+    let waiting = Waiting {
+        world,
+        act,
+        own,
+        reads,
+        tests: world.tests_of(own.numbers),
+        kept: over_all.conjunction().unwrap_or(0),
+    };
+    if waiting.is_in_the_way_of(&world.goal) {
+        return true;
+    }
+    let events = world.events.iter().enumerate();
+    let coming = events.filter(|(index, _)| happened & (1 << index) == 0);
+    let mut facts = facts;
+    for (_, event) in coming {
+        let of_event = Footprint {
+            adds: event.adds,
+            deletes: event.deletes,
+            ..Footprint::default()
+        };
+        if waiting.is_undone_by(of_event) {
+            return true;
+        }
+        facts |= event.adds;
+    }
+    waiting.has_something_to_wait_for(facts, under_way & !(1 << act))
+}
+
+impl Waiting<'_> {
+    /// Goes through all that may come about from these facts, with that under way, if nothing is made false but what
+    /// the action needs.
+    fn has_something_to_wait_for(&self, mut facts: Facts, mut started: u64) -> bool {
+        let acts = || self.world.acts.iter().enumerate();
+        for (index, other) in acts() {
+            if started & (1 << index) != 0 {
+                facts |= other.adds_by_failing();
+            }
+        }
+        let mut ended = 1_u64 << self.act;
+        loop {
+            let before = (facts, started, ended);
+            for (index, other) in acts().filter(|(index, _)| *index != self.act) {
+                let bit = 1 << index;
+                let start = &other.start;
+                if started & bit == 0 && start.needs.is_possible(facts) && !self.is_broken_by(start)
+                {
+                    if self.is_better_after_start(other) {
+                        return true;
+                    }
+                    started |= bit;
+                    facts |= start.adds | other.adds_by_failing();
+                }
+                let Some((over_all, end)) = &other.rest else {
+                    continue;
+                };
+                if started & !ended & bit == 0 {
+                    continue;
+                }
+                if self.is_better_after_failures(other) || self.is_in_the_way_of(over_all) {
+                    return true;
+                }
+                let can_end = over_all.is_possible(facts) && end.needs.is_possible(facts);
+                if can_end && !self.is_broken_by(end) {
+                    if self.is_in_the_way_of(&end.needs) || self.is_undone_by(Footprint::of(end)) {
+                        return true;
+                    }
+                    ended |= bit;
+                    facts |= end.adds;
+                }
+            }
+            if (facts, started, ended) == before {
+                return false;
+            }
+        }
+    }
+
+    fn is_better_after_start(&self, other: &Act) -> bool {
+        let over_all = other.rest.as_ref();
+        self.is_in_the_way_of(&other.start.needs)
+            || over_all.is_some_and(|(over_all, _)| self.is_in_the_way_of(over_all))
+            || self.is_undone_by(Footprint::of(&other.start))
+    }
+
+    fn is_better_after_failures(&self, other: &Act) -> bool {
+        let mut failures = other.failures.iter();
+        failures.any(|failed| self.is_undone_by(Footprint::of_failed(failed)))
+    }
+
+    /// Whether needs that hold before the end may not hold after it.
+    fn is_in_the_way_of(&self, needs: &Needs) -> bool {
+        let changed = if self.world.is_monotone {
+            self.own.deletes & !self.own.adds
+        } else {
+            self.own.adds | self.own.deletes
+        };
+        needs.mentions() & (changed | self.tests) != 0
+    }
+
+    /// Whether it makes a difference if that comes before the end.
+    fn is_undone_by(&self, other: Footprint) -> bool {
+        let own = self.own;
+        let changed = if self.world.is_monotone {
+            other.deletes & own.adds
+        } else {
+            (other.deletes | other.adds) & (own.adds | own.deletes | self.reads)
+        };
+        changed != 0 || (other.sets & own.numbers) | (other.numbers & own.sets) != 0
+    }
+
+    /// Whether the action is not under way after that.
+    fn is_broken_by(&self, snap: &Snap) -> bool {
+        snap.deletes & !snap.adds & self.kept != 0
+    }
+}
+
+impl Footprint {
+    fn of(snap: &Snap) -> Self {
+        let amounts = || snap.amounts.iter();
+        let bit = |all, number: usize| all | 1 << number;
+        let setting = amounts().filter(|amount| amount.sets());
+        Self {
+            adds: snap.adds,
+            deletes: snap.deletes,
+            numbers: amounts().map(Amount::number).fold(0, bit),
+            sets: setting.map(Amount::number).fold(0, bit),
+        }
+    }
+
+    fn of_failed(failed: &Failed) -> Self {
+        Self {
+            adds: failed.adds,
+            deletes: failed.deletes,
+            ..Self::default()
+        }
+    }
+}
+
+impl TimedWorld {
+    /// The comparisons of these numbers.
+    fn tests_of(&self, numbers: u64) -> Facts {
+        let tests = self.tests.iter().enumerate();
+        let read = tests.filter(|(_, test)| numbers & (1 << test.number) != 0);
+        let first = self.facts.len();
+        read.fold(0, |all, (place, _)| all | 1 << (first + place))
+    }
+}

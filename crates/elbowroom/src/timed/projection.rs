@@ -1,0 +1,105 @@
+//! A world of which some facts are left out, as if they were always as one would have them: whoever succeeds
+//! in the world itself does so in it, and it has fewer states.
+//!
+//! What is left out is what comes for certain beside the quickest way to the goal: facts that have to hold at
+//! starts and ends only, and that nothing gives but starts, and ends without chances of actions that take nothing
+//! but such facts, as long as the goal is reached no sooner without them.
+
+use super::Side;
+use super::act::Event;
+use super::chances::Chances;
+use super::state::State;
+use super::world::{Facts, TimedWorld};
+
+impl TimedWorld {
+    /// The world without what comes for certain beside the quickest way to the goal; `None` if there is
+    /// nothing of the kind, or if fewer facts may be better.
+    ///
+    /// `chances` are those of this world, seen from above, on a grid on which everything happens at
+    /// [known times](super::moments).
+    pub(super) fn without_certainties(&self, chances: &Chances) -> Option<Self> {
+        if !self.is_monotone {
+            return None;
+        }
+        let soonest = |world: &Self| {
+            let state = State::initial(world);
+            chances.soonest(world, &state, 0, Side::Above)
+        };
+        let first = soonest(self)?;
+        let certain = self.certain();
+        let mut left_out: Facts = 0;
+        for bit in (0..self.facts.len()).map(|place| 1 << place) {
+            let more = left_out | bit;
+            if certain & bit != 0 && soonest(&self.without_facts(more)) == Some(first) {
+                left_out = more;
+            }
+        }
+        let mut leaner = self.without_facts(left_out);
+        leaner.acts.retain(|act| act.adds() != 0 || act.helps());
+        if leaner.acts.len() == self.acts.len() {
+            return None;
+        }
+        leaner.cut().ok()?;
+        leaner.see_what_changes();
+        Some(leaner)
+    }
+
+    /// The facts that come for certain, if somebody wants them to.
+    fn certain(&self) -> Facts {
+        let by_chance = |event: &Event| event.adds | event.deletes;
+        let events = self
+            .events
+            .iter()
+            .fold(0, |all, event| all | by_chance(event));
+        let all: Facts = (0..self.facts.len()).fold(0, |all, place| all | 1 << place);
+        let mut certain = all & !events & !self.goal.mentions();
+        for act in &self.acts {
+            if act.fails() {
+                certain &= !act.adds();
+            } else if let Some((_, end)) = &act.rest
+                && act.has_chances()
+            {
+                certain &= !end.adds;
+            }
+            // What has to last keeps actions apart that take it.
+            if let Some((over_all, _)) = &act.rest {
+                certain &= !over_all.mentions();
+            }
+        }
+        loop {
+            let before = certain;
+            for act in &self.acts {
+                if act.deletes() & !certain != 0 {
+                    certain &= !act.rest.as_ref().map_or(0, |(_, end)| end.adds);
+                }
+            }
+            if certain == before {
+                return certain;
+            }
+        }
+    }
+
+    /// The same world, in which these facts are always as one would have them.
+    fn without_facts(&self, facts: Facts) -> Self {
+        let mut leaner = self.clone();
+        let snaps = leaner.acts.iter_mut().flat_map(|act| {
+            let end = act.rest.iter_mut().map(|(over_all, end)| {
+                *over_all = over_all.without(facts, true);
+                end
+            });
+            end.chain([&mut act.start])
+        });
+        for snap in snaps {
+            snap.needs = snap.needs.without(facts, true);
+            snap.adds &= !facts;
+            snap.deletes &= !facts;
+        }
+        let failures = leaner.acts.iter_mut().flat_map(|act| &mut act.failures);
+        for failed in failures {
+            failed.adds &= !facts;
+            failed.deletes &= !facts;
+        }
+        leaner.initial &= !facts;
+        leaner
+    }
+}

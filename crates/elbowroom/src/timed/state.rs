@@ -1,0 +1,203 @@
+//! What the process may be in: [`State`].
+
+use super::Side;
+use super::act::Snap;
+use super::failures::Ending;
+use super::graph::Hopes;
+use super::numbers::Span;
+use super::world::{Facts, TimedWorld};
+
+/// A state at the beginning of a cell.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) struct State {
+    /// With the comparisons that hold of the numbers.
+    pub(super) facts: Facts,
+    pub(super) numbers: Vec<Span>,
+    /// Whether nobody knows whether something has been broken off or has failed, because of a
+    /// number. Seen from below, that is given up.
+    pub(super) is_doubtful: bool,
+    /// Which events have happened, as bits; not those that happen again and again.
+    pub(super) happened: u32,
+    /// Sorted by action.
+    pub(super) running: Vec<Running>,
+    /// Whether the agent may do something before anything more happens.
+    pub(super) may_act: bool,
+}
+
+/// An action under way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) struct Running {
+    pub(super) act: u8,
+    /// The cell in which it began.
+    pub(super) since: u16,
+    pub(super) phase: Phase,
+}
+
+/// What is known of an action's end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum Phase {
+    /// Nothing yet.
+    Goes,
+    /// It may end in this cell, or in the next one.
+    Ready(Ending),
+    /// It ends in this cell.
+    Due(Ending),
+}
+
+impl State {
+    /// The state before anything has been done, or has happened by itself.
+    pub(super) fn initial(world: &TimedWorld) -> Self {
+        let numbers: Vec<Span> = world.numbers.iter().map(|number| number.initial).collect();
+        Self {
+            facts: world.tested(world.initial, &numbers),
+            numbers,
+            is_doubtful: false,
+            happened: 0,
+            running: Vec::new(),
+            may_act: true,
+        }
+    }
+
+    pub(super) fn under_way(&self) -> u64 {
+        self.running
+            .iter()
+            .fold(0, |set, running| set | 1 << running.act)
+    }
+
+    pub(super) fn is_hopeful(&self, world: &TimedWorld, hopes: &mut Hopes) -> bool {
+        if self.is_doubtful {
+            return false;
+        }
+        let facts = self.facts | world.tested;
+        let (set, happened) = (self.under_way(), self.happened);
+        *hopes
+            .entry((facts, set, happened))
+            .or_insert_with(|| world.is_hopeful(facts, set, happened))
+    }
+
+    /// Actions whose condition over all no longer holds fail.
+    pub(super) fn settle(&mut self, world: &TimedWorld) {
+        let facts = self.facts;
+        let may_hold = self.may_hold(world);
+        let mut is_doubtful = false;
+        self.running.retain(|running| {
+            let rest = world.acts[usize::from(running.act)].rest.as_ref();
+            rest.is_some_and(|(over_all, _)| {
+                let holds = over_all.hold(facts);
+                is_doubtful |= !holds && over_all.hold(may_hold);
+                holds
+            })
+        });
+        self.is_doubtful |= is_doubtful;
+    }
+
+    /// The facts that hold for some of the values that numbers may have.
+    pub(super) fn may_hold(&self, world: &TimedWorld) -> Facts {
+        if self.numbers.is_empty() {
+            return self.facts;
+        }
+        world.with_tests(self.facts, &self.numbers, Side::Above)
+    }
+
+    /// What a happening does, if that is what is drawn.
+    fn apply(&mut self, world: &TimedWorld, snap: &Snap, draw: usize) {
+        self.facts = snap.apply(self.facts);
+        if !snap.amounts.is_empty() {
+            world.changed(&mut self.numbers, snap, draw);
+            self.facts = world.tested(self.facts, &self.numbers);
+        }
+    }
+
+    /// An action starts, in that cell, with what is known of its end; an instantaneous one is over.
+    pub(super) fn started(
+        &self,
+        world: &TimedWorld,
+        act: usize,
+        since: usize,
+        phase: Phase,
+    ) -> Self {
+        let mut after = self.clone();
+        after.apply(world, &world.acts[act].start, 0);
+        if world.acts[act].rest.is_some() {
+            let running = Running {
+                act: u8::try_from(act).expect("at most 64 actions"),
+                since: u16::try_from(since).expect("fewer than 65,535 cells"),
+                phase,
+            };
+            let place = after.running.partition_point(|other| *other < running);
+            after.running.insert(place, running);
+        }
+        after.settle(world);
+        after
+    }
+
+    /// Whether the goal is reached for good: it holds, and nothing is under way that nobody might be
+    /// able to let go, and that could spoil it.
+    pub(super) fn is_won(&self, world: &TimedWorld) -> bool {
+        let holds_up = |running: &Running| world.acts[usize::from(running.act)].may_hold_up();
+        world.goal.hold(self.facts) && !self.is_doubtful && !self.running.iter().any(holds_up)
+    }
+
+    /// The action at that place in the list ends, well or badly. It fails, too, if what its end
+    /// needs does not hold; then nothing is left behind or undone, nor is it where it breaks off.
+    pub(super) fn ended(&self, world: &TimedWorld, place: usize, ending: Ending) -> Self {
+        let mut after = self.clone();
+        let running = after.running.remove(place);
+        let act = &world.acts[usize::from(running.act)];
+        if let Some(failed) = act.failed(ending) {
+            after.facts = failed.apply(after.facts);
+            after.settle(world);
+        } else if let (Some((_, end)), Ending::Well(draw)) = (&act.rest, ending) {
+            if end.needs.hold(after.facts) {
+                after.apply(world, end, usize::from(draw));
+                after.settle(world);
+            } else {
+                after.is_doubtful |= end.needs.hold(after.may_hold(world));
+            }
+        }
+        after
+    }
+
+    /// An event happens.
+    pub(super) fn changed(&self, world: &TimedWorld, event: usize) -> Self {
+        let mut after = self.clone();
+        if !world.events[event].is_recurrent() {
+            after.happened |= 1 << event;
+        }
+        after.facts = world.events[event].apply(after.facts);
+        after.settle(world);
+        after
+    }
+
+    /// The actions that can start and may do any good; the only one that needs looking at, where
+    /// nothing is ever better than to start it at once.
+    pub(super) fn startable(&self, world: &TimedWorld) -> Vec<usize> {
+        let under_way = self.under_way();
+        let can_start = |act: &usize| {
+            let is_idle = under_way & (1 << act) == 0;
+            is_idle
+                && world.acts[*act].start.needs.hold(self.facts)
+                && world.is_useful(*act, self.facts)
+        };
+        let acts: Vec<usize> = (0..world.acts.len()).filter(can_start).collect();
+        let is_eager = |act: &&usize| {
+            let Some((over_all, _)) = &world.acts[**act].rest else {
+                return false;
+            };
+            let facts = world.acts[**act].start.apply(self.facts);
+            world.acts[**act].is_eager && over_all.hold(facts)
+        };
+        match acts.iter().find(is_eager) {
+            Some(eager) => vec![*eager],
+            None => acts,
+        }
+    }
+
+    /// Whether the agent has nothing to think about but to start the first of these.
+    pub(super) fn must_start(&self, world: &TimedWorld, startable: &[usize]) -> bool {
+        matches!(startable, [only] if world.acts[*only].is_eager && {
+            let facts = world.acts[*only].start.apply(self.facts);
+            world.acts[*only].rest.as_ref().is_some_and(|(over_all, _)| over_all.hold(facts))
+        })
+    }
+}
