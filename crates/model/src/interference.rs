@@ -79,7 +79,7 @@ impl Footprint {
     }
 
     /// The footprint of an event.
-    pub(crate) fn of_snap(task: &Task, snap: &SnapAction) -> Self {
+    pub fn of_snap(task: &Task, snap: &SnapAction) -> Self {
         let mut footprint = Self::default();
         footprint.include_snap(task, snap);
         footprint

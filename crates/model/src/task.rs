@@ -15,6 +15,9 @@ use crate::problem::{self, FunctionId, ObjectId, PredicateId, Problem, SchemaId}
 use crate::state::{State, TimedHappening};
 use crate::table::Table;
 
+const CONTROLS: &str = "control parameters (`:control`)";
+const CONSTRAINTS: &str = "trajectory constraints (`:constraints`)";
+
 /// A problem, and the ground facts and fluents met so far.
 ///
 /// Facts and fluents enter a table when something mentions them, so that a plan can be judged
@@ -125,13 +128,13 @@ impl Task {
         &self.autonomous
     }
 
-    /// The part of the problem, if there is one, that nobody but the judge heeds. All who find,
-    /// change or carry out plans must refuse it.
+    /// The part of the problem, if there is one, that nobody heeds but the judge, and envelopes as
+    /// far as they say so. All who find, change or carry out plans must refuse it.
     pub fn left_to_the_judge(&self) -> Option<&'static str> {
         if !self.autonomous.is_empty() {
             return Some("processes and events (PDDL+)");
         }
-        (!self.problem.controls.is_empty()).then_some("control parameters (`:control`)")
+        (!self.problem.controls.is_empty()).then_some(CONTROLS)
     }
 
     /// The part of the problem, if there is one, that decides whether a plan is valid and that
@@ -140,7 +143,18 @@ impl Task {
         if let Some(feature) = self.left_to_the_judge() {
             return Some(feature);
         }
-        (!self.constraints.hard.is_empty()).then_some("trajectory constraints (`:constraints`)")
+        (!self.constraints.hard.is_empty()).then_some(CONSTRAINTS)
+    }
+
+    /// The part of the problem, if there is one, that decides whether a plan is valid and that the
+    /// boxes of a network given as such do not heed. Where there are processes and events, they heed
+    /// constraints, too, as far as they say so.
+    pub fn beyond_boxes(&self) -> Option<&'static str> {
+        if !self.problem.controls.is_empty() {
+            return Some(CONTROLS);
+        }
+        let are_heeded = self.constraints.hard.is_empty() || !self.autonomous.is_empty();
+        (!are_heeded).then_some(CONSTRAINTS)
     }
 
     /// The same task with another goal. Facts and fluents keep their numbers.

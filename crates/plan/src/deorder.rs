@@ -108,9 +108,26 @@ pub enum DeorderError {
 /// # Errors
 /// When the plan is not valid, as far as that shows here; ask the judge first. When the problem
 /// has constraints that orders and bounds do not respect: on numbers, on derived facts, on what
-/// conditional effects change.
+/// conditional effects change. When the problem has processes or events, or numbers that the plan
+/// chooses.
 pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, DeorderError> {
     if let Some(feature) = task.left_to_the_judge() {
+        return Err(DeorderError::Unsupported { feature });
+    }
+    deorder_the_plan_alone(task, plan)
+}
+
+/// [`deorder`] as if there were no processes and events, nor, if there are, constraints on the course:
+/// all that may need more than the constraints of the result keep.
+///
+/// # Errors
+/// As for [`deorder`], but for these.
+pub fn deorder_the_plan_alone(
+    task: &Task,
+    plan: &TimeTriggeredPlan,
+) -> Result<Deordered, DeorderError> {
+    if !task.problem().controls.is_empty() {
+        let feature = "control parameters (`:control`)";
         return Err(DeorderError::Unsupported { feature });
     }
     let Labelled {
@@ -137,8 +154,10 @@ pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, Deord
         .constraints
         .extend(durations::constraints(task, &stn_plan, &times));
     stn_plan.constraints.extend(order.into_constraints());
-    let course = course::constraints(task, &stn_plan, &footprints, &times)?;
-    stn_plan.constraints.extend(course);
+    if task.autonomous().is_empty() {
+        let course = course::constraints(task, &stn_plan, &footprints, &times)?;
+        stn_plan.constraints.extend(course);
+    }
     let sides: Vec<_> = sides.into_constraints().collect();
     let nominal = nominal(task, &stn_plan, &sides, times)?;
     Ok(Deordered {

@@ -46,11 +46,11 @@ use crate::parameter::ParametrizedPlan;
 ///
 /// # Errors
 /// All mistakes found, those of syntax and those of names that the task does not know. And when the
-/// problem has what networks do not respect ([`Task::only_judged`]).
+/// problem has what the boxes of networks do not respect ([`Task::beyond_boxes`]).
 pub fn read(source: impl Into<Source>, task: &Task) -> Result<ParametrizedPlan, Diagnostics> {
     let source = source.into();
     let (file, mut mistakes) = syntax::parse(&source);
-    if let Some(feature) = task.only_judged() {
+    if let Some(feature) = task.beyond_boxes() {
         let message = format!("networks do not respect {feature} yet, which the problem has");
         mistakes.error(0..0, message);
     }

@@ -15,8 +15,8 @@ use crate::stn_plan::{InstanceId, Node, NodeId, Reason};
 /// Whether every schedule of a deordered plan is known to work, without a look at its conditions one by
 /// one; `nominal` is one of its schedules.
 ///
-/// Where this is so, each happening reads in every schedule what it reads in `nominal`: the facts and fluents
-/// that it reads were written by the same happenings, and what these write does not depend on when
+/// Where this is so, nothing happens without the plan, and each happening reads in every schedule what
+/// it reads in `nominal`: the facts and fluents that it reads were written by the same happenings, and what these write does not depend on when
 /// they are. So numbers may change, but not continuously, not by amounts that depend on durations or on
 /// parameters, and not only under conditions. An over-all condition reads all states in its action's time;
 /// their order is kept where it is about one fact, or where at most one change of the fluents that it
@@ -28,7 +28,8 @@ pub fn keeps_all_that_is_read(task: &Task, plan: &ParametrizedPlan, nominal: &Sc
         |kind: ParameterKind| matches!(kind, ParameterKind::Duration(_) | ParameterKind::Timed(_));
     let constraints = &plan.plan.constraints;
     let actions = || plan.plan.instances.iter().map(|own| &*own.action);
-    if !plan.parameters.iter().all(|own| is_time(own.kind))
+    if !task.autonomous().is_empty()
+        || !plan.parameters.iter().all(|own| is_time(own.kind))
         || constraints.iter().any(|own| own.reason == Reason::Side)
         || !is_plain(task, &plan.goal)
         || !actions().all(|action| has_plain_conditions(task, action))
