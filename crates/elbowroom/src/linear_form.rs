@@ -59,7 +59,8 @@ impl LinearForm {
         let schedule = schedule.earliest_schedule(zero);
         let schedule = schedule.times().iter().cloned().collect();
         let reduction = Reduction::new(plan);
-        let compiled = Obligations::compile(task, plan, &schedule, &reduction.substitution)?;
+        let compiled =
+            Obligations::compile(task, plan, (&schedule, around), &reduction.substitution)?;
         let order = Order::of(plan, values, &compiled.over_all)?;
         let mut obligations = compiled.direct;
         for over_all in &compiled.over_all {

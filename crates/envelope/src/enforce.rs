@@ -25,7 +25,8 @@ pub fn enforced(
     let reduction = Reduction::new(plan);
     let nominal = plan.nominal();
     let schedule = earliest_schedule(&reduction, &nominal).ok_or(Refusal::NoNominalSchedule)?;
-    let obligations = Obligations::compile(task, plan, &schedule, &reduction.substitution)?;
+    let obligations =
+        Obligations::compile(task, plan, (&schedule, &nominal), &reduction.substitution)?;
     let ranges = DecoupledEnvelope::ranges(plan);
     let network = ConsistentNetwork::try_from(reduction.network(&ranges).network).ok();
     let is_implied = |wanted: &Difference| {

@@ -136,6 +136,13 @@ pub enum Requirement {
         /// The fluent.
         fluent: FluentId,
     },
+    /// Processes and events keep their course.
+    Nature {
+        /// The happening after which it would change.
+        after: NodeId,
+        /// The course, in words: `the event (boil) happens`.
+        course: String,
+    },
     /// The goal holds at the end.
     Goal {
         /// The condition, one conjunct.
@@ -218,6 +225,14 @@ pub enum Refusal {
         /// The parameter.
         name: String,
     },
+    /// What processes and events do is not known, or cannot be told by linear inequalities.
+    #[error("{place}: {obstacle}")]
+    Nature {
+        /// Where it stands.
+        place: String,
+        /// What stands in the way.
+        obstacle: String,
+    },
     /// The plan's network has no schedule at the nominal values.
     #[error("the plan has no schedule at its nominal values")]
     NoNominalSchedule,
@@ -263,6 +278,9 @@ impl Requirement {
                     plan.node_words(task, *node),
                     task.fluent_name(*fluent)
                 )
+            }
+            Self::Nature { after, course } => {
+                format!("after {}, {course}", plan.node_words(task, *after))
             }
             Self::Goal { condition } => {
                 format!(

@@ -147,7 +147,8 @@ impl Soundness {
         let Some(schedule) = earliest_schedule(&reduction, valuation) else {
             return Ok(None);
         };
-        let obligations = Obligations::compile(task, plan, &schedule, &reduction.substitution)?;
+        let obligations =
+            Obligations::compile(task, plan, (&schedule, valuation), &reduction.substitution)?;
         let mut direct = Vec::new();
         for (index, obligation) in obligations.direct.iter().enumerate() {
             for (case, bad) in obligation.bad_cases.iter().enumerate() {

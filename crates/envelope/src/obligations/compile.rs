@@ -2,6 +2,7 @@
 
 mod changes;
 mod guards;
+mod nature;
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
@@ -12,6 +13,7 @@ use elbowroom_model::ground::{Body, Condition, Expression, SnapAction};
 
 use changes::record;
 use guards::{GuardId, GuardPart, effects};
+use nature::{Nature, Occurrence};
 
 use super::dnf::{Alternatives, Wanted, compared};
 use super::goal::goal_cases;
@@ -23,7 +25,9 @@ use super::{
     BadCase, Difference, Obligation, Obligations, OverAll, Refusal, Requirement, Substitution,
 };
 use crate::linear::Linear;
-use elbowroom_plan::{InstanceId, Node, NodeId, ParameterKind, ParametrizedPlan, Schedule};
+use elbowroom_plan::{
+    InstanceId, Node, NodeId, ParameterKind, ParametrizedPlan, Schedule, Valuation,
+};
 
 /// How many combinations of outcomes of conditional effects are followed.
 const MOST_RUNS: usize = 256;
@@ -31,7 +35,7 @@ const MOST_RUNS: usize = 256;
 impl Obligations {
     /// All obligations of a plan.
     ///
-    /// `nominal` gives each node its time in some schedule at the nominal parameter values;
+    /// `nominal` gives each node its time in some schedule at the values `around`;
     /// `substitution` the parameters that are differences of times.
     ///
     /// # Errors
@@ -39,7 +43,7 @@ impl Obligations {
     pub fn compile(
         task: &Task,
         plan: &ParametrizedPlan,
-        nominal: &Schedule,
+        (nominal, around): (&Schedule, &Valuation),
         substitution: &Substitution,
     ) -> Result<Self, Refusal> {
         let mut order: Vec<NodeId> = plan.plan.nodes().map(|(id, _)| id).collect();
@@ -54,11 +58,13 @@ impl Obligations {
             plan,
             order,
             substitution,
+            nature: Nature::of(task, plan, (nominal, around))?,
         };
         let mut runs = vec![Run {
             position: 0,
             timeline: Timeline::initial(task, plan, &compiler.substitution),
             outcomes: BTreeMap::new(),
+            occurred: Vec::new(),
         }];
         let mut finished = 0;
         while let Some(run) = runs.pop() {
@@ -83,6 +89,8 @@ struct Run {
     position: usize,
     timeline: Timeline,
     outcomes: BTreeMap<GuardId, bool>,
+    /// The events that have happened without a plan.
+    occurred: Vec<Occurrence>,
 }
 
 enum Progress {
@@ -97,15 +105,23 @@ struct Compiler<'a> {
     /// All nodes in nominal order.
     order: Vec<NodeId>,
     substitution: Arc<Substitution>,
+    /// What goes on without a plan, if anything does.
+    nature: Option<Nature>,
 }
 
 impl Compiler<'_> {
     fn follow(&self, mut run: Run, obligations: &mut Obligations) -> Result<Progress, Refusal> {
         while let Some(&node) = self.order.get(run.position) {
             if let Some(split) = self.decide_guards(&mut run, node, obligations)? {
+                if self.nature.is_some() {
+                    return Err(self.guard_depends(node));
+                }
                 return Ok(Progress::Split(split));
             }
             self.happen(&mut run, node, obligations)?;
+            if let Some(nature) = &self.nature {
+                self.pass(nature, &mut run, obligations)?;
+            }
             run.position += 1;
         }
         self.finish(run, obligations)?;
@@ -263,6 +279,14 @@ impl Compiler<'_> {
                 continue;
             };
             for condition in body.over_all.conjuncts() {
+                // Those have been looked at on the way.
+                if self
+                    .nature
+                    .as_ref()
+                    .is_some_and(|nature| nature.changes(self.task, condition))
+                {
+                    continue;
+                }
                 let (start, end) = (plan.start(id), plan.end(id));
                 let literal = match condition {
                     Condition::Fact(fact) => Some((*fact, true)),

@@ -167,7 +167,7 @@ pub(crate) fn compared(
 }
 
 /// Drops inequalities between constants that hold; `None` if one does not.
-fn settled(conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
+pub(crate) fn settled(conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
     let mut open = Vec::new();
     for inequality in conjunction {
         match inequality.expression.as_constant() {
@@ -179,7 +179,7 @@ fn settled(conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
     Some(open)
 }
 
-fn always_if(condition: bool) -> Alternatives {
+pub(crate) fn always_if(condition: bool) -> Alternatives {
     if condition {
         vec![Vec::new()]
     } else {

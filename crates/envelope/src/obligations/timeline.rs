@@ -113,6 +113,53 @@ impl Timeline {
             .push((node, change));
     }
 
+    /// What holds and counts at the node, after all that was recorded, as a timeline on which
+    /// nothing happens.
+    pub(crate) fn snapshot(&self, moment: NodeId) -> Self {
+        let mut snapshot = Self {
+            assumptions: self.assumptions.clone(),
+            ..Self::default()
+        };
+        for &fact in self.facts.keys() {
+            snapshot.put_fact(fact, self.is_true(fact, &|_| true));
+        }
+        for &fluent in self.fluents.keys() {
+            snapshot.put_value(fluent, self.value(fluent, &|_| true, moment));
+        }
+        snapshot
+    }
+
+    /// Gives a fact its first truth value.
+    pub(crate) fn put_fact(&mut self, fact: FactId, truth: bool) {
+        self.facts.entry(fact).or_default().initially = truth;
+    }
+
+    /// Gives a fluent its first value.
+    pub(crate) fn put_value(&mut self, fluent: FluentId, value: Option<Linear>) {
+        self.fluents.entry(fluent).or_default().initially = value;
+    }
+
+    /// The continuous changes that have begun and not stopped.
+    pub(crate) fn drifts(&self) -> Vec<(FluentId, Linear)> {
+        let mut all = Vec::new();
+        for (&fluent, history) in &self.fluents {
+            let mut drifts: Vec<(NodeId, &Linear)> = Vec::new();
+            for (node, change) in &history.events {
+                match change {
+                    FluentChange::Drift(rate) => drifts.push((*node, rate)),
+                    FluentChange::DriftEnd(since) => {
+                        if let Some(index) = drifts.iter().position(|(began, _)| began == since) {
+                            drifts.remove(index);
+                        }
+                    }
+                    FluentChange::Assign(_) | FluentChange::Shift(_) => {}
+                }
+            }
+            all.extend(drifts.into_iter().map(|(_, rate)| (fluent, rate.clone())));
+        }
+        all
+    }
+
     /// The history of a fact.
     pub(crate) fn fact_history(&self, fact: FactId) -> FactHistory {
         self.facts.get(&fact).cloned().unwrap_or_default()

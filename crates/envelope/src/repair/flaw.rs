@@ -51,7 +51,8 @@ impl Finder<'_> {
         schedule: &Schedule,
         decided: &BTreeSet<(NodeId, NodeId)>,
     ) -> Result<Flaw, Refusal> {
-        let compiled = Obligations::compile(self.task, self.plan, schedule, self.substitution)?;
+        let compiled =
+            Obligations::compile(self.task, self.plan, (schedule, values), self.substitution)?;
         // As long as separations are broken, the others go by an order that there may not be.
         for obligation in &compiled.direct {
             if let Some(case) = broken(obligation, values, schedule) {
@@ -149,6 +150,7 @@ impl Finder<'_> {
             Requirement::Defined { node } | Requirement::OneUpdate { node, .. } => {
                 (BTreeSet::new(), true, vec![*node])
             }
+            Requirement::Nature { after, .. } => (BTreeSet::new(), true, vec![*after]),
             Requirement::Separation { first, second } => {
                 (BTreeSet::new(), false, vec![*first, *second])
             }

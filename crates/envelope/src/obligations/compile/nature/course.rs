@@ -1,0 +1,379 @@
+//! The course from one happening of the plan to the next one.
+
+mod ahead;
+mod fire;
+mod needs;
+mod work;
+
+use std::cell::OnceCell;
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_model::autonomous::{Autonomous, GroundEvent};
+use elbowroom_model::ground::{Condition, Expression, FactId, FluentId};
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, NodeId};
+
+use super::super::{Compiler, Run};
+use super::condition::{View, When};
+use super::{Nature, Occurrence, oblige_nature};
+use crate::linear::Linear;
+use crate::obligations::dnf::{Alternatives, Wanted};
+use crate::obligations::timeline::{Reading, Timeline};
+use crate::obligations::{Inequality, Obligations, Refusal, Requirement};
+
+/// How many turns of events and processes there may be between two happenings of the plan.
+const MOST_TURNS: usize = 200;
+
+/// The state at a moment, and what has been changed since the happening before.
+pub(super) struct Course<'a> {
+    compiler: &'a Compiler<'a>,
+    nature: &'a Nature,
+    node: NodeId,
+    next: Option<NodeId>,
+    /// The actions under way, each with its over-all conditions that nature may break; and, of no
+    /// action, what must always hold.
+    running: Vec<(Option<InstanceId>, Vec<&'a Condition>)>,
+    /// The continuous changes of these.
+    drifts: Vec<(FluentId, Linear)>,
+    /// What holds and counts now.
+    now: Timeline,
+    at: Linear,
+    rates: BTreeMap<FluentId, Linear>,
+    /// Whether each process is at work.
+    at_work: Vec<bool>,
+    /// The events that have happened at this moment.
+    fired: BTreeSet<usize>,
+    /// Whether the next happening must not fall together with this moment.
+    must_go_on: bool,
+    facts: BTreeSet<FactId>,
+    fluents: BTreeSet<FluentId>,
+    occurred: Vec<Occurrence>,
+    /// The events that had happened before the happening.
+    earlier: &'a [Occurrence],
+    obligations: &'a mut Obligations,
+}
+
+/// What nature has changed.
+pub(super) struct Changed {
+    pub(super) facts: Vec<(FactId, bool)>,
+    pub(super) values: Vec<(FluentId, Option<Linear>)>,
+    pub(super) occurred: Vec<Occurrence>,
+}
+
+impl<'a> Course<'a> {
+    /// Right after a happening.
+    pub(super) fn after(
+        (compiler, nature): (&'a Compiler<'a>, &'a Nature),
+        run: &'a Run,
+        (node, next): (NodeId, Option<NodeId>),
+        obligations: &'a mut Obligations,
+    ) -> Self {
+        let plan = &compiler.plan.plan;
+        let position = |node: NodeId| compiler.order.iter().position(|other| *other == node);
+        let here = Some(run.position);
+        let mut running = vec![(None, nature.always.iter().collect())];
+        for (index, instance) in plan.instances.iter().enumerate() {
+            let id = InstanceId::from(index);
+            let Some(body) = instance.action.durative() else {
+                continue;
+            };
+            if position(plan.start(id)) <= here && here < position(plan.end(id)) {
+                let conditions = body.over_all.conjuncts().into_iter();
+                let touched = conditions.filter(|own| nature.changes(compiler.task, own));
+                running.push((Some(id), touched.collect()));
+            }
+        }
+        Self {
+            compiler,
+            nature,
+            node,
+            next,
+            running,
+            drifts: run.timeline.drifts(),
+            now: run.timeline.snapshot(node),
+            at: Linear::difference(NodeId::ZERO, node),
+            rates: BTreeMap::new(),
+            at_work: Vec::new(),
+            fired: BTreeSet::new(),
+            must_go_on: false,
+            facts: BTreeSet::new(),
+            fluents: BTreeSet::new(),
+            occurred: Vec::new(),
+            earlier: &run.occurred,
+            obligations,
+        }
+    }
+
+    /// What it has come to.
+    pub(super) fn end(self) -> Changed {
+        let reading = self.reading(&self.now);
+        let truth = |fact: &FactId| (*fact, reading.fact(*fact).unwrap_or_default());
+        let value = |fluent: &FluentId| {
+            let value = reading.linear(&Expression::Fluent(*fluent));
+            (*fluent, value.ok().flatten())
+        };
+        let (facts, values) = (
+            self.facts.iter().map(truth).collect(),
+            self.fluents.iter().map(value).collect(),
+        );
+        Changed {
+            facts,
+            values,
+            occurred: self.occurred,
+        }
+    }
+
+    /// Lets the events happen whose conditions hold at the moment.
+    pub(super) fn happens_now(&mut self) -> Result<(), Refusal> {
+        loop {
+            let mut ready = Vec::new();
+            for (index, event) in self.nature_of_task().events.iter().enumerate() {
+                let condition = &event.snap.condition;
+                self.refuse_derived_numbers(condition, &event.name)?;
+                let zero = Rational::ZERO;
+                let holds = self.view(&self.now).holds(condition, When::At(&zero))?;
+                self.expect_now(condition, holds, &course_of(event, holds))?;
+                if holds {
+                    ready.push(index);
+                }
+            }
+            if ready.is_empty() {
+                return Ok(());
+            }
+            // Of a happening at the same moment, the changes would come first.
+            self.must_go_on |= self.node != NodeId::ZERO && !self.has_moved();
+            self.happen(&ready, false)?;
+        }
+    }
+
+    /// From right after the moment to the arrival at the next happening.
+    pub(super) fn goes_on_until(&mut self, next: NodeId) -> Result<(), Refusal> {
+        self.expect_order(next)?;
+        for _ in 0..MOST_TURNS {
+            self.settle()?;
+            let until = time_of(next);
+            if let Some(turn) = self.next_turn(&until)? {
+                self.expect_later(&turn)?;
+                self.advance(turn, false)?;
+                self.must_go_on = false;
+                self.happens_now()?;
+                continue;
+            }
+            self.expect_order(next)?;
+            self.advance(until, true)?;
+            let before = self.occurred.len();
+            self.happens_now()?;
+            if self.occurred.len() > before {
+                return Err(self.obstacle(
+                    "an event falls together with the next happening, as planned: their order is \
+                     not known",
+                ));
+            }
+            return Ok(());
+        }
+        Err(self.obstacle(&format!(
+            "there are more than {MOST_TURNS} events and turns of processes before the next \
+             happening"
+        )))
+    }
+
+    /// In the end.
+    pub(super) fn stays(&mut self) -> Result<(), Refusal> {
+        self.demand_conditions_now(true)
+    }
+
+    fn nature_of_task(&self) -> &'a Autonomous {
+        self.compiler.task.autonomous()
+    }
+
+    fn has_moved(&self) -> bool {
+        self.at != time_of(self.node)
+    }
+
+    fn reading<'r>(&'r self, timeline: &'r Timeline) -> Reading<'r> {
+        self.reading_of(timeline, None)
+    }
+
+    fn reading_of<'r>(&'r self, timeline: &'r Timeline, action: Option<InstanceId>) -> Reading<'r> {
+        let plan = &self.compiler.plan.plan;
+        Reading {
+            task: self.compiler.task,
+            timeline,
+            cut: &|_| true,
+            // Nothing drifts on a snapshot, so the moment of reading does not matter.
+            moment: NodeId::ZERO,
+            action: action.map(|id| (plan.start(id), plan.end(id))),
+            substitution: &self.compiler.substitution,
+            place: action.map_or("processes and events", |id| &plan.instance(id).action.name),
+            derived: OnceCell::new(),
+        }
+    }
+
+    fn view<'r>(&'r self, timeline: &'r Timeline) -> View<'r> {
+        self.view_of(timeline, None)
+    }
+
+    fn view_of<'r>(&'r self, timeline: &'r Timeline, action: Option<InstanceId>) -> View<'r> {
+        View {
+            task: self.compiler.task,
+            reading: self.reading_of(timeline, action),
+            rates: &self.rates,
+            nominal: (&self.nature.times, &self.nature.values),
+        }
+    }
+
+    fn obstacle(&self, obstacle: &str) -> Refusal {
+        let words = (self.compiler.plan.plan).node_words(self.compiler.task, self.node);
+        Refusal::Nature {
+            place: format!("after {words}"),
+            obstacle: obstacle.to_owned(),
+        }
+    }
+
+    /// Rules that compare numbers would have to be followed while these change.
+    fn refuse_derived_numbers(&self, condition: &Condition, name: &str) -> Result<(), Refusal> {
+        let (mut own, mut all) = (0_usize, 0_usize);
+        condition.visit_fluents(&mut |_| own += 1);
+        (self.compiler.task).visit_fluents_of(condition, &mut |_| all += 1);
+        if own == all {
+            return Ok(());
+        }
+        Err(Refusal::Nature {
+            place: name.to_owned(),
+            obstacle: "a derived predicate compares numbers".to_owned(),
+        })
+    }
+
+    fn demand(&mut self, course: &str, broken: Alternatives) {
+        let requirement = Requirement::Nature {
+            after: self.node,
+            course: course.to_owned(),
+        };
+        let assumptions = &self.now.assumptions;
+        oblige_nature(self.obligations, requirement, assumptions, broken);
+    }
+
+    /// [`demand`](Self::demand), of the course that is followed: it goes on as it does, unless the
+    /// order of what falls together is not known.
+    fn expect(&mut self, course: &str, broken: Alternatives) -> Result<(), Refusal> {
+        let holds = |inequality: &Inequality| {
+            let value = &inequality.expression;
+            let value = value.value(&self.nature.times, &self.nature.values);
+            value.is_negative() || value.is_zero() && !inequality.is_strict
+        };
+        if broken.iter().any(|case| case.iter().all(holds)) {
+            return Err(self.obstacle(
+                "as planned, things fall together whose order is not known then: happenings, \
+                 events, or processes that start or stop",
+            ));
+        }
+        self.demand(course, broken);
+        Ok(())
+    }
+
+    /// The condition is as wanted at this moment.
+    fn expect_now(
+        &mut self,
+        condition: &Condition,
+        wanted: bool,
+        course: &str,
+    ) -> Result<(), Refusal> {
+        let unwanted = if wanted {
+            Wanted::NotTrue
+        } else {
+            Wanted::True
+        };
+        let broken = self.reading(&self.now).alternatives(condition, unwanted)?;
+        self.expect(course, broken)
+    }
+
+    /// The next happening does not come before this moment, nor at it where that makes a
+    /// difference.
+    fn expect_order(&mut self, next: NodeId) -> Result<(), Refusal> {
+        // Happenings of one time are followed in the order of their numbers.
+        let is_later = self.must_go_on || !self.has_moved() && next < self.node;
+        let broken = Inequality {
+            expression: time_of(next).minus(&self.at),
+            is_strict: !is_later,
+        };
+        let words = (self.compiler.plan.plan).node_words(self.compiler.task, next);
+        let course = format!("{words} must come after what happens before it as planned");
+        self.expect(&course, vec![vec![broken]])
+    }
+
+    /// The turn comes after this moment.
+    fn expect_later(&mut self, turn: &Linear) -> Result<(), Refusal> {
+        let broken = Inequality {
+            expression: turn.minus(&self.at),
+            is_strict: false,
+        };
+        let course = "events, and processes that start or stop, must keep their order";
+        self.expect(course, vec![vec![broken]])
+    }
+
+    /// Goes on to a later moment; `is_arrival` at the next happening.
+    fn advance(&mut self, to: Linear, is_arrival: bool) -> Result<(), Refusal> {
+        self.demand_conditions_now(!self.has_moved())?;
+        let elapsed = to.minus(&self.at);
+        let mut then = self.now.clone();
+        for (fluent, rate) in &self.rates {
+            let value = self.view(&self.now).value(&Expression::Fluent(*fluent))?;
+            let change = rate.times(&elapsed).ok_or_else(|| Refusal::NotLinear {
+                place: "processes and events".to_owned(),
+                expression: self.compiler.task.fluent_name(*fluent),
+            })?;
+            then.put_value(*fluent, Some(value.plus(&change)));
+        }
+        let (mut expected, mut demands) = (Vec::new(), Vec::new());
+        let autonomous = self.nature_of_task();
+        let (before, after) = (self.view(&self.now), self.view(&then));
+        for event in &autonomous.events {
+            let broken =
+                before.broken_throughout((&after, &elapsed), &event.snap.condition, false)?;
+            expected.push((course_of(event, false), broken));
+        }
+        for (process, on) in autonomous.processes.iter().zip(&self.at_work) {
+            let broken = before.broken_throughout((&after, &elapsed), &process.condition, *on)?;
+            expected.push((turn_of(&process.name, *on), broken));
+        }
+        for (id, conditions) in &self.running {
+            let (before, after) = (self.view_of(&self.now, *id), self.view_of(&then, *id));
+            for condition in conditions {
+                self.refuse_derived_numbers(condition, before.reading.place)?;
+                let broken = before.broken_throughout((&after, &elapsed), condition, true)?;
+                demands.push((self.need(*id, condition), broken));
+            }
+        }
+        for (course, broken) in expected {
+            self.expect(&course, broken)?;
+        }
+        for (course, broken) in demands {
+            self.demand(&course, broken);
+        }
+        // The timeline itself knows what changes because of the plan alone.
+        let moved = self.rates.keys().copied();
+        (self.fluents).extend(moved.filter(|fluent| self.nature.fluents.contains(fluent)));
+        self.now = then;
+        self.at = to;
+        self.fired.clear();
+        self.demand_conditions_on_arrival(is_arrival)
+    }
+}
+
+fn time_of(node: NodeId) -> Linear {
+    Linear::difference(NodeId::ZERO, node)
+}
+
+fn course_of(event: &GroundEvent, happens: bool) -> String {
+    let name = &event.name;
+    if happens {
+        format!("the event {name} must happen as planned")
+    } else {
+        format!("the event {name} must not happen before what comes next")
+    }
+}
+
+fn turn_of(process: &str, is_at_work: bool) -> String {
+    let is = if is_at_work { "at work" } else { "at rest" };
+    format!("the process {process} must be {is} until what comes next")
+}

@@ -1,0 +1,124 @@
+//! The moment at which something turns next.
+
+use std::collections::BTreeSet;
+
+use elbowroom_model::ground::Condition;
+use elbowroom_num::Rational;
+
+use super::super::condition::{View, When};
+use super::Course;
+use crate::linear::Linear;
+use crate::obligations::Refusal;
+
+impl Course<'_> {
+    /// The moment of the next turn before `until`: where an event's condition comes to hold, or a
+    /// process starts or stops, in the schedule that is followed.
+    pub(super) fn next_turn(&self, until: &Linear) -> Result<Option<Linear>, Refusal> {
+        let view = self.view(&self.now);
+        let length = view.nominally(until) - view.nominally(&self.at);
+        let autonomous = self.nature_of_task();
+        let events = autonomous.events.iter();
+        let events = events.map(|event| (&event.snap.condition, None));
+        let processes = autonomous.processes.iter().zip(&self.at_work);
+        let processes = processes.map(|(process, on)| (&process.condition, Some(*on)));
+        let conditions: Vec<(&Condition, Option<bool>)> = events.chain(processes).collect();
+        let mut moments = BTreeSet::new();
+        for (condition, _) in &conditions {
+            let zeros = zeros(&view, condition)?;
+            moments.extend(zeros.into_iter().map(|(elapsed, _)| elapsed));
+        }
+        let moments = moments.into_iter();
+        for elapsed in moments.filter(|at| at.is_positive() && *at <= length) {
+            let mut turned = Vec::new();
+            for (condition, at_work) in &conditions {
+                let is_then = view.holds(condition, When::At(&elapsed))?;
+                let is_after = view.holds(condition, When::RightAfter(&elapsed))?;
+                // On arrival at the next happening, what holds right after it is not settled yet.
+                let is_turned = match at_work {
+                    None if elapsed == length => is_then,
+                    None => is_then || is_after,
+                    Some(_) if elapsed == length => false,
+                    Some(on) => is_then != *on || is_after != *on,
+                };
+                if is_turned {
+                    turned.push(*condition);
+                }
+            }
+            if !turned.is_empty() {
+                return self.moment_of(&view, &turned, &elapsed).map(Some);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The moment, so much later, at which these conditions turn.
+    fn moment_of(
+        &self,
+        view: &View<'_>,
+        turned: &[&Condition],
+        elapsed: &Rational,
+    ) -> Result<Linear, Refusal> {
+        let mut found: Option<Linear> = None;
+        for condition in turned {
+            for (zero, later) in zeros(view, condition)? {
+                if zero != *elapsed {
+                    continue;
+                }
+                let Some(later) = later else {
+                    return Err(self.obstacle(
+                        "how fast a number reaches the bound of a condition depends on parameters",
+                    ));
+                };
+                let moment = self.at.plus(&later);
+                if found.as_ref().is_some_and(|other| *other != moment) {
+                    return Err(self.obstacle(
+                        "two numbers reach bounds at one moment, as planned, and need not do so \
+                         at other times: their order is not known",
+                    ));
+                }
+                found = Some(moment);
+            }
+        }
+        found.ok_or_else(|| self.obstacle("the moment of an event or of a process is not known"))
+    }
+}
+
+/// After how much time, in the schedule that is followed, the numbers of a condition reach its
+/// bounds; and, if that can be said, in all schedules.
+fn zeros(
+    view: &View<'_>,
+    condition: &Condition,
+) -> Result<Vec<(Rational, Option<Linear>)>, Refusal> {
+    let mut sides = Vec::new();
+    condition.visit_comparisons(&mut |left, right| sides.push((left.clone(), right.clone())));
+    let mut zeros = Vec::new();
+    for (left, right) in &sides {
+        let moving = match view.difference(left, right) {
+            Ok(moving) => moving,
+            // What has no value, or changes along a curve, does no harm where a fact decides.
+            Err(_) if is_decided_by_facts(view, condition)? => continue,
+            Err(refusal) => return Err(refusal),
+        };
+        let rate = view.nominally(&moving.rate);
+        let Some(per_rate) = rate.reciprocal() else {
+            continue;
+        };
+        let elapsed = -(view.nominally(&moving.value) * &per_rate);
+        let constant = moving.rate.as_constant();
+        let later = constant.map(|_| moving.value.scaled(&-per_rate));
+        zeros.push((elapsed, later));
+    }
+    Ok(zeros)
+}
+
+/// Whether a conjunction is false because of a fact.
+fn is_decided_by_facts(view: &View<'_>, condition: &Condition) -> Result<bool, Refusal> {
+    for conjunct in condition.conjuncts() {
+        let mut has_numbers = false;
+        conjunct.visit_comparisons(&mut |_, _| has_numbers = true);
+        if !has_numbers && !view.holds(conjunct, When::At(&Rational::ZERO))? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}

@@ -1,0 +1,60 @@
+//! The conditions that must hold throughout: the over-all ones that processes and events may break,
+//! and constraints on the course.
+
+use elbowroom_model::ground::Condition;
+use elbowroom_plan::InstanceId;
+
+use super::Course;
+use crate::obligations::Refusal;
+use crate::obligations::dnf::Wanted;
+
+impl Course<'_> {
+    pub(super) fn need(&self, id: Option<InstanceId>, condition: &Condition) -> String {
+        let condition = self.compiler.task.describe_condition(condition);
+        match id {
+            Some(id) => {
+                let name = &self.compiler.plan.plan.instance(id).action.name;
+                format!("{name} needs {condition} throughout")
+            }
+            None => format!("{condition} must hold always"),
+        }
+    }
+
+    /// They hold at this moment; `may_begin`: those of an action that starts here need not yet.
+    pub(super) fn demand_conditions_now(&mut self, may_begin: bool) -> Result<(), Refusal> {
+        let plan = &self.compiler.plan.plan;
+        let node = self.node;
+        let begins =
+            |id: Option<InstanceId>| may_begin && id.is_some_and(|id| plan.start(id) == node);
+        self.demand_conditions(&begins)
+    }
+
+    /// The same before anything happens at this moment; `is_next`: at the next happening, where an
+    /// action that ends there needs nothing any more. What must always hold must do so after all
+    /// that happens.
+    pub(super) fn demand_conditions_on_arrival(&mut self, is_next: bool) -> Result<(), Refusal> {
+        let plan = &self.compiler.plan.plan;
+        let next = self.next;
+        let ends =
+            |id: Option<InstanceId>| id.is_none_or(|id| is_next && Some(plan.end(id)) == next);
+        self.demand_conditions(&ends)
+    }
+
+    fn demand_conditions(
+        &mut self,
+        is_free: &dyn Fn(Option<InstanceId>) -> bool,
+    ) -> Result<(), Refusal> {
+        let mut demands = Vec::new();
+        for (id, conditions) in &self.running {
+            for condition in conditions.iter().filter(|_| !is_free(*id)) {
+                let reading = self.reading_of(&self.now, *id);
+                let broken = reading.alternatives(condition, Wanted::NotTrue)?;
+                demands.push((self.need(*id, condition), broken));
+            }
+        }
+        for (course, broken) in demands {
+            self.demand(&course, broken);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,112 @@
+//! Which processes are at work, and how numbers change then.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_model::ground::FluentId;
+use elbowroom_num::Rational;
+
+use super::super::condition::When;
+use super::{Course, course_of, turn_of};
+use crate::linear::Linear;
+use crate::obligations::Refusal;
+
+impl Course<'_> {
+    /// Finds out which processes are at work right after the moment, and lets the events happen
+    /// whose conditions hold right after it.
+    pub(super) fn settle(&mut self) -> Result<(), Refusal> {
+        loop {
+            self.find_processes_at_work()?;
+            let mut ready = Vec::new();
+            let mut demands = Vec::new();
+            for (index, event) in self.nature_of_task().events.iter().enumerate() {
+                let (condition, zero) = (&event.snap.condition, Rational::ZERO);
+                let view = self.view(&self.now);
+                let holds = view.holds(condition, When::RightAfter(&zero))?;
+                let broken = view.broken_after(condition, holds)?;
+                demands.push((course_of(event, holds), broken));
+                if holds {
+                    ready.push(index);
+                }
+            }
+            if ready.is_empty() {
+                // In the part that follows, no event's condition holds; that says it all.
+                return Ok(());
+            }
+            for (course, broken) in demands {
+                self.expect(&course, broken)?;
+            }
+            self.demand_conditions_now(false)?;
+            self.must_go_on = true;
+            self.happen(&ready, true)?;
+        }
+    }
+
+    pub(super) fn find_processes_at_work(&mut self) -> Result<(), Refusal> {
+        let processes = &self.nature_of_task().processes;
+        let zero = Rational::ZERO;
+        let mut on = Vec::new();
+        for process in processes {
+            self.refuse_derived_numbers(&process.condition, &process.name)?;
+            let holds = (self.view(&self.now)).holds(&process.condition, When::At(&zero))?;
+            self.expect_now(&process.condition, holds, &turn_of(&process.name, holds))?;
+            on.push(holds);
+        }
+        let mut tried = BTreeSet::new();
+        loop {
+            self.rates = self.rates_under(&on)?;
+            let mut then = Vec::new();
+            for process in processes {
+                let view = self.view(&self.now);
+                let holds = view.holds(&process.condition, When::RightAfter(&zero))?;
+                let broken = view.broken_after(&process.condition, holds)?;
+                self.expect(&turn_of(&process.name, holds), broken)?;
+                then.push(holds);
+            }
+            if then == on {
+                self.at_work = on;
+                return Ok(());
+            }
+            if !tried.insert(std::mem::replace(&mut on, then)) {
+                return Err(self.obstacle("a process would start and stop without end"));
+            }
+        }
+    }
+
+    /// The rates of all numbers that change, when these processes are at work.
+    fn rates_under(&self, on: &[bool]) -> Result<BTreeMap<FluentId, Linear>, Refusal> {
+        let mut rates: BTreeMap<FluentId, Linear> = BTreeMap::new();
+        for (fluent, rate) in &self.drifts {
+            let sum = rates.entry(*fluent).or_default();
+            *sum = sum.plus(rate);
+        }
+        let mut read = Vec::new();
+        let processes = self.nature_of_task().processes.iter();
+        for (process, _) in processes.zip(on).filter(|(_, on)| **on) {
+            for effect in &process.effects {
+                let rate = self.view(&self.now).value(&effect.rate)?;
+                if !rate.times.is_empty() || !rate.products.is_empty() {
+                    return Err(Refusal::NotLinear {
+                        place: process.name.clone(),
+                        expression: self.compiler.task.describe_expression(&effect.rate),
+                    });
+                }
+                effect
+                    .rate
+                    .visit_fluents(&mut |fluent| read.push((fluent, process, effect.fluent)));
+                let sum = rates.entry(effect.fluent).or_default();
+                *sum = sum.plus(&rate);
+            }
+        }
+        rates.retain(|_, rate| *rate != Linear::default());
+        match read
+            .iter()
+            .find(|(fluent, _, _)| rates.contains_key(fluent))
+        {
+            None => Ok(rates),
+            Some((_, process, changed)) => Err(Refusal::ChangingRate {
+                place: process.name.clone(),
+                fluent: self.compiler.task.fluent_name(*changed),
+            }),
+        }
+    }
+}
