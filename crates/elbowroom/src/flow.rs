@@ -7,7 +7,7 @@ use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{Guarantee, Objective};
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_plan::deorder::{DeorderError, Deordered, deorder};
+use elbowroom_plan::deorder::{DeorderError, Deordered, deorder, deorder_the_plan_alone};
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize, vary};
 use elbowroom_plan::{NodeId, ParametrizedPlan};
 use elbowroom_sim::WorldModel;
@@ -115,6 +115,34 @@ pub fn free(task: &Task, time_triggered: &TimeTriggeredPlan) -> Result<Freed, Fl
         }),
         _ => Err(FlowError::Invalid(violation)),
     }
+}
+
+/// [`free`], and the quantities left open as by [`open`], also of a plan with processes and events:
+/// all its happenings keep their order then, and the times between them are kept near the plan's
+/// own as far as it takes for processes and events to do in every schedule what they do in the
+/// plan.
+///
+/// # Errors
+/// When the judge rejects the plan, and when `specs` names what the plan does not have.
+pub(crate) fn free_and_open(
+    task: &Task,
+    time_triggered: &TimeTriggeredPlan,
+    specs: &[VarySpec],
+    repaired: &mut dyn FnMut(&validate::Violation),
+) -> Result<ParametrizedPlan, FlowError> {
+    if task.autonomous().is_empty() {
+        let freed = free(task, time_triggered)?;
+        if let Some(violation) = &freed.repaired {
+            repaired(violation);
+        }
+        return open(task, freed, specs);
+    }
+    if let Verdict::Invalid(violation) = judge(task, time_triggered) {
+        return Err(FlowError::Invalid(Box::new(violation)));
+    }
+    let Deordered { plan, nominal, .. } = deorder_the_plan_alone(task, time_triggered)?;
+    let plan = parametrize(task, plan, &nominal, specs)?;
+    Ok(room::in_order(task, plan, &nominal))
 }
 
 /// A plan like the one given, with other times, if the judge rejects it but accepts those: what

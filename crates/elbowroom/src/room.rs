@@ -51,6 +51,57 @@ pub(crate) fn sound(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) ->
     found.unwrap_or(all)
 }
 
+/// The plan of a problem with processes and events, all its happenings in their order, and each as
+/// long after the one before it as in the plan, give or take what leaves every schedule valid. Ends
+/// of actions whose durations are left open just keep the order.
+pub(crate) fn in_order(
+    task: &Task,
+    mut plan: ParametrizedPlan,
+    nominal: &Schedule,
+) -> ParametrizedPlan {
+    plan.plan = without_sides(plan.plan).0;
+    let given = plan.plan.constraints.len();
+    let is_open = |instance: InstanceId| {
+        let parameters = &mut plan.parameters.iter();
+        parameters.any(|own| own.kind == ParameterKind::Duration(instance))
+    };
+    let mut order: Vec<NodeId> = plan.plan.nodes().map(|(node, _)| node).collect();
+    order.sort_by(|a, b| nominal[*a].cmp(&nominal[*b]).then(a.cmp(b)));
+    let mut pins = Vec::new();
+    for (&from, &to) in order.iter().zip(order.iter().skip(1)) {
+        let distance = &nominal[to] - &nominal[from];
+        let what = plan.plan.nodes[to.index()];
+        let is_chosen = match what {
+            Node::Zero | Node::Timed(_) => false,
+            Node::Start(_) | Node::Instant(_) => true,
+            Node::End(instance) => !is_open(instance),
+        };
+        let least = task.epsilon().clone().min(distance.clone());
+        if !matches!(what, Node::Timed(_)) || !matches!(plan.plan.nodes[from.index()], Node::Zero) {
+            pins.push((from, to, least, None));
+        }
+        if is_chosen {
+            pins.push((from, to, distance.clone(), Some(distance)));
+        }
+    }
+    // What is only an order stays as it is.
+    pins.sort_by_key(|(_, _, _, upper)| upper.is_some());
+    let orders = pins
+        .iter()
+        .filter(|(_, _, _, upper)| upper.is_none())
+        .count();
+    let constraints = pins.into_iter().map(|(from, to, lower, upper)| Constraint {
+        from,
+        to,
+        lower: Bound::Finite(lower),
+        upper: upper.map_or(Bound::Infinite, Bound::Finite),
+        reason: Reason::Pinned,
+    });
+    plan.plan.constraints.extend(constraints);
+    let scale = longest(&plan.plan, nominal);
+    loosened(task, plan, given + orders, &scale)
+}
+
 /// How many sides of one time point may be left open.
 const MOST_SIDES: usize = 12;
 

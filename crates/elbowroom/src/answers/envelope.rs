@@ -16,9 +16,11 @@ mod worth;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{BestSettings, Growth, Guarantee, Method, Oracle};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
+use elbowroom_plan::deorder::DeorderError;
 use elbowroom_plan::parametrize::VarySpec;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 use elbowroom_sim::WorldModel;
@@ -174,7 +176,12 @@ pub fn envelope(
     request: &EnvelopeRequest,
     watcher: &mut dyn Watcher,
 ) -> Result<EnvelopeOutcome, RequestError> {
-    let (plan, enforced) = match opened(request, watcher) {
+    let opened = if request.search.method == Method::Best {
+        opened(request, watcher)
+    } else {
+        opened_with_nature(request, watcher)
+    };
+    let (plan, enforced) = match opened {
         Ok((plan, enforced)) => (Arc::new(plan), enforced),
         Err(FlowError::Invalid(violation)) => {
             let violation = (&*violation).into();
@@ -259,8 +266,20 @@ pub fn so_far(
 /// the dispatcher to keep to.
 ///
 /// # Errors
-/// When the judge rejects the plan, or the request names what the plan does not have.
+/// When the judge rejects the plan, or the request names what the plan does not have; when the
+/// problem has processes or events.
 pub(crate) fn opened(
+    request: &EnvelopeRequest,
+    watcher: &mut dyn Watcher,
+) -> Result<(ParametrizedPlan, usize), FlowError> {
+    match request.task.left_to_the_judge() {
+        Some(feature) => Err(DeorderError::Unsupported { feature }.into()),
+        None => opened_with_nature(request, watcher),
+    }
+}
+
+/// [`opened`], also if the problem has processes and events.
+fn opened_with_nature(
     request: &EnvelopeRequest,
     watcher: &mut dyn Watcher,
 ) -> Result<(ParametrizedPlan, usize), FlowError> {
@@ -268,11 +287,9 @@ pub(crate) fn opened(
     let plan = match &request.plan {
         AnyPlan::Stn(plan) => flow::open_more(task, plan.clone(), &request.vary)?,
         AnyPlan::TimeTriggered(plan) => {
-            let freed = flow::free(task, plan)?;
-            if let Some(violation) = &freed.repaired {
+            flow::free_and_open(task, plan, &request.vary, &mut |violation| {
                 watcher.notice(&Event::Repaired(violation));
-            }
-            flow::open(task, freed, &request.vary)?
+            })?
         }
     };
     if !request.enforce {
@@ -295,6 +312,7 @@ fn contains(
         return Ok(subject.outcome(EnvelopeFinding::Inside { parameters }));
     };
     let why_not = subject.explainer.objection(&oracle, &envelope, &objection);
+    subject.refuse_harmless("this box", &why_not)?;
     let mut outcome = subject.outcome(EnvelopeFinding::Outside {
         parameters,
         counterexample: subject.counterexample(&why_not),
@@ -321,6 +339,22 @@ impl Subject<'_> {
             envelope: None,
             why_not: None,
         }
+    }
+
+    /// That processes and events take another course than in the plan need not break it.
+    fn refuse_harmless(&self, place: &str, why_not: &Explanation) -> Result<(), FlowError> {
+        let may_be_harmless = why_not.schedule.is_some() && why_not.verdict.is_none();
+        if self.request.task.autonomous().is_empty() || !may_be_harmless {
+            return Ok(());
+        }
+        let reason = &why_not.reason;
+        Err(FlowError::Refused(Refusal::Nature {
+            place: place.to_owned(),
+            obstacle: format!(
+                "the course of processes and events may change, and what the plan does then is \
+                 not analysed: {reason}"
+            ),
+        }))
     }
 
     /// The plan fails even as planned.

@@ -3,6 +3,7 @@
 use elbowroom_model::Task;
 use elbowroom_model::validate::Violation;
 use elbowroom_num::Rational;
+use elbowroom_plan::deorder::DeorderError;
 use elbowroom_plan::{Bound, Constraint, Node, NodeId, ParametrizedPlan};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -127,6 +128,9 @@ pub enum BoundAnswer {
 /// When the plan cannot be deordered. That it is not valid is an answer.
 pub fn stn(request: &StnRequest<'_>) -> Result<StnOutcome, RequestError> {
     let task = request.task;
+    if let Some(feature) = task.left_to_the_judge() {
+        return Err(FlowError::from(DeorderError::Unsupported { feature }).into());
+    }
     let (plan, repaired) = match &request.plan {
         AnyPlan::Stn(plan) => (plan.clone(), None),
         AnyPlan::TimeTriggered(plan) => match flow::free(task, plan) {

@@ -66,6 +66,7 @@ pub(super) fn search(
         Err(objection) => {
             let point = DecoupledEnvelope::point(&subject.plan.nominal());
             let why_not = subject.explainer.objection(&oracle, &point, &objection);
+            subject.refuse_harmless("the plan as it is", &why_not)?;
             return Ok(subject.fails(why_not));
         }
     };
