@@ -1,4 +1,5 @@
-//! Parts of the language that only the judge heeds: every other command refuses them by name.
+//! Parts of the language that only the judge heeds: every other command refuses them by name, but
+//! for envelopes, which heed processes and events.
 
 mod command;
 
@@ -52,6 +53,14 @@ const REFUSING: [&str; 19] = [
     "export prism D P --likelihoods ODDS",
     "export prism D P --world WORLD",
     "compare EXPERIMENT",
+];
+
+/// Those among them that heed processes and events, or want no network at all.
+const HEEDING_NATURE: [&str; 4] = [
+    "envelope D P PLAN",
+    "envelope D P NETWORK",
+    "check D P NETWORK",
+    "run D P --plan NETWORK",
 ];
 
 /// A folder with files for a domain with this in it.
@@ -111,7 +120,11 @@ fn what_only_the_judge_heeds_is_judged_and_refused_by_name_by_all_others() {
         };
         let judged = run("check D P PLAN");
         assert_eq!(judged.status.code(), Some(0), "{judged:?}");
+        let heeds_nature = feature.2.starts_with("processes");
         for command in REFUSING {
+            if heeds_nature && HEEDING_NATURE.contains(&command) {
+                continue;
+            }
             let output = run(command);
             assert_eq!(output.status.code(), Some(2), "{command}: {output:?}");
             assert!(output.stdout.is_empty(), "{command}: {output:?}");
@@ -122,6 +135,10 @@ fn what_only_the_judge_heeds_is_judged_and_refused_by_name_by_all_others() {
                 "{command} in {}: {said}",
                 place.display()
             );
+        }
+        if heeds_nature {
+            let output = run("envelope D P PLAN");
+            assert_eq!(output.status.code(), Some(0), "{output:?}");
         }
         // A repair finds that nothing has to change, but gives no guarantee, and says why.
         let repaired = run("envelope D P PLAN --repair");

@@ -50,7 +50,8 @@ const SUPPORTED: &[(&str, &str)] = &[
     ("Derived predicates", "stratified rules"),
     (
         "Processes and events",
-        "PDDL+ `:process` and `:event`, grounded and judged ([how](#processes-and-events)); \
+        "PDDL+ `:process` and `:event`, grounded, judged and heeded by envelopes \
+         ([how](#processes-and-events)); \
          `:constraint`, which must hold in each state",
     ),
     (
@@ -138,8 +139,10 @@ The meaning is that of Fox & Long (*Modelling mixed discrete-continuous domains 
   process that would start and stop without end; more than 1000 events and turns of processes \
   between two happenings of the plan.
 - A `:constraint` (of the dialect of ENHSP) is `(always condition)` for all its parameters.
-- They are read and judged, no more: the embedded planner, networks, envelopes, repairs, odds and \
-  runs refuse such domains by name. External planners can be used, and their plans are judged.
+- `elbowroom envelope` heeds them where their order is known and their moments are linear, and says \
+  what stands in the way elsewhere ([how](guarantees.md#processes-and-events)). The embedded planner, \
+  networks of plans, largest and exact envelopes, repairs, odds and runs refuse such domains by name. \
+  External planners can be used, and their plans are judged.
 
 ";
 

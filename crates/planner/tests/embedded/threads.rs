@@ -138,6 +138,9 @@ fn our_own_cases_have_the_same_plans() {
             let read = read_problem(&source("domain.pddl"), &source("problem.pddl"));
             Task::new(read.expect("our own cases can be read").0)
         };
+        if make().left_to_the_judge().is_some() {
+            continue;
+        }
         assert!(agree(&make, &|_| {}, 40) > 0, "{}", folder.display());
     }
 }
