@@ -97,12 +97,14 @@ impl Course<'_> {
                 *sum = sum.plus(&rate);
             }
         }
-        rates.retain(|_, rate| *rate != Linear::default());
         match read
             .iter()
             .find(|(fluent, _, _)| rates.contains_key(fluent))
         {
-            None => Ok(rates),
+            None => {
+                rates.retain(|_, rate| *rate != Linear::default());
+                Ok(rates)
+            }
             Some((_, process, changed)) => Err(Refusal::ChangingRate {
                 place: process.name.clone(),
                 fluent: self.compiler.task.fluent_name(*changed),
