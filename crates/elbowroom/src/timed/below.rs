@@ -58,7 +58,8 @@ fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
     if !state.may_act {
         return vec![Move::Wait];
     }
-    let startable = state.startable(world);
+    let under_way = state.under_way();
+    let startable = state.startable(world, |act| under_way & (1 << act) == 0);
     if state.must_start(world, &startable) {
         return vec![Move::Start(startable[0])];
     }
@@ -79,7 +80,7 @@ fn leave_nothing_undone(world: &TimedWorld, state: &State, must: u64, moves: &mu
     let breaks_nothing = |choice: &Move| match choice {
         Move::Start(act) => {
             let under_way = usize::from(world.acts[*act].rest.is_some());
-            let after = state.started(world, *act, 0, Phase::Goes);
+            let after = state.started(world, *act, (*act, 0, Phase::Goes));
             after.running.len() == state.running.len() + under_way
         }
         Move::Cancel(_) | Move::Wait => false,
@@ -354,7 +355,7 @@ impl Cell<'_> {
                 vec![(1.0, vec![self.target(after)])]
             }
             Move::Start(act) => {
-                let after = state.started(world, act, self.number, Phase::Goes);
+                let after = state.started(world, act, (act, self.number, Phase::Goes));
                 vec![(1.0, vec![self.target(after)])]
             }
             Move::Wait => self.wait(state),

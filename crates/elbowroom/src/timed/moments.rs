@@ -12,25 +12,27 @@
 //! So the bound from above has a state only where something gets ready, and an action that is ready may end there
 //! or at any later such time. The bound from below acts when something has happened, and nothing lasts longer
 //! there. Cells are as long as all known times divide; between two states there may be any number of them.
+//! From above they may be longer: what begins in a cell and takes n whole cells and something is ready n cells later,
+//! which is no later than it is, and may end at any time from then on. There are far fewer states then.
 
-mod above;
+mod stretched;
 mod waiting;
 
 use elbowroom_sim::Distribution;
 
 use super::act::Occurs;
+use super::above::Above;
 use super::below::Below;
 use super::chances::{Chances, NEVER};
 use super::state::{Phase, State};
-use super::within::constant;
+use super::within::{constant, fitting};
 use super::world::{Facts, TimedWorld};
 use super::{Grid, NotTabulated, SLACK, Settings, Side, Stop, graph, step};
 
-pub(super) use above::Stretched;
+pub(super) use stretched::{Alike, Reasons};
 
-/// Bounds from both sides where everything happens at known times; `None` where it does not.
-///
-/// Of the worlds in which more is possible that from above is sought in the one with the fewest states first.
+/// Bounds from both sides where everything happens at known times; `None` where it does not, or if `goes_on` says
+/// so.
 pub(super) fn bounds(
     world: &TimedWorld,
     settings: &Settings,
@@ -39,52 +41,106 @@ pub(super) fn bounds(
     let Some(cells) = cells(world) else {
         return Ok(None);
     };
-    let mut grid = Grid {
+    let grid = Grid {
         step: step(world, cells),
         lower: 0.0,
         upper: 1.0,
         states: 0,
     };
-    // There is more to look at where these bounds are not close.
-    let most_states = settings.most_states / SHARE;
-    for keeping in world.keeping_to(&settings.plans) {
-        let mut left = most_states;
-        let chances = super::chances(&keeping, cells, Side::Below)?;
-        let below = Below::by_moments(&keeping, &chances, keeping.asked_for(&settings.plans));
-        let value = graph::value(&below, &mut left, goes_on);
-        grid.states += most_states - left;
-        match value {
-            Ok(lower) => grid.lower = grid.lower.max(lower - SLACK),
-            Err(Stop::Interrupted) => return Ok(None),
-            Err(_) => {}
-        }
-    }
+    let mut search = Search {
+        settings,
+        goes_on,
+        cells,
+        grid,
+    };
+    let within = world.keeping_to(&settings.plans);
+    // Of the worlds in which more is possible the one with the fewest states first.
     let above = world.seen_from(Side::Above);
-    let freer = above.without_numbers_over_all();
+    let freer = above.without_numbers_over_all()?;
     let chances = super::chances(&freer, cells, Side::Above)?;
-    let worlds = [
-        freer.without_certainties(&chances),
-        Some(freer),
-        Some(above),
-    ];
-    for world in worlds.into_iter().flatten() {
-        let mut left = most_states;
-        let chances = super::chances(&world, cells, Side::Above)?;
-        let value = graph::value(&Stretched::new(&world, &chances), &mut left, goes_on);
-        grid.states += most_states - left;
-        let Ok(value) = value else {
-            break;
-        };
-        grid.upper = grid.upper.min(value + SLACK);
-        if grid.upper - grid.lower <= settings.gap {
-            break;
+    let leaner = freer.without_certainties(&chances);
+    let kinder = [leaner, Some(freer), Some(above)];
+    for share in SHARES {
+        let most_states = settings.most_states / share;
+        for world in &within {
+            if !search.from_below(world, most_states)? {
+                return Ok(None);
+            }
+        }
+        for world in kinder.iter().flatten() {
+            if !search.from_above(world, most_states)? {
+                return Ok(None);
+            }
         }
     }
-    Ok(Some(grid))
+    Ok(Some(search.grid))
 }
 
-/// Each bound may have one in so many of all states that there may be.
-const SHARE: usize = 4;
+/// Each bound may have one in so many of all states that there may be; more only if bounds are not close then.
+const SHARES: [usize; 2] = [16, 4];
+
+struct Search<'a> {
+    settings: &'a Settings,
+    goes_on: &'a dyn Fn() -> bool,
+    cells: usize,
+    /// What has been found.
+    grid: Grid,
+}
+
+impl Search<'_> {
+    fn is_close(&self) -> bool {
+        self.grid.upper - self.grid.lower <= self.settings.gap
+    }
+
+    /// Whether to go on.
+    fn from_below(&mut self, world: &TimedWorld, most_states: usize) -> Result<bool, NotTabulated> {
+        if self.is_close() {
+            return Ok(true);
+        }
+        let mut left = most_states;
+        let chances = super::chances(world, self.cells, Side::Below)?;
+        let below = Below::by_moments(world, &chances, world.in_plans(&self.settings.plans));
+        let value = graph::value(&below, &mut left, self.goes_on);
+        self.grid.states += most_states - left;
+        match value {
+            Ok(lower) => self.grid.lower = self.grid.lower.max(lower - SLACK),
+            Err(Stop::Interrupted) => return Ok(false),
+            Err(_) => {}
+        }
+        Ok(true)
+    }
+
+    /// Whether to go on.
+    fn from_above(&mut self, world: &TimedWorld, most_states: usize) -> Result<bool, NotTabulated> {
+        let mut wanted = self.settings.first_cells.max(1);
+        while !self.is_close() {
+            // The last grid is the one on which nothing is given away.
+            let (step, cells) = match fitting(world, wanted, Side::Above) {
+                Some(fit) if fit.cells < self.cells => (fit.step(), fit.cells),
+                _ => (step(world, self.cells), self.cells),
+            };
+            if std::env::var("DBG").is_ok() {
+                for a in &world.acts { eprintln!("act {} draws {:?}", a.name, a.rest.as_ref().map(|(_, e)| e.draws.len())); }
+                for n in &world.numbers { eprintln!("{n:?}"); }
+            }
+            let mut left = most_states;
+            let chances = Chances::new(world, step, cells + 1, Side::Above)?;
+            let value = graph::value(&Above::by_moments(world, &chances), &mut left, self.goes_on);
+            self.grid.states += most_states - left;
+            eprintln!("above {step} {value:?} {}", most_states - left);
+            match value {
+                Ok(value) => self.grid.upper = self.grid.upper.min(value + SLACK),
+                Err(Stop::Interrupted) => return Ok(false),
+                Err(_) => break,
+            }
+            if cells == self.cells {
+                break;
+            }
+            wanted *= 2;
+        }
+        Ok(true)
+    }
+}
 
 /// How many cells there are if all known times are whole numbers of cells; `None` if something may
 /// happen at any time, or if that takes too many.

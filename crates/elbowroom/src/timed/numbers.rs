@@ -12,7 +12,7 @@ use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
 use elbowroom_sim::{Rule, Side as Part};
 
-use super::act::Snap;
+use super::act::{Act, Snap};
 use super::world::{Facts, unknown_shape};
 use super::{NotTabulated, Side, TimedWorld};
 
@@ -334,6 +334,17 @@ impl TimedWorld {
         amounts.filter(move |amount| amount.number == number)
     }
 
+    /// Those of actions with which it is not over.
+    fn amounts_before_goal(&self, number: usize) -> impl Iterator<Item = &Amount> {
+        let acts = self.acts.iter().filter(|act| !act.wins(&self.goal));
+        let snaps = acts.flat_map(|act| {
+            let end = act.rest.iter().map(|(_, end)| end);
+            std::iter::once(&act.start).chain(end)
+        });
+        let amounts = snaps.flat_map(|snap| &snap.amounts);
+        amounts.filter(move |amount| amount.number == number)
+    }
+
     /// Values that are known from the beginning, or once they are set.
     fn anchors(&self, number: usize) -> BTreeSet<i64> {
         let set = self.amounts_of(number).filter_map(|amount| match amount {
@@ -349,13 +360,29 @@ impl TimedWorld {
 
     /// The values at which conditions change, each once.
     fn thresholds(&self, number: usize) -> BTreeSet<i64> {
-        let tests = self.tests.iter().filter(|test| test.number == number);
-        tests.flat_map(|test| test.edges()).collect()
+        let first = self.facts.len();
+        let asked_for = self.asked_for();
+        let tests = self.tests.iter().enumerate();
+        let own = tests.filter(|(place, test)| {
+            test.number == number && asked_for & (1 << (first + place)) != 0
+        });
+        own.flat_map(|(_, test)| test.edges()).collect()
+    }
+
+    /// The facts and comparisons that some condition reads.
+    fn asked_for(&self) -> Facts {
+        let of_act = |act: &Act| {
+            let rest = act.rest.as_ref();
+            let rest = rest.map_or(0, |(over_all, end)| over_all.mentions() | end.needs.mentions());
+            act.start.needs.mentions() | rest
+        };
+        let of_acts = self.acts.iter().fold(0, |all, act| all | of_act(act));
+        of_acts | self.goal.mentions()
     }
 
     /// What known amounts add up to, those of fewer amounts first.
     fn sums(&self, number: usize) -> Vec<i64> {
-        let steps = self.amounts_of(number).filter_map(|amount| match amount {
+        let steps = self.amounts_before_goal(number).filter_map(|amount| match amount {
             Amount {
                 change: Changed::Added,
                 by: By::Known(value),

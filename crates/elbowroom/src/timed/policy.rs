@@ -299,7 +299,7 @@ impl Policy {
             may_act: true,
         };
         match standing.started.and_then(act_of) {
-            Some(act) => state.started(&self.world, act, standing.period, Phase::Goes),
+            Some(act) => state.started(&self.world, act, (act, standing.period, Phase::Goes)),
             None => state,
         }
     }

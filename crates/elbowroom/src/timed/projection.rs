@@ -54,6 +54,10 @@ impl TimedWorld {
         let all: Facts = (0..self.facts.len()).fold(0, |all, place| all | 1 << place);
         let mut certain = all & !events & !self.goal.mentions();
         for act in &self.acts {
+            // What chances depend on stays, so that nobody has more of them.
+            if act.has_chances() {
+                certain &= !act.start.needs.mentions();
+            }
             if act.fails() {
                 certain &= !act.adds();
             } else if let Some((_, end)) = &act.rest
