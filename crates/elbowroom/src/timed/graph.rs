@@ -235,7 +235,6 @@ fn explored(
         }
         let states = layers.remove(&cell).unwrap_or_default();
         let nodes = bound.expand(cell as usize, &states, &mut layers, hopes, most_nodes);
-        if std::env::var("DBG").is_ok() { eprint!("{cell}:{}/{} ", states.len(), nodes.as_ref().map_or(0, Nodes::len)); if cell == 18 { for s in &states { eprintln!("S {:?} {:?} {:x}", s.running.iter().map(|r| (r.act, r.since, r.phase)).collect::<Vec<_>>(), s.numbers.iter().map(|s| (s.low as f64/1e6, s.high as f64/1e6)).collect::<Vec<_>>(), s.facts); } } }
         nodes.ok_or(Stop::TooManyStates)?;
         let new = layers.range(cell..).map(|(_, states)| states.len());
         if new.sum::<usize>() > *left {

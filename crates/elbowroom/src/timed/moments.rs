@@ -102,6 +102,7 @@ impl Search<'_> {
         let below = Below::by_moments(world, &chances, world.in_plans(&self.settings.plans));
         let value = graph::value(&below, &mut left, self.goes_on);
         self.grid.states += most_states - left;
+        eprintln!("below acts {} {value:?} {}", world.acts.len(), most_states - left);
         match value {
             Ok(lower) => self.grid.lower = self.grid.lower.max(lower - SLACK),
             Err(Stop::Interrupted) => return Ok(false),
@@ -119,10 +120,6 @@ impl Search<'_> {
                 Some(fit) if fit.cells < self.cells => (fit.step(), fit.cells),
                 _ => (step(world, self.cells), self.cells),
             };
-            if std::env::var("DBG").is_ok() {
-                for a in &world.acts { eprintln!("act {} draws {:?}", a.name, a.rest.as_ref().map(|(_, e)| e.draws.len())); }
-                for n in &world.numbers { eprintln!("{n:?}"); }
-            }
             let mut left = most_states;
             let chances = Chances::new(world, step, cells + 1, Side::Above)?;
             let value = graph::value(&Above::by_moments(world, &chances), &mut left, self.goes_on);

@@ -180,6 +180,7 @@ impl State {
             is_idle(*act)
                 && world.acts[*act].start.needs.hold(self.facts)
                 && world.is_useful(*act, self.facts)
+                && !self.breaks_off_at_once(world, *act)
         };
         let acts: Vec<usize> = (0..world.acts.len()).filter(can_start).collect();
         let is_eager = |act: &&usize| {
@@ -193,6 +194,13 @@ impl State {
             Some(eager) => vec![*eager],
             None => acts,
         }
+    }
+
+    /// Whether what an action needs over all does not hold right after its start.
+    fn breaks_off_at_once(&self, world: &TimedWorld, act: usize) -> bool {
+        let act = &world.acts[act];
+        let over_all = act.rest.as_ref().map(|(over_all, _)| over_all);
+        over_all.is_some_and(|over_all| !over_all.hold(act.start.apply(self.facts)))
     }
 
     /// Whether the agent has nothing to think about but to start the first of these.
