@@ -85,8 +85,13 @@ fn leave_nothing_undone(world: &TimedWorld, state: &State, must: u64, moves: &mu
         }
         Move::Cancel(_) | Move::Wait => false,
     };
+    // What an action is done for may be there already.
+    let is_wanted = |act: usize| {
+        let end = world.acts[act].rest.as_ref();
+        must & (1 << act) != 0 && end.is_none_or(|(_, end)| end.adds & !state.facts != 0)
+    };
     let is_undone = |choice: &Move| {
-        matches!(choice, Move::Start(act) if must & (1 << act) != 0) && breaks_nothing(choice)
+        matches!(choice, Move::Start(act) if is_wanted(*act)) && breaks_nothing(choice)
     };
     if moves.iter().any(is_undone) {
         moves.retain(breaks_nothing);
