@@ -196,11 +196,18 @@ impl State {
         }
     }
 
-    /// Whether what an action needs over all does not hold right after its start.
+    /// Whether what an action needs over all does not hold right after its start: nobody starts it then.
     fn breaks_off_at_once(&self, world: &TimedWorld, act: usize) -> bool {
         let act = &world.acts[act];
-        let over_all = act.rest.as_ref().map(|(over_all, _)| over_all);
-        over_all.is_some_and(|over_all| !over_all.hold(act.start.apply(self.facts)))
+        let Some((over_all, _)) = &act.rest else {
+            return false;
+        };
+        if act.start.amounts.is_empty() {
+            return !over_all.hold(act.start.apply(self.facts));
+        }
+        let mut after = self.clone();
+        after.apply(world, &act.start, 0);
+        !over_all.hold(after.facts)
     }
 
     /// Whether the agent has nothing to think about but to start the first of these.

@@ -564,6 +564,10 @@ impl SmallWorld {
                 after.facts = action.at_start.map_or(now.facts, |it| set(it, now.facts));
                 after.number -= action.amount.taken;
                 self.break_off(&mut after);
+                // Nobody starts what breaks off at once.
+                if !after.running.iter().any(|running| running.action == index) {
+                    continue;
+                }
             } else {
                 continue;
             }
