@@ -20,8 +20,8 @@ mod waiting;
 
 use elbowroom_sim::Distribution;
 
-use super::act::Occurs;
 use super::above::Above;
+use super::act::Occurs;
 use super::below::Below;
 use super::chances::{Chances, NEVER};
 use super::state::{Phase, State};
@@ -59,16 +59,18 @@ pub(super) fn bounds(
     let freer = above.without_numbers_over_all()?;
     let chances = super::chances(&freer, cells, Side::Above)?;
     let leaner = freer.without_certainties(&chances);
-    let kinder = [leaner, Some(freer), Some(above)];
+    let kinder: Vec<TimedWorld> = leaner.into_iter().chain([freer, above]).collect();
     for share in SHARES {
         let most_states = settings.most_states / share;
-        for world in &within {
-            if !search.from_below(world, most_states)? {
-                return Ok(None);
-            }
-        }
-        for world in kinder.iter().flatten() {
-            if !search.from_above(world, most_states)? {
+        // From either side in turn, as one does not know which is the harder one.
+        for turn in 0..within.len().max(kinder.len()) {
+            let goes_on = within
+                .get(turn)
+                .map_or(Ok(true), |world| search.from_below(world, most_states))?
+                && kinder
+                    .get(turn)
+                    .map_or(Ok(true), |world| search.from_above(world, most_states))?;
+            if !goes_on {
                 return Ok(None);
             }
         }
@@ -102,7 +104,6 @@ impl Search<'_> {
         let below = Below::by_moments(world, &chances, world.in_plans(&self.settings.plans));
         let value = graph::value(&below, &mut left, self.goes_on);
         self.grid.states += most_states - left;
-        eprintln!("below acts {} {value:?} {}", world.acts.len(), most_states - left);
         match value {
             Ok(lower) => self.grid.lower = self.grid.lower.max(lower - SLACK),
             Err(Stop::Interrupted) => return Ok(false),
@@ -124,7 +125,6 @@ impl Search<'_> {
             let chances = Chances::new(world, step, cells + 1, Side::Above)?;
             let value = graph::value(&Above::by_moments(world, &chances), &mut left, self.goes_on);
             self.grid.states += most_states - left;
-            eprintln!("above {step} {value:?} {}", most_states - left);
             match value {
                 Ok(value) => self.grid.upper = self.grid.upper.min(value + SLACK),
                 Err(Stop::Interrupted) => return Ok(false),

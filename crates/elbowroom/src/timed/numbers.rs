@@ -380,7 +380,9 @@ impl TimedWorld {
     fn asked_for(&self) -> Facts {
         let of_act = |act: &Act| {
             let rest = act.rest.as_ref();
-            let rest = rest.map_or(0, |(over_all, end)| over_all.mentions() | end.needs.mentions());
+            let rest = rest.map_or(0, |(over_all, end)| {
+                over_all.mentions() | end.needs.mentions()
+            });
             act.start.needs.mentions() | rest
         };
         let of_acts = self.acts.iter().fold(0, |all, act| all | of_act(act));
@@ -389,19 +391,21 @@ impl TimedWorld {
 
     /// What known amounts add up to, those of fewer amounts first.
     fn sums(&self, number: usize) -> Vec<i64> {
-        let steps = self.amounts_before_goal(number).filter_map(|amount| match amount {
-            Amount {
-                change: Changed::Added,
-                by: By::Known(value),
-                ..
-            } => Some(*value),
-            Amount {
-                change: Changed::Taken,
-                by: By::Known(value),
-                ..
-            } => Some(-*value),
-            _ => None,
-        });
+        let steps = self
+            .amounts_before_goal(number)
+            .filter_map(|amount| match amount {
+                Amount {
+                    change: Changed::Added,
+                    by: By::Known(value),
+                    ..
+                } => Some(*value),
+                Amount {
+                    change: Changed::Taken,
+                    by: By::Known(value),
+                    ..
+                } => Some(-*value),
+                _ => None,
+            });
         let steps: BTreeSet<i64> = steps.collect();
         let ends: BTreeSet<i64> = &self.anchors(number) | &self.thresholds(number);
         let range = ends.last().unwrap_or(&0) - ends.first().unwrap_or(&0);
@@ -479,9 +483,7 @@ impl TimedWorld {
             let half = move |edge: &i64| (*anchor, (edge - *anchor).div_euclid(2));
             thresholds.iter().map(half)
         });
-        let decides = |(_, half): &(i64, i64)| {
-            self.may_be_beyond(amount, amount.cut(*half))
-        };
+        let decides = |(_, half): &(i64, i64)| self.may_be_beyond(amount, amount.cut(*half));
         ways.filter(decides).collect()
     }
 
@@ -527,11 +529,19 @@ impl TimedWorld {
 
     /// What is drawn, cut where that decides something, with how likely each part is.
     fn parts(&self, amount: &Amount) -> Option<Vec<(f64, Span)>> {
-        let lowest = if self.is_never_negative(amount) { 0 } else { -FAR };
+        let lowest = if self.is_never_negative(amount) {
+            0
+        } else {
+            -FAR
+        };
         let mut parts = Vec::new();
         let (mut low, mut before) = (lowest, 0.0);
         for high in self.cuts(amount).into_iter().chain([FAR]) {
-            let until = if high < FAR { self.share(amount, high)? } else { 1.0 };
+            let until = if high < FAR {
+                self.share(amount, high)?
+            } else {
+                1.0
+            };
             let p: f64 = until - before;
             if p > 0.0 {
                 parts.push((p, Span { low, high }));
@@ -550,7 +560,8 @@ impl TimedWorld {
         };
         let ways = self.sums(number).into_iter().flat_map(|sum| {
             let thresholds = self.thresholds(number).into_iter();
-            let ways = thresholds.flat_map(|edge| from.iter().map(move |anchor| edge - anchor - sum));
+            let ways =
+                thresholds.flat_map(|edge| from.iter().map(move |anchor| edge - anchor - sum));
             ways.collect::<Vec<_>>()
         });
         let halves = self.halves(amount).into_iter().map(|(_, half)| half);

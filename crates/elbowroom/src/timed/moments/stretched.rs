@@ -122,7 +122,9 @@ impl Cell<'_> {
                 && act.start.needs.hold(state.facts)
         };
         let acts: Vec<usize> = (0..world.acts.len()).filter(is_of_use).collect();
-        acts.into_iter().map(|act| self.start(&without, *coming, act)).collect()
+        acts.into_iter()
+            .map(|act| self.start(&without, *coming, act))
+            .collect()
     }
 
     /// Nothing more is done until something may happen.
