@@ -213,12 +213,11 @@ impl Cell<'_> {
     fn choices(&mut self, moment: &Moment) -> Vec<Choice> {
         let world = self.bound.world;
         let (state, coming) = moment;
-        let startable = match &self.bound.by_moments {
-            Some(alike) => state.startable(world, |act| alike.free(state, act).is_some()),
-            None => {
-                let under_way = state.under_way();
-                state.startable(world, |act| under_way & (1 << act) == 0)
-            }
+        let startable = if let Some(alike) = &self.bound.by_moments {
+            state.startable(world, |act| alike.free(state, act).is_some())
+        } else {
+            let under_way = state.under_way();
+            state.startable(world, |act| under_way & (1 << act) == 0)
         };
         if state.must_start(world, &startable) {
             return vec![self.start(state, *coming, startable[0])];

@@ -22,7 +22,7 @@ use elbowroom_sim::Distribution;
 
 use super::above::Above;
 use super::act::Occurs;
-use super::below::Below;
+use super::below::{Below, Manner};
 use super::chances::{Chances, NEVER};
 use super::state::{Phase, State};
 use super::within::{constant, fitting};
@@ -31,13 +31,24 @@ use super::{Grid, NotTabulated, SLACK, Settings, Side, Stop, graph, step};
 
 pub(super) use stretched::{Alike, Reasons};
 
+/// Bounds from both sides where everything happens at known times.
+pub(super) struct Found {
+    pub(super) grid: Grid,
+    /// How many cells there are, seen from below.
+    pub(super) cells: usize,
+    /// The world within which the bound from below is reached.
+    pub(super) within: Option<TimedWorld>,
+}
+
 /// Bounds from both sides where everything happens at known times; `None` where it does not, or if `goes_on` says
-/// so.
+/// so. Each may have one in so many of all states that there may be, one of these `shares` after the other until
+/// they are close.
 pub(super) fn bounds(
     world: &TimedWorld,
     settings: &Settings,
+    shares: &[usize],
     goes_on: &dyn Fn() -> bool,
-) -> Result<Option<Grid>, NotTabulated> {
+) -> Result<Option<Found>, NotTabulated> {
     let Some(cells) = cells(world) else {
         return Ok(None);
     };
@@ -50,8 +61,11 @@ pub(super) fn bounds(
     let mut search = Search {
         settings,
         goes_on,
-        cells,
-        grid,
+        found: Found {
+            grid,
+            cells,
+            within: None,
+        },
     };
     let within = world.keeping_to(&settings.plans);
     // Of the worlds in which more is possible the one with the fewest states first.
@@ -60,77 +74,93 @@ pub(super) fn bounds(
     let chances = super::chances(&freer, cells, Side::Above)?;
     let leaner = freer.without_certainties(&chances);
     let kinder: Vec<TimedWorld> = leaner.into_iter().chain([freer, above]).collect();
-    for share in SHARES {
+    for share in shares {
         let most_states = settings.most_states / share;
         // From either side in turn, as one does not know which is the harder one.
         for turn in 0..within.len().max(kinder.len()) {
             let goes_on = within
                 .get(turn)
-                .map_or(Ok(true), |world| search.from_below(world, most_states))?
+                .map_or(Ok(true), |world| search.look_from_below(world, most_states))?
                 && kinder
                     .get(turn)
-                    .map_or(Ok(true), |world| search.from_above(world, most_states))?;
+                    .map_or(Ok(true), |world| search.look_from_above(world, most_states))?;
             if !goes_on {
                 return Ok(None);
             }
         }
     }
-    Ok(Some(search.grid))
+    Ok(Some(search.found))
 }
 
-/// Each bound may have one in so many of all states that there may be; more only if bounds are not close then.
-const SHARES: [usize; 2] = [16, 4];
+/// The shares of all states for the yardstick.
+pub(super) const SHARES: [usize; 2] = [16, 4];
 
 struct Search<'a> {
     settings: &'a Settings,
     goes_on: &'a dyn Fn() -> bool,
-    cells: usize,
-    /// What has been found.
-    grid: Grid,
+    found: Found,
+}
+
+impl TimedWorld {
+    /// How whoever keeps to plans acts.
+    pub(super) fn by_moments(&self, settings: &Settings) -> Manner {
+        Manner::ByMoments(self.in_plans(&settings.plans))
+    }
 }
 
 impl Search<'_> {
     fn is_close(&self) -> bool {
-        self.grid.upper - self.grid.lower <= self.settings.gap
+        self.found.grid.upper - self.found.grid.lower <= self.settings.gap
     }
 
     /// Whether to go on.
-    fn from_below(&mut self, world: &TimedWorld, most_states: usize) -> Result<bool, NotTabulated> {
+    fn look_from_below(
+        &mut self,
+        world: &TimedWorld,
+        most_states: usize,
+    ) -> Result<bool, NotTabulated> {
         if self.is_close() {
             return Ok(true);
         }
         let mut left = most_states;
-        let chances = super::chances(world, self.cells, Side::Below)?;
-        let below = Below::by_moments(world, &chances, world.in_plans(&self.settings.plans));
+        let chances = super::chances(world, self.found.cells, Side::Below)?;
+        let below = Below::new(world, &chances, world.by_moments(self.settings));
         let value = graph::value(&below, &mut left, self.goes_on);
-        self.grid.states += most_states - left;
+        self.found.grid.states += most_states - left;
         match value {
-            Ok(lower) => self.grid.lower = self.grid.lower.max(lower - SLACK),
+            Ok(lower) if lower - SLACK > self.found.grid.lower => {
+                self.found.grid.lower = lower - SLACK;
+                self.found.within = Some(world.clone());
+            }
             Err(Stop::Interrupted) => return Ok(false),
-            Err(_) => {}
+            Ok(_) | Err(_) => {}
         }
         Ok(true)
     }
 
     /// Whether to go on.
-    fn from_above(&mut self, world: &TimedWorld, most_states: usize) -> Result<bool, NotTabulated> {
+    fn look_from_above(
+        &mut self,
+        world: &TimedWorld,
+        most_states: usize,
+    ) -> Result<bool, NotTabulated> {
         let mut wanted = self.settings.first_cells.max(1);
         while !self.is_close() {
             // The last grid is the one on which nothing is given away.
             let (step, cells) = match fitting(world, wanted, Side::Above) {
-                Some(fit) if fit.cells < self.cells => (fit.step(), fit.cells),
-                _ => (step(world, self.cells), self.cells),
+                Some(fit) if fit.cells < self.found.cells => (fit.step(), fit.cells),
+                _ => (step(world, self.found.cells), self.found.cells),
             };
             let mut left = most_states;
             let chances = Chances::new(world, step, cells + 1, Side::Above)?;
             let value = graph::value(&Above::by_moments(world, &chances), &mut left, self.goes_on);
-            self.grid.states += most_states - left;
+            self.found.grid.states += most_states - left;
             match value {
-                Ok(value) => self.grid.upper = self.grid.upper.min(value + SLACK),
+                Ok(value) => self.found.grid.upper = self.found.grid.upper.min(value + SLACK),
                 Err(Stop::Interrupted) => return Ok(false),
                 Err(_) => break,
             }
-            if cells == self.cells {
+            if cells == self.found.cells {
                 break;
             }
             wanted *= 2;

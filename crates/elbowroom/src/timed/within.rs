@@ -13,7 +13,7 @@ use elbowroom_sim::{Distribution, WorldModel};
 use serde::{Deserialize, Serialize};
 
 use super::act::Occurs;
-use super::below::{Below, WHEN_SOMETHING_HAPPENS};
+use super::below::{Below, Manner};
 use super::chances::Chances;
 use super::{SLACK, Settings, Side, TimedWorld, graph};
 
@@ -166,7 +166,7 @@ impl Set {
         let fit = fitting(&self.world, self.cells, Side::Below)?;
         let step = fit.step();
         let chances = Chances::new(&self.world, step, fit.cells, Side::Below).ok()?;
-        let bound = Below::new(&self.world, &chances, WHEN_SOMETHING_HAPPENS);
+        let bound = Below::new(&self.world, &chances, Manner::WhenSomethingHappens);
         let mut left = most_states;
         let value = graph::value(&bound, &mut left, goes_on).ok()?;
         self.cells *= 2;
