@@ -39,6 +39,15 @@ fn of_experiment(name: &str, settings: &Settings) -> TimedOptimum {
     )
 }
 
+/// With nothing that happens by itself there is only this to be late for.
+fn until(horizon: i64) -> Settings {
+    Settings {
+        horizon: Some(horizon.into()),
+        most_states: 20_000,
+        ..Settings::default()
+    }
+}
+
 #[track_caller]
 fn assert_encloses(found: &TimedOptimum, value: f64) {
     assert!(
@@ -390,7 +399,7 @@ fn nobody_starts_what_breaks_off_at_once() {
             domain,
             &problem,
             "format = \"elbowroom-world\"\nversion = 1\n",
-            &Settings::default(),
+            &until(20),
         )
     };
     assert_encloses(&domain("(at-press)"), 1.0);
@@ -419,7 +428,7 @@ fn what_is_drawn_twice_is_cut_where_half_of_it_decides() {
     let amount = |action: &str| {
         format!(
             "[[amount]]\naction = \"{action}\"\nfluent = \"weight\"\n\
-             uniform = {{ lower = 0, upper = 80 }}\n"
+             uniform = {{ from = 0, to = 80 }}\n"
         )
     };
     let world = format!(
@@ -427,7 +436,7 @@ fn what_is_drawn_twice_is_cut_where_half_of_it_decides() {
         amount("once"),
         amount("again")
     );
-    let found = bounds(domain, problem, &world, &Settings::default());
+    let found = bounds(domain, problem, &world, &until(20));
     assert_encloses(&found, 1.0 - 60.0 * 60.0 / 2.0 / (80.0 * 80.0));
     // Cut at 60 alone, nothing but a draw of 60 or more is known to be enough.
     assert!(found.lower > 1.0 - 0.75 * 0.75 + 0.1, "{found:?}");
