@@ -66,6 +66,7 @@ pub(super) fn bounds(
             cells,
             within: None,
         },
+        has: [false; 2],
     };
     let within = world.keeping_to(&settings.plans);
     // Of the worlds in which more is possible the one with the fewest states first.
@@ -99,6 +100,8 @@ struct Search<'a> {
     settings: &'a Settings,
     goes_on: &'a dyn Fn() -> bool,
     found: Found,
+    /// Whether there are values from below, and from above.
+    has: [bool; 2],
 }
 
 impl TimedWorld {
@@ -110,7 +113,8 @@ impl TimedWorld {
 
 impl Search<'_> {
     fn is_close(&self) -> bool {
-        self.found.grid.upper - self.found.grid.lower <= self.settings.gap
+        let gap = self.found.grid.upper - self.found.grid.lower;
+        self.has == [true; 2] && gap <= self.settings.gap
     }
 
     /// Whether to go on.
@@ -126,6 +130,7 @@ impl Search<'_> {
         let chances = super::chances(world, self.found.cells, Side::Below)?;
         let below = Below::new(world, &chances, world.by_moments(self.settings));
         let value = graph::value(&below, &mut left, self.goes_on);
+        self.has[0] |= value.is_ok();
         self.found.grid.states += most_states - left;
         match value {
             Ok(lower) if lower - SLACK > self.found.grid.lower => {
@@ -154,6 +159,7 @@ impl Search<'_> {
             let mut left = most_states;
             let chances = Chances::new(world, step, cells + 1, Side::Above)?;
             let value = graph::value(&Above::by_moments(world, &chances), &mut left, self.goes_on);
+            self.has[1] |= value.is_ok();
             self.found.grid.states += most_states - left;
             match value {
                 Ok(value) => self.found.grid.upper = self.found.grid.upper.min(value + SLACK),
