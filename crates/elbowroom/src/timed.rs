@@ -200,7 +200,7 @@ pub fn optimum(
         lower: search.lower(),
         ..TimedOptimum::unknown()
     };
-    if let Some(found) = moments::bounds(&world, settings, &moments::SHARES, goes_on)? {
+    if let Some(found) = moments::bounds(&world, settings, moments::Effort::WHOLE, goes_on)? {
         let grid = found.grid;
         known.lower = known.lower.max(grid.lower);
         known.upper = grid.upper;

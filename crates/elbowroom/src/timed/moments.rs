@@ -41,12 +41,11 @@ pub(super) struct Found {
 }
 
 /// Bounds from both sides where everything happens at known times; `None` where it does not, or if `goes_on` says
-/// so. Each may have one in so many of all states that there may be, one of these `shares` after the other until
-/// they are close.
+/// so.
 pub(super) fn bounds(
     world: &TimedWorld,
     settings: &Settings,
-    shares: &[usize],
+    effort: Effort,
     goes_on: &dyn Fn() -> bool,
 ) -> Result<Option<Found>, NotTabulated> {
     let Some(cells) = cells(world) else {
@@ -75,16 +74,18 @@ pub(super) fn bounds(
     let chances = super::chances(&freer, cells, Side::Above)?;
     let leaner = freer.without_certainties(&chances);
     let kinder: Vec<TimedWorld> = leaner.into_iter().chain([freer, above]).collect();
-    for share in shares {
+    for share in effort.shares {
         let most_states = settings.most_states / share;
         // From either side in turn, as one does not know which is the harder one.
         for turn in 0..within.len().max(kinder.len()) {
-            let goes_on = within
-                .get(turn)
-                .map_or(Ok(true), |world| search.look_from_below(world, most_states))?
-                && kinder
-                    .get(turn)
-                    .map_or(Ok(true), |world| search.look_from_above(world, most_states))?;
+            let mut goes_on = match within.get(turn) {
+                Some(world) => search.look_from_below(world, most_states)?,
+                None => true,
+            };
+            goes_on &= search.has[0] || !effort.gives_up;
+            if let Some(world) = kinder.get(turn).filter(|_| goes_on) {
+                goes_on = search.look_from_above(world, most_states)?;
+            }
             if !goes_on {
                 return Ok(None);
             }
@@ -93,8 +94,28 @@ pub(super) fn bounds(
     Ok(Some(search.found))
 }
 
-/// The shares of all states for the yardstick.
-pub(super) const SHARES: [usize; 2] = [16, 4];
+/// How much is tried for bounds.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
+    /// Each bound may have one in so many of all states that there may be, one of these after the other until bounds
+    /// are close.
+    shares: &'static [usize],
+    /// Whether nothing more is tried once the first world within plans has too many states.
+    gives_up: bool,
+}
+
+impl Effort {
+    /// For the yardstick.
+    pub(super) const WHOLE: Self = Self {
+        shares: &[16, 4],
+        gives_up: false,
+    };
+    /// For a policy, for which a run waits.
+    pub(super) const QUICK: Self = Self {
+        shares: &[16],
+        gives_up: true,
+    };
+}
 
 struct Search<'a> {
     settings: &'a Settings,

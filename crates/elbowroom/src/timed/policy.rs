@@ -53,9 +53,6 @@ const GROWTH: f64 = 4.0;
 /// and to find that one does not get far takes the longer the more states it has.
 const FIRST_SHARE: usize = 32;
 
-/// The same where everything happens at known times and bounds are found on a single grid.
-const MOMENTS_SHARES: [usize; 1] = [16];
-
 /// How long one of so many cells is.
 fn exact_step(world: &TimedWorld, cells: usize) -> Rational {
     // The horizon is a number that somebody wrote, or a multiple of the resolution.
@@ -149,7 +146,7 @@ impl Policy {
         settings: &Settings,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, NotTabulated> {
-        let found = moments::bounds(world, settings, &MOMENTS_SHARES, goes_on)?;
+        let found = moments::bounds(world, settings, moments::Effort::QUICK, goes_on)?;
         let Some(found) = found.filter(|found| found.grid.upper - found.grid.lower <= CLOSE) else {
             return Ok(None);
         };
