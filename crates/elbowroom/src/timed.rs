@@ -200,7 +200,8 @@ pub fn optimum(
         lower: search.lower(),
         ..TimedOptimum::unknown()
     };
-    if let Some(grid) = moments::bounds(&world, settings, goes_on)? {
+    if let Some(found) = moments::bounds(&world, settings, moments::Effort::WHOLE, goes_on)? {
+        let grid = found.grid;
         known.lower = known.lower.max(grid.lower);
         known.upper = grid.upper;
         known.grids.push(grid);
@@ -346,7 +347,7 @@ fn bound(
             value.map(|value| (value + SLACK).min(1.0))
         }
         Side::Below => {
-            let below = below::Below::new(world, &chances, below::ALWAYS);
+            let below = below::Below::new(world, &chances, below::Manner::Always);
             let value = graph::value(&below, left, goes_on);
             value.map(|value| (value - SLACK).max(0.0))
         }

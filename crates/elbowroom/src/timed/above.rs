@@ -1,19 +1,23 @@
-//! The bound from above: the agent knows what this cell brings, and chooses the order.
+//! The bound from above: the agent knows what this cell brings, and chooses the order. Where everything happens
+//! at known times, states are only where something does ([`stretched`](super::moments)).
 
 use indexmap::IndexSet;
 
 use super::chances::Chances;
 use super::graph::{Choice, Expansion, Hopes, Layers, Nodes, Target};
+use super::moments::{Alike, Reasons};
 use super::state::{Phase, State};
 use super::world::TimedWorld;
 
 pub(super) struct Above<'a> {
-    world: &'a TimedWorld,
-    chances: &'a Chances,
+    pub(super) world: &'a TimedWorld,
+    pub(super) chances: &'a Chances,
+    /// The actions that end alike, where everything happens at known times.
+    pub(super) by_moments: Option<Alike>,
 }
 
 /// A state within a cell, with the events that are still to come in it.
-type Moment = (State, Coming);
+pub(super) type Moment = (State, Coming);
 
 /// The events of a cell, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -44,25 +48,38 @@ impl Coming {
 }
 
 /// What is being put together of one cell.
-struct Cell<'c> {
-    bound: &'c Above<'c>,
+pub(super) struct Cell<'c> {
+    pub(super) bound: &'c Above<'c>,
     /// Its number.
-    number: usize,
+    pub(super) number: usize,
     /// After the nodes of the cell's beginning.
     moments: IndexSet<Moment>,
     first: usize,
-    later: &'c mut Layers,
-    hopes: &'c mut Hopes,
+    pub(super) later: &'c mut Layers,
+    pub(super) hopes: &'c mut Hopes,
+    pub(super) reasons: Reasons,
 }
 
 impl<'a> Above<'a> {
     pub(super) fn new(world: &'a TimedWorld, chances: &'a Chances) -> Self {
-        Self { world, chances }
+        Self {
+            world,
+            chances,
+            by_moments: None,
+        }
+    }
+
+    /// Where everything happens at [known times](super::moments), which may be earlier by less than a cell.
+    pub(super) fn by_moments(world: &'a TimedWorld, chances: &'a Chances) -> Self {
+        Self {
+            by_moments: Some(Alike::new(world, chances)),
+            ..Self::new(world, chances)
+        }
     }
 }
 
 /// What the cell brings: which of the actions under way may end, and which events happen.
-pub(super) fn revealed(
+fn revealed(
     world: &TimedWorld,
     chances: &Chances,
     cell: usize,
@@ -148,6 +165,7 @@ impl Expansion for Above<'_> {
             first: states.len(),
             later,
             hopes,
+            reasons: Reasons::new(),
         };
         let mut nodes = Nodes::of(cell);
         for state in states {
@@ -180,7 +198,7 @@ impl Expansion for Above<'_> {
 }
 
 impl Cell<'_> {
-    fn target(&mut self, moment: Moment) -> Target {
+    pub(super) fn target(&mut self, moment: Moment) -> Target {
         let world = self.bound.world;
         let moment = forced(world, moment);
         if world.goal.hold(moment.0.facts) {
@@ -195,9 +213,19 @@ impl Cell<'_> {
     fn choices(&mut self, moment: &Moment) -> Vec<Choice> {
         let world = self.bound.world;
         let (state, coming) = moment;
-        let startable = state.startable(world);
+        let startable = if let Some(alike) = &self.bound.by_moments {
+            state.startable(world, |act| alike.free(state, act).is_some())
+        } else {
+            let under_way = state.under_way();
+            state.startable(world, |act| under_way & (1 << act) == 0)
+        };
         if state.must_start(world, &startable) {
             return vec![self.start(state, *coming, startable[0])];
+        }
+        if self.bound.by_moments.is_some()
+            && let Some(only) = self.nothing_else_at(moment, &startable)
+        {
+            return only;
         }
         let mut choices: Vec<Choice> = Vec::new();
         for (place, running) in state.running.iter().enumerate() {
@@ -205,10 +233,10 @@ impl Cell<'_> {
                 let after = state.ended(world, place, ending);
                 choices.push(vec![(1.0, vec![self.target((after, *coming))])]);
             }
-            if world.may_gain_by_cancelling(usize::from(running.act)) {
-                let mut after = state.clone();
-                after.running.remove(place);
-                choices.push(vec![(1.0, vec![self.target((after, *coming))])]);
+            if self.bound.by_moments.is_some() {
+                choices.extend(self.begun_anew(moment, place));
+            } else if world.may_gain_by_cancelling(usize::from(running.act)) {
+                choices.push(self.let_go(moment, place));
             }
         }
         for event in 0..world.events.len() {
@@ -241,8 +269,14 @@ impl Cell<'_> {
         choices
     }
 
+    pub(super) fn let_go(&mut self, (state, coming): &Moment, place: usize) -> Choice {
+        let mut after = state.clone();
+        after.running.remove(place);
+        vec![(1.0, vec![self.target((after, *coming))])]
+    }
+
     /// An action starts, which may end in the very cell.
-    fn start(&mut self, state: &State, coming: Coming, act: usize) -> Choice {
+    pub(super) fn start(&mut self, state: &State, coming: Coming, act: usize) -> Choice {
         let world = self.bound.world;
         let ways: Vec<_> = match world.acts[act].rest {
             Some(_) => self.bound.chances.ends[act][0]
@@ -250,16 +284,22 @@ impl Cell<'_> {
                 .collect(),
             None => vec![(1.0, None)],
         };
+        let alike = self.bound.by_moments.as_ref();
+        let as_act = alike.and_then(|alike| alike.free(state, act));
         let mut choice = Choice::new();
         for (p, ending) in ways.into_iter().filter(|(p, _)| *p > 0.0) {
             let phase = ending.map_or(Phase::Goes, Phase::Ready);
-            let after = state.started(world, act, self.number, phase);
+            let under_way = (as_act.unwrap_or(act), self.number, phase);
+            let after = state.started(world, act, under_way);
             choice.push((p, vec![self.target((after, coming))]));
         }
         choice
     }
 
     fn pass(&mut self, mut state: State) -> Target {
+        if self.bound.by_moments.is_some() {
+            return self.pass_until_something_happens(state);
+        }
         let world = self.bound.world;
         for running in &mut state.running {
             if let Phase::Ready(ending) = running.phase {
@@ -274,7 +314,7 @@ impl Cell<'_> {
 }
 
 /// What is best done at once.
-pub(super) fn forced(world: &TimedWorld, mut moment: Moment) -> Moment {
+fn forced(world: &TimedWorld, mut moment: Moment) -> Moment {
     loop {
         let (state, coming) = &moment;
         let event = (0..world.events.len())

@@ -189,6 +189,11 @@ impl Event {
 }
 
 impl Act {
+    /// Whether its end alone is all that the goal asks for.
+    pub(super) fn wins(&self, goal: &Needs) -> bool {
+        self.rest.iter().any(|(_, end)| goal.hold(end.adds))
+    }
+
     /// Whether it may end in more than one way.
     pub(super) fn has_chances(&self) -> bool {
         let end = self.rest.as_ref();

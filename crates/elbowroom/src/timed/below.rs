@@ -13,21 +13,22 @@ use super::world::TimedWorld;
 /// What more than so many happenings in one cell lead to is taken to be lost.
 const MOST_ORDERED: usize = 5;
 
-/// The agent may do something at every boundary.
-pub(super) const ALWAYS: usize = 1;
-
-/// Only when something has happened, and at time 0.
-pub(super) const WHEN_SOMETHING_HAPPENS: usize = usize::MAX;
+/// When whoever decides does something, and what it looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Manner {
+    /// Anything, at every boundary.
+    Always,
+    /// Only when something has happened, and at time 0; then nothing is left undone.
+    WhenSomethingHappens,
+    /// The same where everything happens at [known times](super::moments); nothing is let go. None of the actions
+    /// is left undone that are bits of this.
+    ByMoments(u64),
+}
 
 pub(super) struct Below<'a> {
     world: &'a TimedWorld,
     chances: &'a Chances,
-    /// After how many cells in which nothing happens the agent may do something all the same.
-    stride: usize,
-    /// The actions that are not left undone, as bits.
-    must: u64,
-    /// Whether everything happens at [known times](super::moments).
-    by_moments: bool,
+    manner: Manner,
 }
 
 /// Something that happens in a cell.
@@ -58,7 +59,8 @@ fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
     if !state.may_act {
         return vec![Move::Wait];
     }
-    let startable = state.startable(world);
+    let under_way = state.under_way();
+    let startable = state.startable(world, |act| under_way & (1 << act) == 0);
     if state.must_start(world, &startable) {
         return vec![Move::Start(startable[0])];
     }
@@ -79,13 +81,18 @@ fn leave_nothing_undone(world: &TimedWorld, state: &State, must: u64, moves: &mu
     let breaks_nothing = |choice: &Move| match choice {
         Move::Start(act) => {
             let under_way = usize::from(world.acts[*act].rest.is_some());
-            let after = state.started(world, *act, 0, Phase::Goes);
+            let after = state.started(world, *act, (*act, 0, Phase::Goes));
             after.running.len() == state.running.len() + under_way
         }
         Move::Cancel(_) | Move::Wait => false,
     };
+    // What an action is done for may be there already.
+    let is_wanted = |act: usize| {
+        let end = world.acts[act].rest.as_ref();
+        must & (1 << act) != 0 && end.is_none_or(|(_, end)| end.adds & !state.facts != 0)
+    };
     let is_undone = |choice: &Move| {
-        matches!(choice, Move::Start(act) if must & (1 << act) != 0) && breaks_nothing(choice)
+        matches!(choice, Move::Start(act) if is_wanted(*act)) && breaks_nothing(choice)
     };
     if moves.iter().any(is_undone) {
         moves.retain(breaks_nothing);
@@ -106,38 +113,27 @@ struct Cell<'c> {
 }
 
 impl<'a> Below<'a> {
-    /// Any `stride` is a way to act, and so bounds the best from below.
-    pub(super) fn new(world: &'a TimedWorld, chances: &'a Chances, stride: usize) -> Self {
+    /// Any manner is a way to act, and so bounds the best from below.
+    pub(super) fn new(world: &'a TimedWorld, chances: &'a Chances, manner: Manner) -> Self {
         Self {
             world,
             chances,
-            stride,
-            must: u64::MAX,
-            by_moments: false,
-        }
-    }
-
-    /// Whoever acts when something has happened, where everything happens at [known times](super::moments).
-    /// It leaves none of the actions undone that are bits of `must`.
-    pub(super) fn by_moments(world: &'a TimedWorld, chances: &'a Chances, must: u64) -> Self {
-        Self {
-            world,
-            chances,
-            stride: WHEN_SOMETHING_HAPPENS,
-            must,
-            by_moments: true,
+            manner,
         }
     }
 
     /// All that whoever acts so looks at in a state, as [`moves`].
     pub(super) fn moves(&self, state: &State) -> Vec<Move> {
         let mut moves = moves(self.world, state);
-        if self.by_moments {
-            moves.retain(|choice| !matches!(choice, Move::Cancel(_)));
-        }
-        if self.stride == WHEN_SOMETHING_HAPPENS {
-            leave_nothing_undone(self.world, state, self.must, &mut moves);
-        }
+        let must = match self.manner {
+            Manner::Always => return moves,
+            Manner::WhenSomethingHappens => u64::MAX,
+            Manner::ByMoments(must) => {
+                moves.retain(|choice| !matches!(choice, Move::Cancel(_)));
+                must
+            }
+        };
+        leave_nothing_undone(self.world, state, must, &mut moves);
         moves
     }
 
@@ -354,7 +350,7 @@ impl Cell<'_> {
                 vec![(1.0, vec![self.target(after)])]
             }
             Move::Start(act) => {
-                let after = state.started(world, act, self.number, Phase::Goes);
+                let after = state.started(world, act, (act, self.number, Phase::Goes));
                 vec![(1.0, vec![self.target(after)])]
             }
             Move::Wait => self.wait(state),
@@ -365,25 +361,26 @@ impl Cell<'_> {
     fn wait(&mut self, state: &State) -> Choice {
         let world = self.bound.world;
         let chances = self.bound.chances;
-        let cell = if self.bound.stride == WHEN_SOMETHING_HAPPENS {
+        let is_always = self.bound.manner == Manner::Always;
+        let cell = if is_always {
+            self.number
+        } else {
             match chances.next(state, self.number) {
                 Some(cell) => cell,
                 None => return vec![(1.0, vec![Target::Lost])],
             }
-        } else {
-            self.number
         };
         let mut choice = Choice::new();
         for (p, happenings) in self.bound.happenings(cell, state) {
             let outcomes = self.bound.outcomes(state, &happenings).unwrap_or_default();
-            let may_act = !happenings.is_empty() || (cell + 1).is_multiple_of(self.bound.stride);
+            let may_act = is_always || !happenings.is_empty();
             let targets = outcomes.into_iter().map(|mut outcome| {
                 outcome.may_act = may_act;
                 if outcome.is_won(world) {
                     return Target::Won;
                 }
                 let is_hopeful = outcome.is_hopeful(world, self.hopes)
-                    && (!self.bound.by_moments
+                    && (!matches!(self.bound.manner, Manner::ByMoments(_))
                         || chances.is_in_time(world, &outcome, cell + 1, Side::Below));
                 if is_hopeful {
                     Target::later(self.later, cell + 1, outcome)

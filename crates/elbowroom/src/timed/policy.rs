@@ -8,14 +8,16 @@ use elbowroom_num::Rational;
 use elbowroom_sim::{Side as Part, WorldModel};
 use indexmap::{IndexMap, IndexSet};
 
-use super::below::{ALWAYS, Below, Move, WHEN_SOMETHING_HAPPENS};
+use super::below::{Below, Manner, Move};
 use super::chances::Chances;
 use super::graph::{Expansion, Hopes, Layers, Tolls, Values, backwards, settled};
 use super::numbers::Span;
 use super::state::{Phase, Running, State};
 use super::within::Search;
 use super::world::{Facts, TimedWorld};
-use super::{Grid, NotTabulated, QUICK_SHARE, Settings, Side, TimedOptimum, grid, refined};
+use super::{
+    Grid, NotTabulated, QUICK_SHARE, Settings, Side, TimedOptimum, grid, moments, refined,
+};
 
 /// The values of all states on the grid of the bound from below, by which each move can be weighed.
 ///
@@ -29,8 +31,7 @@ pub struct Policy {
     step: Rational,
     /// By cell: what its states are worth.
     values: BTreeMap<u32, IndexMap<State, f64>>,
-    /// When it acts: see [`Below::new`].
-    stride: usize,
+    manner: Manner,
     tolls: Tolls,
     optimum: TimedOptimum,
 }
@@ -51,6 +52,13 @@ const GROWTH: f64 = 4.0;
 /// Of the states that there may be, the first grid may have one in so many. It hardly ever is the last,
 /// and to find that one does not get far takes the longer the more states it has.
 const FIRST_SHARE: usize = 32;
+
+/// How long one of so many cells is.
+fn exact_step(world: &TimedWorld, cells: usize) -> Rational {
+    // The horizon is a number that somebody wrote, or a multiple of the resolution.
+    let horizon = Rational::from_f64_as_written(world.horizon).unwrap_or_default();
+    horizon / Rational::from(i64::try_from(cells).unwrap_or(i64::MAX))
+}
 
 /// Whether the bounds may get close before there are too many states, if each further grid halves what
 /// is between them, and has as many times the states of the one before as the last one has.
@@ -122,11 +130,39 @@ impl Policy {
         if 1.0 - search.lower() <= SURE {
             return Self::within(search, settings, goes_on);
         }
-        let whole = world.and_then(|world| Self::close_in(world, settings, goes_on));
+        let whole = world.and_then(|world| match Self::by_moments(&world, settings, goes_on)? {
+            Some(policy) => Ok(Some(policy)),
+            None => Self::close_in(world, settings, goes_on),
+        });
         if !matches!(whole, Ok(Some(_))) && 1.0 - search.lower() <= CLOSE {
             return Self::within(search, settings, goes_on);
         }
         whole
+    }
+
+    /// The policy where everything happens at known times, if the bounds get close.
+    fn by_moments(
+        world: &TimedWorld,
+        settings: &Settings,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, NotTabulated> {
+        let found = moments::bounds(world, settings, moments::Effort::QUICK, goes_on)?;
+        let Some(found) = found.filter(|found| found.grid.upper - found.grid.lower <= CLOSE) else {
+            return Ok(None);
+        };
+        let Some(within) = found.within else {
+            return Ok(None);
+        };
+        let chances = super::chances(&within, found.cells, Side::Below)?;
+        let step = exact_step(&within, found.cells);
+        let optimum = TimedOptimum {
+            lower: found.grid.lower,
+            upper: found.grid.upper,
+            grids: vec![found.grid],
+            ..TimedOptimum::unknown()
+        };
+        let acts = (found.cells, within.by_moments(settings));
+        Ok(Self::of(within, chances, optimum, step, acts).filled(settings, goes_on))
     }
 
     /// The policy in the whole process, if the bounds get close.
@@ -175,7 +211,7 @@ impl Policy {
             within: Some(within),
             ..TimedOptimum::unknown()
         };
-        let acts = (fit.cells, WHEN_SOMETHING_HAPPENS);
+        let acts = (fit.cells, Manner::WhenSomethingHappens);
         Ok(Self::of(world, chances, optimum, exact, acts).filled(settings, goes_on))
     }
 
@@ -192,10 +228,11 @@ impl Policy {
         #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
         let step = world.horizon / cells as f64;
         let chances = Chances::new(&world, step, cells, Side::Below)?;
-        // The horizon is a number that somebody wrote, or a multiple of the resolution.
-        let horizon = Rational::from_f64_as_written(world.horizon).unwrap_or_default();
-        let exact = horizon / Rational::from(i64::try_from(cells).unwrap_or(i64::MAX));
-        Ok(Self::of(world, chances, optimum, exact, (cells, ALWAYS)).filled(settings, goes_on))
+        let exact = exact_step(&world, cells);
+        Ok(
+            Self::of(world, chances, optimum, exact, (cells, Manner::Always))
+                .filled(settings, goes_on),
+        )
     }
 
     /// Without its values yet.
@@ -204,14 +241,14 @@ impl Policy {
         chances: Chances,
         optimum: TimedOptimum,
         step: Rational,
-        (cells, stride): (usize, usize),
+        (cells, manner): (usize, Manner),
     ) -> Self {
         #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
         let count = cells as f64;
         Self {
             step,
             values: BTreeMap::new(),
-            stride,
+            manner,
             tolls: Tolls {
                 cell: 1.0 - HASTE / count,
                 step: 1.0 - HASTE / count,
@@ -224,7 +261,7 @@ impl Policy {
 
     fn filled(mut self, settings: &Settings, goes_on: &dyn Fn() -> bool) -> Option<Self> {
         let mut left = settings.most_states;
-        let bound = Below::new(&self.world, &self.chances, self.stride);
+        let bound = Below::new(&self.world, &self.chances, self.manner);
         let (layers, values) = backwards(&bound, &mut left, self.tolls, goes_on).ok()?;
         let tables = layers.into_iter().zip(values.0.into_values());
         let tables =
@@ -246,7 +283,7 @@ impl Policy {
         if state.is_won(world) || !state.is_hopeful(world, &mut hopes) {
             return Vec::new();
         }
-        let bound = Below::new(world, &self.chances, self.stride);
+        let bound = Below::new(world, &self.chances, self.manner);
         let mut later = Layers::new();
         let only = IndexSet::from([state.clone()]);
         let nodes = bound.expand(cell, &only, &mut later, &mut hopes, usize::MAX);
@@ -299,7 +336,7 @@ impl Policy {
             may_act: true,
         };
         match standing.started.and_then(act_of) {
-            Some(act) => state.started(&self.world, act, standing.period, Phase::Goes),
+            Some(act) => state.started(&self.world, act, (act, standing.period, Phase::Goes)),
             None => state,
         }
     }
@@ -379,7 +416,7 @@ impl Outlook for Policy {
         }
         // Of what is none of the plan's actions nothing is known.
         let knows = |name: &str| self.world.acts.iter().any(|act| act.name == name);
-        if self.stride != ALWAYS && !standing.started.is_none_or(knows) {
+        if self.manner != Manner::Always && !standing.started.is_none_or(knows) {
             return None;
         }
         let facts = self.world.facts.iter().enumerate();

@@ -6,7 +6,7 @@
 //! but such facts, as long as the goal is reached no sooner without them.
 
 use super::Side;
-use super::act::Event;
+use super::act::{Act, Event};
 use super::chances::Chances;
 use super::state::State;
 use super::world::{Facts, TimedWorld};
@@ -52,7 +52,7 @@ impl TimedWorld {
             .iter()
             .fold(0, |all, event| all | by_chance(event));
         let all: Facts = (0..self.facts.len()).fold(0, |all, place| all | 1 << place);
-        let mut certain = all & !events & !self.goal.mentions();
+        let mut certain = all & !events & !self.goal.mentions() & !self.leads_to_chances();
         for act in &self.acts {
             if act.fails() {
                 certain &= !act.adds();
@@ -76,6 +76,24 @@ impl TimedWorld {
             if certain == before {
                 return certain;
             }
+        }
+    }
+
+    /// The facts without which actions with chances cannot start, or others that lead to these: nobody has more
+    /// chances if they stay. When the goal is reached it is over.
+    fn leads_to_chances(&self) -> Facts {
+        let mut leading: Facts = 0;
+        loop {
+            let leads = |act: &&Act| {
+                let leads = act.has_chances() || act.adds() & leading != 0;
+                leads && !act.wins(&self.goal)
+            };
+            let acts = self.acts.iter().filter(leads);
+            let more = acts.fold(leading, |all, act| all | act.start.needs.mentions());
+            if more == leading {
+                return leading;
+            }
+            leading = more;
         }
     }
 

@@ -108,19 +108,19 @@ impl State {
         }
     }
 
-    /// An action starts, in that cell, with what is known of its end; an instantaneous one is over.
+    /// An action starts, and is under way as that one, from that cell on, with what is known of its end; an
+    /// instantaneous one is over.
     pub(super) fn started(
         &self,
         world: &TimedWorld,
         act: usize,
-        since: usize,
-        phase: Phase,
+        (as_act, since, phase): (usize, usize, Phase),
     ) -> Self {
         let mut after = self.clone();
         after.apply(world, &world.acts[act].start, 0);
         if world.acts[act].rest.is_some() {
             let running = Running {
-                act: u8::try_from(act).expect("at most 64 actions"),
+                act: u8::try_from(as_act).expect("at most 64 actions"),
                 since: u16::try_from(since).expect("fewer than 65,535 cells"),
                 phase,
             };
@@ -171,13 +171,16 @@ impl State {
 
     /// The actions that can start and may do any good; the only one that needs looking at, where
     /// nothing is ever better than to start it at once.
-    pub(super) fn startable(&self, world: &TimedWorld) -> Vec<usize> {
-        let under_way = self.under_way();
+    pub(super) fn startable(
+        &self,
+        world: &TimedWorld,
+        is_idle: impl Fn(usize) -> bool,
+    ) -> Vec<usize> {
         let can_start = |act: &usize| {
-            let is_idle = under_way & (1 << act) == 0;
-            is_idle
+            is_idle(*act)
                 && world.acts[*act].start.needs.hold(self.facts)
                 && world.is_useful(*act, self.facts)
+                && !self.breaks_off_at_once(world, *act)
         };
         let acts: Vec<usize> = (0..world.acts.len()).filter(can_start).collect();
         let is_eager = |act: &&usize| {
@@ -191,6 +194,20 @@ impl State {
             Some(eager) => vec![*eager],
             None => acts,
         }
+    }
+
+    /// Whether what an action needs over all does not hold right after its start: nobody starts it then.
+    fn breaks_off_at_once(&self, world: &TimedWorld, act: usize) -> bool {
+        let act = &world.acts[act];
+        let Some((over_all, _)) = &act.rest else {
+            return false;
+        };
+        if act.start.amounts.is_empty() {
+            return !over_all.hold(act.start.apply(self.facts));
+        }
+        let mut after = self.clone();
+        after.apply(world, &act.start, 0);
+        !over_all.hold(after.facts)
     }
 
     /// Whether the agent has nothing to think about but to start the first of these.

@@ -13,7 +13,7 @@ use elbowroom_sim::{Distribution, WorldModel};
 use serde::{Deserialize, Serialize};
 
 use super::act::Occurs;
-use super::below::{Below, WHEN_SOMETHING_HAPPENS};
+use super::below::{Below, Manner};
 use super::chances::Chances;
 use super::{SLACK, Settings, Side, TimedWorld, graph};
 
@@ -163,10 +163,10 @@ impl Search {
 impl Set {
     /// The next grid; `None` if it has too many states, or nobody wants it.
     fn next(&mut self, most_states: usize, goes_on: &dyn Fn() -> bool) -> Option<(Within, Fit)> {
-        let fit = fitting(&self.world, self.cells)?;
+        let fit = fitting(&self.world, self.cells, Side::Below)?;
         let step = fit.step();
         let chances = Chances::new(&self.world, step, fit.cells, Side::Below).ok()?;
-        let bound = Below::new(&self.world, &chances, WHEN_SOMETHING_HAPPENS);
+        let bound = Below::new(&self.world, &chances, Manner::WhenSomethingHappens);
         let mut left = most_states;
         let value = graph::value(&bound, &mut left, goes_on).ok()?;
         self.cells *= 2;
@@ -181,10 +181,12 @@ impl Set {
     }
 }
 
-/// The grid of so many cells up to twice as many on which the least time is lost: whoever acts at the
-/// boundaries of cells loses what is missing to a whole number of them for each time that is known,
-/// such as a duration or a deadline. It may end before the horizon: that is a loss, too.
-fn fitting(world: &TimedWorld, cells: usize) -> Option<Fit> {
+/// The grid of so many cells up to twice as many that fits the times that are known best.
+///
+/// Seen from below, whoever acts at the boundaries of cells loses what is missing to a whole number of them for each
+/// such time, a duration or a deadline. It may end before the horizon: that is a loss, too. Seen from above, what
+/// durations are more than a whole number of cells is given away.
+pub(super) fn fitting(world: &TimedWorld, cells: usize, side: Side) -> Option<Fit> {
     let lasting: Vec<f64> = world
         .acts
         .iter()
@@ -204,8 +206,13 @@ fn fitting(world: &TimedWorld, cells: usize) -> Option<Fit> {
     let loss = |step: f64| {
         let over = |time: &f64| ((time / step - 1e-9).ceil() * step - time).max(0.0);
         let under = |time: &f64| (time - (time / step + 1e-9).floor() * step).max(0.0);
-        let lost: f64 = lasting.iter().map(over).sum();
-        lost + times.iter().chain([&world.horizon]).map(under).sum::<f64>()
+        match side {
+            Side::Below => {
+                let lost: f64 = lasting.iter().map(over).sum();
+                lost + times.iter().chain([&world.horizon]).map(under).sum::<f64>()
+            }
+            Side::Above => lasting.iter().map(under).sum(),
+        }
     };
     let mut best = (world.horizon, wanted);
     for time in lasting.iter().chain(&times).chain([&world.horizon]) {

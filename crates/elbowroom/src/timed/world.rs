@@ -214,7 +214,7 @@ impl TimedWorld {
     }
 
     /// The actions that are in one of the plans, as bits.
-    pub(super) fn asked_for(&self, plans: &[Vec<String>]) -> u64 {
+    pub(super) fn in_plans(&self, plans: &[Vec<String>]) -> u64 {
         let acts = self.acts.iter().enumerate();
         let is_asked_for = |act: &Act| plans.iter().flatten().any(|name| *name == act.name);
         let asked_for = acts.filter(|(_, act)| is_asked_for(act));
@@ -224,10 +224,10 @@ impl TimedWorld {
     /// For each of these plans, and once each: the world without the actions that are only in others; the world
     /// itself if there are no plans.
     pub(super) fn keeping_to(&self, plans: &[Vec<String>]) -> Vec<Self> {
-        let of_any = self.asked_for(plans);
+        let of_any = self.in_plans(plans);
         let mut own: Vec<u64> = Vec::new();
         for plan in plans {
-            let of_plan = self.asked_for(std::slice::from_ref(plan));
+            let of_plan = self.in_plans(std::slice::from_ref(plan));
             if of_plan != 0 && !own.contains(&of_plan) {
                 own.push(of_plan);
             }
@@ -256,15 +256,16 @@ impl TimedWorld {
     }
 
     /// The same world, in which no action is broken off because of a number.
-    pub(super) fn without_numbers_over_all(&self) -> Self {
+    pub(super) fn without_numbers_over_all(&self) -> Result<Self, NotTabulated> {
         let mut kinder = self.clone();
         for act in &mut kinder.acts {
             if let Some((over_all, _)) = &mut act.rest {
                 *over_all = over_all.without(self.tested, true);
             }
         }
+        kinder.cut()?;
         kinder.see_what_changes();
-        kinder
+        Ok(kinder)
     }
 
     /// Facts, with the comparisons that hold of numbers.

@@ -190,7 +190,7 @@ impl Process<'_> {
         for (index, (act, name)) in self.world.acts.iter().zip(&self.acts).enumerate() {
             all.push(Happening {
                 label: format!("start_{name}"),
-                needs: self.holds(&act.start.needs),
+                needs: self.can_start(act),
                 adds: act.start.adds,
                 deletes: act.start.deletes,
                 owner: Owner::Started(index),
@@ -420,19 +420,7 @@ impl Process<'_> {
         let goes_on = self.goes_on(&self.world.acts[act], *adds, *deletes);
         match happening.owner {
             Owner::Started(own) if own == act => {
-                let begun = match &goes_on {
-                    Some(Formula::All(parts)) if parts.is_empty() => "1".to_owned(),
-                    Some(goes_on) => format!("(({goes_on}) ? 1 : 0)"),
-                    None => {
-                        let over_all = self.world.acts[act].rest.as_ref();
-                        let over_all = over_all.map(|(over_all, _)| self.holds(over_all));
-                        match over_all.unwrap_or(Formula::TRUE) {
-                            holds if holds == Formula::TRUE => "1".to_owned(),
-                            holds => format!("(({holds}) ? 1 : 0)"),
-                        }
-                    }
-                };
-                let begins = format!("({since}'={begun})");
+                let begins = format!("({since}'=1)");
                 let ways = match self.bound {
                     Bound::Lower => begins,
                     // It may end in the very cell.
@@ -440,12 +428,7 @@ impl Process<'_> {
                         let ways = ends_of(&ends, &self.chances.ends[act][0], "");
                         let ways = ways.map(|(p, end)| match end.as_str() {
                             "" => (p, begins.clone()),
-                            // Unless it breaks off at once.
-                            end => {
-                                let known = end.replace("'=1)", &format!("'={begun})"));
-                                let known = known.replace("'=2)", &format!("'=2*{begun})"));
-                                (p, format!("{begins}&{known}"))
-                            }
+                            end => (p, format!("{begins}&{end}")),
                         });
                         choice(&ways)
                     }
@@ -474,6 +457,16 @@ impl Process<'_> {
                 }
             }
         }
+    }
+
+    /// Whether an action can start, and what it needs over all holds right after that.
+    fn can_start(&self, act: &Act) -> Formula {
+        let needs = self.holds(&act.start.needs);
+        let over_all = act.rest.iter().map(|(over_all, _)| {
+            let goes_on = self.goes_on(act, act.start.adds, act.start.deletes);
+            goes_on.unwrap_or_else(|| self.holds(over_all))
+        });
+        Formula::all(std::iter::once(needs).chain(over_all))
     }
 
     /// Whether what an action needs over all holds after these effects; `None` if they do not

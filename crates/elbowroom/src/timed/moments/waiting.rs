@@ -19,7 +19,8 @@ struct Footprint {
 /// An end that could come now.
 struct Waiting<'a> {
     world: &'a TimedWorld,
-    act: usize,
+    /// The action, if it is known: it does not start again before it has ended.
+    act: Option<usize>,
     own: Footprint,
     /// What it needs.
     reads: Facts,
@@ -31,10 +32,12 @@ struct Waiting<'a> {
 
 /// Whether an end that could come now may be better after something that can come about while its action is under
 /// way: something that it would be in the way of, or that would undo what it does, or that it needs.
-/// Where more facts are never worse it is in nobody's way by what it gives.
+/// Where more facts are never worse it is in nobody's way by what it gives. If it is alone, no other action ends
+/// like it; else it may be another one that is under way.
 pub(super) fn may_be_better_later(
     world: &TimedWorld,
     (facts, under_way, happened, act, ending): (Facts, u64, u32, usize, Ending),
+    is_alone: bool,
 ) -> bool {
     let Some((over_all, end)) = &world.acts[act].rest else {
         return false;
@@ -47,7 +50,7 @@ pub(super) fn may_be_better_later(
     };
     let waiting = Waiting {
         world,
-        act,
+        act: is_alone.then_some(act),
         own,
         reads,
         tests: world.tests_of(own.numbers),
@@ -83,10 +86,10 @@ impl Waiting<'_> {
                 facts |= other.adds_by_failing();
             }
         }
-        let mut ended = 1_u64 << self.act;
+        let mut ended = 0;
         loop {
             let before = (facts, started, ended);
-            for (index, other) in acts().filter(|(index, _)| *index != self.act) {
+            for (index, other) in acts().filter(|(index, _)| Some(*index) != self.act) {
                 let bit = 1 << index;
                 let start = &other.start;
                 if started & bit == 0 && start.needs.is_possible(facts) && !self.is_broken_by(start)

@@ -1,0 +1,164 @@
+//! The bound from above where everything happens at [known times](super): an action that is ready to end
+//! may end at any time at which something happens or gets ready.
+//!
+//! Most had best end at once. An end that is put off comes right before something that it would have been in the way
+//! of, or it never comes. So where nothing of the kind can come about any more while the action is
+//! under way, the agent ends it or lets it go before it does anything else.
+
+use indexmap::IndexMap;
+
+use super::waiting::may_be_better_later;
+use crate::timed::Side;
+use crate::timed::above::{Cell, Moment};
+use crate::timed::act::Act;
+use crate::timed::chances::Chances;
+use crate::timed::failures::Ending;
+use crate::timed::graph::{Choice, Target};
+use crate::timed::state::{Phase, State};
+use crate::timed::world::{Facts, TimedWorld};
+
+/// Whether an end has a reason to wait, by facts, what is under way, what has happened, and the end.
+pub(in crate::timed) type Reasons = IndexMap<(Facts, u64, u32, usize, Ending), bool>;
+
+/// Actions that differ in their starts only: once they are under way it does not matter which one it is.
+pub(in crate::timed) struct Alike {
+    /// By action: those that end like it, as bits.
+    of: Vec<u64>,
+}
+
+impl Alike {
+    pub(in crate::timed) fn new(world: &TimedWorld, chances: &Chances) -> Self {
+        let end_alike = |one: usize, other: usize| {
+            one == other
+                || (chances.ends[one] == chances.ends[other]
+                    && ends_alike(&world.acts[one], &world.acts[other])
+                    && world.may_gain_by_cancelling(one) == world.may_gain_by_cancelling(other))
+        };
+        let acts = 0..world.acts.len();
+        let of = acts.clone().map(|one| {
+            let others = acts.clone().filter(|other| end_alike(one, *other));
+            others.fold(0, |all, other| all | 1 << other)
+        });
+        Self { of: of.collect() }
+    }
+
+    /// As which action one is under way that starts: the first that ends like it and is not.
+    pub(in crate::timed) fn free(&self, state: &State, act: usize) -> Option<usize> {
+        let free = self.of[act] & !state.under_way();
+        (free != 0).then(|| free.trailing_zeros() as usize)
+    }
+}
+
+/// Whether two actions that cannot fail and change no numbers end in the same way.
+fn ends_alike(one: &Act, other: &Act) -> bool {
+    let (Some((one_over_all, one_end)), Some((other_over_all, other_end))) =
+        (&one.rest, &other.rest)
+    else {
+        return false;
+    };
+    let can_fail = one.fails() || other.fails();
+    let about_numbers = !one_end.amounts.is_empty() || !other_end.amounts.is_empty();
+    !can_fail
+        && !about_numbers
+        && one_over_all == other_over_all
+        && one_end.needs == other_end.needs
+        && (one_end.adds, one_end.deletes) == (other_end.adds, other_end.deletes)
+}
+
+impl Cell<'_> {
+    /// What is done before anything else is thought about, if there is something of the kind.
+    pub(in crate::timed) fn nothing_else_at(
+        &mut self,
+        moment: &Moment,
+        startable: &[usize],
+    ) -> Option<Vec<Choice>> {
+        let world = self.bound.world;
+        let (state, coming) = moment;
+        // Where an action may end as late as one likes and be let go, a start that does nothing costs nothing.
+        let for_nothing = startable.iter().find(|act| {
+            let act = &world.acts[**act];
+            let rest = act.rest.as_ref();
+            act.start.does_nothing() && rest.is_some_and(|(over_all, _)| over_all.hold(state.facts))
+        });
+        if let Some(act) = for_nothing {
+            return Some(vec![self.start(state, *coming, *act)]);
+        }
+        for (place, running) in state.running.iter().enumerate() {
+            let act = usize::from(running.act);
+            let Phase::Ready(ending) = running.phase else {
+                continue;
+            };
+            if !self.has_reason_to_wait(state, act, ending) {
+                let after = state.ended(world, place, ending);
+                let mut only = vec![vec![(1.0, vec![self.target((after, *coming))])]];
+                if world.may_gain_by_cancelling(act) {
+                    only.push(self.let_go(moment, place));
+                }
+                return Some(only);
+            }
+        }
+        None
+    }
+
+    /// To begin anew what is under way, or something that ends like it: letting go is of no other use, as nothing has to
+    /// end.
+    pub(in crate::timed) fn begun_anew(&mut self, moment: &Moment, place: usize) -> Vec<Choice> {
+        let bound = self.bound;
+        let world = bound.world;
+        let (state, coming) = moment;
+        let own = usize::from(state.running[place].act);
+        let Some(alike) = &bound.by_moments else {
+            return Vec::new();
+        };
+        if alike.free(state, own).is_some() || !world.may_gain_by_cancelling(own) {
+            return Vec::new();
+        }
+        let mut without = state.clone();
+        without.running.remove(place);
+        let is_of_use = |act: &usize| {
+            let (bit, act) = (1 << act, &world.acts[*act]);
+            alike.of[own] & bit != 0
+                && (!act.start.does_nothing() || act.has_chances())
+                && act.start.needs.hold(state.facts)
+        };
+        let acts: Vec<usize> = (0..world.acts.len()).filter(is_of_use).collect();
+        acts.into_iter()
+            .map(|act| self.start(&without, *coming, act))
+            .collect()
+    }
+
+    /// Nothing more is done until something may happen.
+    pub(in crate::timed) fn pass_until_something_happens(&mut self, mut state: State) -> Target {
+        // When what is ready began does not matter any more.
+        for running in &mut state.running {
+            if running.phase != Phase::Goes {
+                running.since = 0;
+            }
+        }
+        state.running.sort_unstable();
+        let (world, chances) = (self.bound.world, self.bound.chances);
+        let Some(cell) = chances.next(&state, self.number + 1) else {
+            return Target::Lost;
+        };
+        let has_hope = state.is_hopeful(world, self.hopes)
+            && chances.is_in_time(world, &state, cell, Side::Above);
+        if has_hope {
+            Target::later(self.later, cell, state)
+        } else {
+            Target::Lost
+        }
+    }
+
+    /// Whether an end may be better after something that can come about while its action is under way.
+    fn has_reason_to_wait(&mut self, state: &State, act: usize, ending: Ending) -> bool {
+        let world = self.bound.world;
+        let (facts, under_way) = (state.facts | world.tested, state.under_way());
+        let key = (facts, under_way, state.happened, act, ending);
+        let alike = self.bound.by_moments.as_ref();
+        let is_alone = alike.is_some_and(|alike| alike.of[act] == 1 << act);
+        *self
+            .reasons
+            .entry(key)
+            .or_insert_with(|| may_be_better_later(world, key, is_alone))
+    }
+}
