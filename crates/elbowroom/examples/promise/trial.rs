@@ -5,8 +5,12 @@ use std::sync::Arc;
 
 use elbowroom::envelope::{Guarantee, Oracle, StopReason, irr};
 use elbowroom::execute::{Analyst, Execution};
-use elbowroom::execution::run::{Patience, PlanningTime, Report, RunSettings, Verdict};
-use elbowroom::execution::{Forms, Need, NoPlanner, PrepareError, Prepared, Preparer, World};
+use elbowroom::execution::run::{
+    ExecutedStep, Patience, PlanningTime, Report, RunSettings, Verdict,
+};
+use elbowroom::execution::{
+    Cause, Forms, Need, NoPlanner, PrepareError, Prepared, Preparer, World,
+};
 use elbowroom::flow;
 use elbowroom::model::validate::{self, validate};
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -115,6 +119,25 @@ impl<'a> Ready<'a> {
     /// Runs with an executor in any world.
     pub(crate) fn run(&self, executor: &str, world: &mut dyn World) -> Outcome {
         let report = self.report(executor, world);
+        self.outcome(&report)
+    }
+
+    /// Runs with `guarded` in a world in which this action starts late. It may be too late for the plan, but
+    /// that is known as soon as it has started.
+    pub(crate) fn run_late(&self, world: &mut dyn World, late: &str) -> Outcome {
+        let report = self.report("guarded", world);
+        let is_known = |executed: &ExecutedStep| {
+            executed.step.action.name == late && executed.step.start < report.time
+        };
+        let is_too_late = report.reasons.first().is_some_and(|reason| {
+            reason.cause == Cause::Unreachable && !report.executed.iter().any(is_known)
+        });
+        if is_too_late {
+            return Outcome {
+                failure: None,
+                why: "too late".to_owned(),
+            };
+        }
         self.outcome(&report)
     }
 

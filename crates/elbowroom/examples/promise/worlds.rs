@@ -22,16 +22,19 @@ pub(crate) enum Kind {
     Corner,
     /// As spiteful as what has happened so far allows.
     Spoiler,
+    /// Somewhere in the sixteenth of the interval around what is planned, and one action starts late.
+    Late,
 }
 
 impl Kind {
-    pub(crate) const ALL: [Self; 3] = [Self::Uniform, Self::Corner, Self::Spoiler];
+    pub(crate) const ALL: [Self; 4] = [Self::Uniform, Self::Corner, Self::Spoiler, Self::Late];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Uniform => "uniform",
             Self::Corner => "corners",
             Self::Spoiler => "spoiler",
+            Self::Late => "late start",
         }
     }
 }
@@ -86,6 +89,31 @@ impl<'a> Worlds<'a> {
     /// The world in which durations are drawn so, with that seed.
     pub(crate) fn drawn(&self, kind: Kind, seed: u64) -> Paced<'_, Durations> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        Paced::new(self.sim(), self.durations(kind, &mut rng))
+    }
+
+    /// The world in which one action starts late, as drawn with that seed, and which one; no other of
+    /// the plan has its name.
+    pub(crate) fn late(&self, seed: u64) -> Option<(Paced<'_, Durations>, String)> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let single = self.instances.iter().filter(|(_, all)| all.len() == 1);
+        let names: Vec<&String> = single.map(|(name, _)| name).collect();
+        let name = *names.get(rng.random_range(0..names.len().max(1)))?;
+        let times = self.prepared.plan.plan.nodes();
+        let whole = times.map(|(node, _)| &self.prepared.nominal[node]).max()?;
+        let late = whole * Rational::new(rng.random_range(1..=200), 1000);
+        let late = late.max(Rational::new(1, 100)).to_decimal(3);
+        let text = format!(
+            "format = \"elbowroom-world\"\nversion = 1\n\
+             [[delay]]\naction = \"{name}\"\nconstant = {late}\n"
+        );
+        let model = WorldModel::read(&text, self.task.problem()).expect("a world file");
+        let world = SimWorld::new(Arc::clone(&self.task), &model, 0);
+        let durations = self.durations(Kind::Late, &mut rng);
+        Some((Paced::new(world, durations), name.clone()))
+    }
+
+    fn durations(&self, kind: Kind, rng: &mut ChaCha8Rng) -> Durations {
         let mut durations = BTreeMap::new();
         for (name, instances) in &self.instances {
             let values = instances.iter().map(|(id, parameter)| match parameter {
@@ -93,13 +121,13 @@ impl<'a> Worlds<'a> {
                     self.envelope.interval(*parameter),
                     &self.prepared.plan.parameter(*parameter).nominal,
                     kind,
-                    &mut rng,
+                    rng,
                 ),
                 None => self.nominal(*id),
             });
             durations.insert(name.clone(), values.collect());
         }
-        Paced::new(self.sim(), Durations::new(durations))
+        Durations::new(durations)
     }
 
     fn nominal(&self, id: InstanceId) -> Rational {
@@ -140,6 +168,11 @@ fn drawn(interval: &Interval, nominal: &Rational, kind: Kind, rng: &mut ChaCha8R
     }
     let share = Rational::new(rng.random_range(0..=1000_i64), 1000);
     let value = &lower + (&upper - &lower) * share;
+    if kind == Kind::Late {
+        // Of infinitely much room, as much again as is planned.
+        let value = nominal + (value - nominal) / Rational::from(16);
+        return value.min(nominal * Rational::from(2));
+    }
     // Few decimals, where there is room for that.
     let rounded = (value * Rational::from(1000)).floor() * thousandth;
     rounded.max(lower)
