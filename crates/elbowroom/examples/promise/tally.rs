@@ -59,9 +59,9 @@ pub(crate) fn run(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
     }
     if number % 2 == 0
         && (number / 2) % LATE == LATE - 1
-        && let Some((mut world, late)) = worlds.late(number)
+        && let Some(late) = worlds.late_start(number)
     {
-        let outcome = ready.run_late(&mut world, &late);
+        let outcome = ready.run_late(&mut worlds.late(&late, number), &late.action);
         return tally.add(Kind::Late, &label, &outcome);
     }
     let kind = if (number / 2).is_multiple_of(2) {

@@ -39,6 +39,12 @@ impl Kind {
     }
 }
 
+/// An action that starts later than it is told to.
+pub(crate) struct LateStart {
+    pub(crate) action: String,
+    model: WorldModel,
+}
+
 /// All worlds inside a box of a plan.
 pub(crate) struct Worlds<'a> {
     task: Arc<Task>,
@@ -92,25 +98,30 @@ impl<'a> Worlds<'a> {
         Paced::new(self.sim(), self.durations(kind, &mut rng))
     }
 
-    /// The world in which one action starts late, as drawn with that seed, and which one; no other of
-    /// the plan has its name.
-    pub(crate) fn late(&self, seed: u64) -> Option<(Paced<'_, Durations>, String)> {
+    /// A start that is late, as drawn with that seed: of an action of which the plan has no other.
+    pub(crate) fn late_start(&self, seed: u64) -> Option<LateStart> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let single = self.instances.iter().filter(|(_, all)| all.len() == 1);
         let names: Vec<&String> = single.map(|(name, _)| name).collect();
-        let name = *names.get(rng.random_range(0..names.len().max(1)))?;
+        let action = *names.get(rng.random_range(0..names.len().max(1)))?;
         let times = self.prepared.plan.plan.nodes();
         let whole = times.map(|(node, _)| &self.prepared.nominal[node]).max()?;
         let late = whole * Rational::new(rng.random_range(1..=200), 1000);
         let late = late.max(Rational::new(1, 100)).to_decimal(3);
         let text = format!(
             "format = \"elbowroom-world\"\nversion = 1\n\
-             [[delay]]\naction = \"{name}\"\nconstant = {late}\n"
+             [[delay]]\naction = \"{action}\"\nconstant = {late}\n"
         );
         let model = WorldModel::read(&text, self.task.problem()).expect("a world file");
-        let world = SimWorld::new(Arc::clone(&self.task), &model, 0);
-        let durations = self.durations(Kind::Late, &mut rng);
-        Some((Paced::new(world, durations), name.clone()))
+        let action = action.clone();
+        Some(LateStart { action, model })
+    }
+
+    /// The world in which that action starts late, and durations are as drawn with that seed.
+    pub(crate) fn late<'b>(&self, late: &'b LateStart, seed: u64) -> Paced<'b, Durations> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let world = SimWorld::new(Arc::clone(&self.task), &late.model, 0);
+        Paced::new(world, self.durations(Kind::Late, &mut rng))
     }
 
     fn durations(&self, kind: Kind, rng: &mut ChaCha8Rng) -> Durations {
