@@ -38,6 +38,9 @@ pub(super) enum Origin {
     Way(WayId),
 }
 
+/// The limit on the nodes looked at to see that one comes after another.
+const MOST_BETWEEN: usize = 32;
+
 /// A way by its place in [`Graph::ways`].
 pub(super) type WayId = usize;
 
@@ -60,6 +63,9 @@ pub(super) struct Graph<W> {
     pub(super) negative_into: Vec<Vec<EdgeId>>,
     /// For each node, the upper-case edges of the network that end there.
     pub(super) upper_into: Vec<Vec<EdgeId>>,
+    /// For each node, those that it comes after in every execution, because a negative plain edge of
+    /// the network leads to them, or because they activate the link that ends there.
+    pub(super) earlier: Vec<Vec<NodeId>>,
     /// The number of edges that are the network's own: two for each link, after those of the
     /// requirements.
     pub(super) given: usize,
@@ -74,10 +80,14 @@ impl<W: Weight> Graph<W> {
             positive_into: vec![Vec::new(); count],
             negative_into: vec![Vec::new(); count],
             upper_into: vec![Vec::new(); count],
+            earlier: vec![Vec::new(); count],
             given: 0,
         };
         for id in network.requirements.constraint_ids() {
             let constraint = network.requirements.constraint(id);
+            if constraint.bound < W::zero() {
+                graph.earlier[constraint.from.index()].push(constraint.to);
+            }
             graph.add(Edge {
                 from: constraint.from,
                 to: constraint.to,
@@ -88,6 +98,7 @@ impl<W: Weight> Graph<W> {
         }
         for id in network.link_ids() {
             let link = network.link(id);
+            graph.earlier[link.end.index()].push(link.activation);
             graph.add(Edge {
                 from: link.activation,
                 to: link.end,
@@ -138,6 +149,7 @@ impl<W: Weight> Graph<W> {
             positive_into: self.positive_into,
             negative_into: self.negative_into,
             upper_into: self.upper_into,
+            earlier: self.earlier,
             given: self.given,
         }
     }
@@ -152,6 +164,24 @@ impl<W: Weight> Graph<W> {
         }
         self.edges.push(edge);
         id
+    }
+
+    /// Whether it shows after a few steps that one node comes after the other in every execution.
+    pub(super) fn is_after(&self, later: NodeId, first: NodeId) -> bool {
+        let mut between = vec![later];
+        let mut next = 0;
+        while let Some(&node) = between.get(next) {
+            next += 1;
+            for &earlier in &self.earlier[node.index()] {
+                if earlier == first {
+                    return true;
+                }
+                if between.len() < MOST_BETWEEN && !between.contains(&earlier) {
+                    between.push(earlier);
+                }
+            }
+        }
+        false
     }
 
     /// The edges of the network behind an edge, from its `from` to its `to`; at most so many.
