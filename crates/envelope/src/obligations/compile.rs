@@ -4,7 +4,7 @@ mod changes;
 mod guards;
 
 use std::cell::OnceCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_model::Task;
@@ -49,10 +49,15 @@ impl Obligations {
             over_all: Vec::new(),
         };
         let substitution = Arc::new(substitution.clone());
+        let open = plan.parameters.iter().filter_map(|it| match it.kind {
+            ParameterKind::Duration(instance) => Some(instance),
+            _ => None,
+        });
         let compiler = Compiler {
             task,
             plan,
             order,
+            open: open.collect(),
             substitution,
         };
         let mut runs = vec![Run {
@@ -96,6 +101,8 @@ struct Compiler<'a> {
     plan: &'a ParametrizedPlan,
     /// All nodes in nominal order.
     order: Vec<NodeId>,
+    /// The actions whose durations are open.
+    open: BTreeSet<InstanceId>,
     substitution: Arc<Substitution>,
 }
 
@@ -224,12 +231,7 @@ impl Compiler<'_> {
                 }],
             });
         }
-        let is_open = self
-            .plan
-            .parameters
-            .iter()
-            .any(|parameter| parameter.kind == ParameterKind::Duration(instance));
-        if is_open {
+        if self.open.contains(&instance) {
             return Ok(());
         }
         for (index, constraint) in body.duration.iter().enumerate() {

@@ -19,10 +19,10 @@
 //! stays where it is, and what falls short of it is handed from the waits to the plain edges).
 //!
 //! An edge found that is not negative asks that its end is not too long after its beginning. Where the end
-//! comes first in any case, that says nothing, and the edge is left out. The form stays dispatchable without
-//! it: whoever reckons with it has executed the end before, and so has whatever the end comes after. Where
-//! many wait for each other only because each waits for what came long before, these are nearly all
-//! edges there are.
+//! comes first in any case, that says nothing, nor does a wait of what comes after the link's end in any case:
+//! such edges are left out, where many are found. The form stays dispatchable without them: whoever would
+//! reckon with one has done what it comes after, and so has whatever that comes after. Where much waits only
+//! because it waits for what came long before, these are nearly all edges there are.
 //!
 //! O(n³) at worst (Dijkstra's algorithm for each negative node); in the networks of plans, where
 //! ways end after a few edges, in proportion to their size.
@@ -295,6 +295,8 @@ impl<'a, W: Weight> Search<'a, W> {
             origin: Origin::Way(way),
         };
         match frame.label {
+            // It waits for that in any case.
+            Some(link) if self.graph.is_after(node, links.link(link).end) => false,
             // The link cannot have ended before: it holds in any case.
             Some(link) if distance >= Extended::from(links.link(link).lower.clone()).negated() => {
                 if node == frame.node {

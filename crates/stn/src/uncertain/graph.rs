@@ -2,6 +2,7 @@
 
 use super::conflict::{Ground, Step};
 use super::extended::Extended;
+use super::order::Order;
 use super::{LinkId, UncertainNetwork};
 use crate::{ConstraintId, NodeId, Weight};
 
@@ -38,8 +39,10 @@ pub(super) enum Origin {
     Way(WayId),
 }
 
-/// The limit on the nodes looked at to see that one comes after another.
-const MOST_BETWEEN: usize = 32;
+/// Where searches find more edges than this multiple of the network's, or where there are no more than
+/// that, it is asked whether an edge says anything.
+const FEW: usize = 2;
+const SMALL: usize = 100;
 
 /// A way by its place in [`Graph::ways`].
 pub(super) type WayId = usize;
@@ -63,9 +66,11 @@ pub(super) struct Graph<W> {
     pub(super) negative_into: Vec<Vec<EdgeId>>,
     /// For each node, the upper-case edges of the network that end there.
     pub(super) upper_into: Vec<Vec<EdgeId>>,
-    /// For each node, those that it comes after in every execution, because a negative plain edge of
-    /// the network leads to them, or because they activate the link that ends there.
-    pub(super) earlier: Vec<Vec<NodeId>>,
+    /// For each node, those that it comes after in every execution, because a negative edge of the
+    /// network leads to them, plain or of a link. (That of a link without any duration is not negative.)
+    earlier: Vec<Vec<NodeId>>,
+    /// What follows from that, once it was asked.
+    order: Option<Order>,
     /// The number of edges that are the network's own: two for each link, after those of the
     /// requirements.
     pub(super) given: usize,
@@ -81,6 +86,7 @@ impl<W: Weight> Graph<W> {
             negative_into: vec![Vec::new(); count],
             upper_into: vec![Vec::new(); count],
             earlier: vec![Vec::new(); count],
+            order: None,
             given: 0,
         };
         for id in network.requirements.constraint_ids() {
@@ -98,7 +104,6 @@ impl<W: Weight> Graph<W> {
         }
         for id in network.link_ids() {
             let link = network.link(id);
-            graph.earlier[link.end.index()].push(link.activation);
             graph.add(Edge {
                 from: link.activation,
                 to: link.end,
@@ -111,6 +116,9 @@ impl<W: Weight> Graph<W> {
                 .clone()
                 .map_or_else(Extended::infinity, Into::into);
             let is_upper = upper > Extended::zero();
+            if is_upper {
+                graph.earlier[link.end.index()].push(link.activation);
+            }
             graph.add(Edge {
                 from: link.end,
                 to: link.activation,
@@ -150,6 +158,7 @@ impl<W: Weight> Graph<W> {
             negative_into: self.negative_into,
             upper_into: self.upper_into,
             earlier: self.earlier,
+            order: None,
             given: self.given,
         }
     }
@@ -166,22 +175,14 @@ impl<W: Weight> Graph<W> {
         id
     }
 
-    /// Whether it shows after a few steps that one node comes after the other in every execution.
-    pub(super) fn is_after(&self, later: NodeId, first: NodeId) -> bool {
-        let mut between = vec![later];
-        let mut next = 0;
-        while let Some(&node) = between.get(next) {
-            next += 1;
-            for &earlier in &self.earlier[node.index()] {
-                if earlier == first {
-                    return true;
-                }
-                if between.len() < MOST_BETWEEN && !between.contains(&earlier) {
-                    between.push(earlier);
-                }
-            }
+    /// Whether a node comes after another in every execution, as far as that is asked: it takes a while to
+    /// find out, and is worth it only where much is found.
+    pub(super) fn is_after(&mut self, later: NodeId, first: NodeId) -> bool {
+        if self.given > SMALL && self.edges.len() <= FEW * self.given {
+            return false;
         }
-        false
+        let order = self.order.get_or_insert_with(|| Order::new(&self.earlier));
+        order.is_after(later, first)
     }
 
     /// The edges of the network behind an edge, from its `from` to its `to`; at most so many.
