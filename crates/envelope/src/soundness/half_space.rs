@@ -30,18 +30,30 @@ struct Place {
 }
 
 impl Soundness {
-    /// What every box inside the envelope satisfies because of what is broken in this one; `None`
-    /// if that is nothing linear.
-    pub(crate) fn row(
+    /// What every box inside the envelope satisfies because of each of these, which are broken in this
+    /// one; `None` if that is nothing linear.
+    pub(crate) fn rows(
         &self,
         plan: &ParametrizedPlan,
-        broken: &Broken,
+        broken: &[Broken],
         envelope: &DecoupledEnvelope,
-    ) -> Option<Row> {
-        let case = &broken.case;
+    ) -> Vec<Option<Row>> {
         let places = places(&self.reduction);
+        let cases = broken.iter().map(|broken| &broken.case);
+        cases
+            .map(|case| self.row(plan, case, envelope, &places))
+            .collect()
+    }
+
+    fn row(
+        &self,
+        plan: &ParametrizedPlan,
+        case: &BadCase,
+        envelope: &DecoupledEnvelope,
+        places: &[Place],
+    ) -> Option<Row> {
         let row = |expression: &Linear, is_strict: bool| {
-            let row = half_space(&self.reduction, &places, expression, is_strict)?;
+            let row = half_space(&self.reduction, places, expression, is_strict)?;
             (!row.holds_in(envelope)).then_some(row)
         };
         match (&case.differences[..], &case.inequalities[..]) {
