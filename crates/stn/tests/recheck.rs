@@ -140,7 +140,7 @@ fn whole_numbers_change_nothing() {
             upper: link.upper.map(seventh),
         });
         let fractions = UncertainNetwork::new(requirements, links.collect()).unwrap();
-        match (fractions.dynamic(), fractions.dispatchable()) {
+        match (fractions.executable(), fractions.dispatchable()) {
             (Ok(one), Ok(other)) => {
                 assert!(one.edges().eq(other.edges()), "seed {seed}");
                 assert!(one.waits().eq(other.waits()), "seed {seed}");

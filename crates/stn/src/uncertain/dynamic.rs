@@ -20,7 +20,7 @@
 //!
 //! An edge found that is not negative asks that its end is not too long after its beginning. Where the end
 //! comes first in any case, that says nothing, nor does a wait of what comes after the link's end in any case:
-//! such edges are left out, where many are found. The form stays dispatchable without them: whoever would
+//! such edges are left out, where many are found, unless all are asked for. The form stays dispatchable without them: whoever would
 //! reckon with one has done what it comes after, and so has whatever that comes after. Where much waits only
 //! because it waits for what came long before, these are nearly all edges there are.
 //!
@@ -42,11 +42,23 @@ use crate::{NodeId, Weight};
 const MOST_STEPS: usize = 10_000;
 
 impl<W: Weight> UncertainNetwork<W> {
-    /// The network's dispatchable form, if it is dynamically controllable.
+    /// The network's dispatchable form with all edges that were found, if it is dynamically controllable:
+    /// what shows that it is.
     ///
     /// # Errors
     /// The cycle that shows that it is not.
     pub fn dynamic(&self) -> Result<Dispatchable<W>, Conflict<W>> {
+        let mut graph = Graph::new(self);
+        graph.is_full = true;
+        let graph = self.search_in(graph, true)?;
+        Ok(Dispatchable::new(self.clone(), graph))
+    }
+
+    /// The same with what executing it needs.
+    ///
+    /// # Errors
+    /// The cycle that shows that it is not dynamically controllable.
+    pub fn executable(&self) -> Result<Dispatchable<W>, Conflict<W>> {
         let graph = self.search(true)?;
         Ok(Dispatchable::new(self.clone(), graph))
     }
@@ -64,7 +76,10 @@ impl<W: Weight> UncertainNetwork<W> {
     }
 
     pub(super) fn search(&self, keeps_edges: bool) -> Result<Graph<W>, Conflict<W>> {
-        let mut graph = Graph::new(self);
+        self.search_in(Graph::new(self), keeps_edges)
+    }
+
+    fn search_in(&self, mut graph: Graph<W>, keeps_edges: bool) -> Result<Graph<W>, Conflict<W>> {
         let mut search = Search::new(self, &mut graph, keeps_edges);
         for node in self.requirements.nodes() {
             search.settle(node)?;

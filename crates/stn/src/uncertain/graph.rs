@@ -71,6 +71,8 @@ pub(super) struct Graph<W> {
     earlier: Vec<Vec<NodeId>>,
     /// What follows from that, once it was asked.
     order: Option<Order>,
+    /// Whether every edge that is found is kept.
+    pub(super) is_full: bool,
     /// The number of edges that are the network's own: two for each link, after those of the
     /// requirements.
     pub(super) given: usize,
@@ -87,6 +89,7 @@ impl<W: Weight> Graph<W> {
             upper_into: vec![Vec::new(); count],
             earlier: vec![Vec::new(); count],
             order: None,
+            is_full: false,
             given: 0,
         };
         for id in network.requirements.constraint_ids() {
@@ -159,6 +162,7 @@ impl<W: Weight> Graph<W> {
             upper_into: self.upper_into,
             earlier: self.earlier,
             order: None,
+            is_full: self.is_full,
             given: self.given,
         }
     }
@@ -178,7 +182,8 @@ impl<W: Weight> Graph<W> {
     /// Whether a node comes after another in every execution, as far as that is asked: it takes a while to
     /// find out, and is worth it only where much is found.
     pub(super) fn is_after(&mut self, later: NodeId, first: NodeId) -> bool {
-        if self.given > SMALL && self.edges.len() <= FEW * self.given {
+        let is_little = self.given > SMALL && self.edges.len() <= FEW * self.given;
+        if self.is_full || is_little {
             return false;
         }
         let order = self.order.get_or_insert_with(|| Order::new(&self.earlier));

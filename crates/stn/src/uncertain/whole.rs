@@ -100,7 +100,7 @@ impl UncertainNetwork<Rational> {
         })
     }
 
-    /// [`dynamic`](Self::dynamic), in whole numbers where they do.
+    /// [`executable`](Self::executable), in whole numbers where they do.
     ///
     /// # Errors
     /// The cycle that shows that the network is not dynamically controllable.
