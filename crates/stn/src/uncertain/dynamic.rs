@@ -48,9 +48,7 @@ impl<W: Weight> UncertainNetwork<W> {
     /// # Errors
     /// The cycle that shows that it is not.
     pub fn dynamic(&self) -> Result<Dispatchable<W>, Conflict<W>> {
-        let mut graph = Graph::new(self);
-        graph.is_full = true;
-        let graph = self.search_in(graph, true)?;
+        let graph = self.search(true, true)?;
         Ok(Dispatchable::new(self.clone(), graph))
     }
 
@@ -59,27 +57,26 @@ impl<W: Weight> UncertainNetwork<W> {
     /// # Errors
     /// The cycle that shows that it is not dynamically controllable.
     pub fn executable(&self) -> Result<Dispatchable<W>, Conflict<W>> {
-        let graph = self.search(true)?;
+        let graph = self.search(true, false)?;
         Ok(Dispatchable::new(self.clone(), graph))
     }
 
     /// Why the network is not dynamically controllable; `None` if it is. Quicker than
     /// [`dynamic`](Self::dynamic), because what only dispatching needs is left out.
     pub fn conflict(&self) -> Option<Conflict<W>> {
-        self.search(false).err()
+        self.search(false, false).err()
     }
 
     /// Whether a strategy that decides with nothing but what has been observed satisfies every
     /// requirement whatever the world does.
     pub fn is_dynamically_controllable(&self) -> bool {
-        self.search(false).is_ok()
+        self.search(false, false).is_ok()
     }
 
-    pub(super) fn search(&self, keeps_edges: bool) -> Result<Graph<W>, Conflict<W>> {
-        self.search_in(Graph::new(self), keeps_edges)
-    }
-
-    fn search_in(&self, mut graph: Graph<W>, keeps_edges: bool) -> Result<Graph<W>, Conflict<W>> {
+    /// With all edges that are found if it `is_full`, else without those that say nothing.
+    pub(super) fn search(&self, keeps_edges: bool, is_full: bool) -> Result<Graph<W>, Conflict<W>> {
+        let mut graph = Graph::new(self);
+        graph.is_full = is_full;
         let mut search = Search::new(self, &mut graph, keeps_edges);
         for node in self.requirements.nodes() {
             search.settle(node)?;
