@@ -53,10 +53,10 @@ impl Oracle {
             })
         });
         let cuts: Vec<Cut> = cuts.collect();
-        Ok(match cuts.is_empty() {
-            true => Learnt::Unknown,
-            false => Learnt::Cuts(cuts),
-        })
+        if cuts.is_empty() {
+            return Ok(Learnt::Unknown);
+        }
+        Ok(Learnt::Cuts(cuts))
     }
 
     /// Takes a box that includes the accepted one for the accepted one, if it is inside the envelope;
