@@ -62,6 +62,9 @@ pub(crate) fn run(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
         && let Some(late) = worlds.late_start(number)
     {
         let outcome = ready.run_late(&mut worlds.late(&late, number), &late.action);
+        // What a late start excuses does not happen where that start is in time.
+        let outcome =
+            outcome.unwrap_or_else(|| ready.run(executor, &mut worlds.drawn(Kind::Late, number)));
         return tally.add(Kind::Late, &label, &outcome);
     }
     let kind = if (number / 2).is_multiple_of(2) {

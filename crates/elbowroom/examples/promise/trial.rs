@@ -5,12 +5,8 @@ use std::sync::Arc;
 
 use elbowroom::envelope::{Guarantee, Oracle, StopReason, irr};
 use elbowroom::execute::{Analyst, Execution};
-use elbowroom::execution::run::{
-    ExecutedStep, Patience, PlanningTime, Report, RunSettings, Verdict,
-};
-use elbowroom::execution::{
-    Cause, Forms, Need, NoPlanner, PrepareError, Prepared, Preparer, World,
-};
+use elbowroom::execution::run::{Patience, PlanningTime, Report, RunSettings, Verdict};
+use elbowroom::execution::{Forms, Need, NoPlanner, PrepareError, Prepared, Preparer, World};
 use elbowroom::flow;
 use elbowroom::model::validate::{self, validate};
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -18,6 +14,7 @@ use elbowroom::num::Rational;
 use elbowroom::plan::DecoupledEnvelope;
 use elbowroom::sim::{SimWorld, WorldModel};
 
+use super::lateness;
 use super::subject::Subject;
 
 /// A plan made ready for every executor.
@@ -122,23 +119,12 @@ impl<'a> Ready<'a> {
         self.outcome(&report)
     }
 
-    /// Runs with `guarded` in a world in which this action starts late. It may be too late for the plan, but
-    /// that is known as soon as it has started.
-    pub(crate) fn run_late(&self, world: &mut dyn World, late: &str) -> Outcome {
+    /// Runs with `guarded` in a world in which this action starts late; `None` if it ended because of
+    /// that, before anybody could know.
+    pub(crate) fn run_late(&self, world: &mut dyn World, late: &str) -> Option<Outcome> {
         let report = self.report("guarded", world);
-        let is_known = |executed: &ExecutedStep| {
-            executed.step.action.name == late && executed.step.start < report.time
-        };
-        let is_too_late = report.reasons.first().is_some_and(|reason| {
-            reason.cause == Cause::Unreachable && !report.executed.iter().any(is_known)
-        });
-        if is_too_late {
-            return Outcome {
-                failure: None,
-                why: "too late".to_owned(),
-            };
-        }
-        self.outcome(&report)
+        let is_excused = lateness::excuses(&self.subject.task, &self.open, &report, late);
+        (!is_excused).then(|| self.outcome(&report))
     }
 
     pub(crate) fn report(&self, executor: &str, world: &mut dyn World) -> Report {
