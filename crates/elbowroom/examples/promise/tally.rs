@@ -57,7 +57,7 @@ pub(crate) fn run(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
         let outcome = ready.run(executor, &mut world);
         return tally.add(Kind::Spoiler, &label, &outcome);
     }
-    if number % 2 == 0
+    if number.is_multiple_of(2)
         && (number / 2) % LATE == LATE - 1
         && let Some(late) = worlds.late_start(number)
     {
