@@ -66,8 +66,8 @@ impl Attendance {
         }
     }
 
-    /// A record that attendants see, too. Where it is not `written_ahead`, a request counts as taken
-    /// in as soon as it is recorded.
+    /// A record that attendants see, too. Where it is not `written_ahead`, a request is recorded as
+    /// soon as this sees it.
     pub(crate) fn witnessed<R: Recorder>(
         &self,
         inner: R,
@@ -79,6 +79,7 @@ impl Attendance {
             task: Arc::clone(task),
             attendants: self.0.clone(),
             written_ahead,
+            to_come: 0,
         }
     }
 }
@@ -89,6 +90,8 @@ pub(crate) struct Witnessed<R> {
     task: Arc<Task>,
     attendants: Option<Attendants>,
     written_ahead: bool,
+    /// How many of the observations that were handed to the run it has not taken in yet.
+    to_come: usize,
 }
 
 impl<R: Recorder> Recorder for Witnessed<R> {
@@ -100,8 +103,21 @@ impl<R: Recorder> Recorder for Witnessed<R> {
                 let line = Line::of(&self.task, entry);
                 board.add(&format!("{}\n", line.text()));
             }
-            if !self.written_ahead && matches!(entry, Entry::Passed { .. }) {
-                attendants.desk.acknowledge();
+            let desk = &attendants.desk;
+            match entry {
+                Entry::Passed { observations, .. } => {
+                    self.to_come = observations.len();
+                    if !self.written_ahead {
+                        desk.note_recorded();
+                    }
+                }
+                Entry::Taken { .. } => {
+                    self.to_come = self.to_come.saturating_sub(1);
+                }
+                _ => return,
+            }
+            if self.to_come == 0 {
+                desk.acknowledge();
             }
         }
     }

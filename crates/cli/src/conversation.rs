@@ -7,6 +7,8 @@ mod pipes;
 pub(crate) use listener::{Ability, Greeting, Listener, Said, hello, is_time};
 pub(crate) use pipes::{Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Mouth, Told};
 
+use std::io;
+use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
@@ -19,8 +21,8 @@ use crate::words::plain;
 /// In words, when it cannot be started.
 pub(crate) fn launch(command: &str) -> Result<(Child, Mouth, Ears), String> {
     let mut words = command.split_whitespace();
-    let program = words.next().ok_or("the command is empty")?;
-    let mut program = Command::new(program);
+    let name = words.next().ok_or("the command is empty")?;
+    let mut program = Command::new(name);
     program
         .args(words)
         .stdin(Stdio::piped())
@@ -28,10 +30,24 @@ pub(crate) fn launch(command: &str) -> Result<(Child, Mouth, Ears), String> {
     // Ctrl-C is for this program, which then ends that one in order.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut program, 0);
-    let mut child = program.spawn().map_err(|error| plain(&error))?;
+    let mut child = program.spawn().map_err(|error| no_program(name, &error))?;
     match (child.stdin.take(), child.stdout.take()) {
         (Some(stdin), Some(stdout)) => Ok((child, Mouth::new(stdin), Ears::new(stdout))),
         _ => Err("its standard input and output are not there".to_owned()),
+    }
+}
+
+/// Why this is no program that can be started: of a folder, the system only says that it is forbidden.
+fn no_program(name: &str, error: &io::Error) -> String {
+    let path = Path::new(name);
+    if path.is_dir() && path.components().count() > 1 {
+        return format!("`{name}` is a folder, not a program");
+    }
+    match error.kind() {
+        io::ErrorKind::PermissionDenied if path.is_file() => {
+            format!("you may not execute `{name}`; `chmod +x` makes a script a program")
+        }
+        _ => plain(error),
     }
 }
 

@@ -33,9 +33,10 @@ struct Inner {
 #[derive(Default)]
 struct State {
     waiting: VecDeque<Ask>,
-    /// How many were handed in, handed to the run, and taken in by it.
+    /// How many were handed in, handed to the run, recorded, and taken in by it.
     given: u64,
     fetched: u64,
+    recorded: u64,
     taken: u64,
 }
 
@@ -67,9 +68,15 @@ impl Desk {
         state.taken >= number
     }
 
-    /// Whether nothing waits.
+    /// Whether nothing waits to be fetched.
     pub(crate) fn is_empty(&self) -> bool {
         self.lock().waiting.is_empty()
+    }
+
+    /// Whether the run has taken in all that was handed in.
+    pub(crate) fn is_clear(&self) -> bool {
+        let state = self.lock();
+        state.taken == state.given
     }
 
     /// Everything that waits, as observed at `now`.
@@ -102,13 +109,19 @@ impl Desk {
     /// Whether the run was handed something that it has not recorded yet.
     pub(crate) fn has_fetched(&self) -> bool {
         let state = self.lock();
-        state.taken < state.fetched
+        state.recorded < state.fetched
     }
 
     /// What the run was handed is recorded.
+    pub(crate) fn note_recorded(&self) {
+        let mut state = self.lock();
+        state.recorded = state.fetched;
+    }
+
+    /// The run has taken in what is recorded, and whoever asks how it stands is told so.
     pub(crate) fn acknowledge(&self) {
         let mut state = self.lock();
-        state.taken = state.fetched;
+        state.taken = state.recorded;
         drop(state);
         self.0.changed.notify_all();
     }
@@ -121,7 +134,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn a_request_is_taken_when_it_was_fetched_and_recorded() {
+    fn a_request_is_taken_in_after_it_was_fetched_and_recorded() {
         let desk = Desk::default();
         let number = desk
             .hand_in(vec![Ask::Request(Request::Pause)])
@@ -132,7 +145,12 @@ mod tests {
         desk.lock().fetched = number;
         assert!(desk.has_fetched());
         desk.acknowledge();
-        assert!(desk.await_taken(number, soon));
+        assert!(!desk.await_taken(number, soon), "it was not recorded");
+        assert!(!desk.is_clear());
+        desk.note_recorded();
+        assert!(!desk.has_fetched());
+        desk.acknowledge();
+        assert!(desk.await_taken(number, soon) && desk.is_clear());
     }
 
     #[test]

@@ -120,6 +120,21 @@ fn what_is_changed_while_it_runs_is_followed() {
     assert!(!facts.contains(&json!("(done b2)")), "{state}");
 }
 
+/// Who is told that something was taken in sees it in every later answer.
+#[test]
+fn what_was_taken_in_counts_for_the_next_request() {
+    let own = simulated("at-once");
+    own.await_state(|state| state["activity"] != "beginning");
+    // So that no goal is reached meanwhile.
+    assert_eq!(own.post("/v1/pause", &Value::Null).0, 200);
+    for _ in 0..20 {
+        let (status, answer) = own.post("/v1/goals", &json!({"name": "x", "goal": "(done a3)"}));
+        assert_eq!((status, &answer["name"]), (200, &json!("x")), "{answer}");
+        let deleted = [(); 2].map(|()| own.delete("/v1/goals/x"));
+        assert_eq!([deleted[0].0, deleted[1].0], [200, 404], "{deleted:?}");
+    }
+}
+
 #[test]
 fn in_a_pause_nothing_is_started() {
     let own = Executive::start(&folder("pause"), &[DOMAIN, PROBLEM, "--realtime", "10"]);
@@ -334,6 +349,14 @@ fn who_may_not_or_talks_nonsense_gets_one_clear_sentence() {
             json!({"fluent": "(charge r)", "value": "much"}).to_string(),
             422,
             "expected a number",
+        ),
+        (
+            "POST",
+            "/v1/numbers",
+            Some(TOKEN),
+            "[]".to_owned(),
+            422,
+            "is a list, not an object",
         ),
         (
             "GET",

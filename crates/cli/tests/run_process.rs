@@ -316,6 +316,8 @@ fn planning_takes_time_on_a_wall_clock() {
 fn a_world_that_cannot_be_started_ends_the_run_with_a_message() {
     for (command, message) in [
         ("no-such-program", "cannot start the world"),
+        ("./crates", "`./crates` is a folder, not a program"),
+        ("./README.md", "you may not execute `./README.md`"),
         // Whether it is noticed when telling or when listening is a matter of chance.
         ("true", "has ended (exit status: 0)"),
         ("echo hello", ""),

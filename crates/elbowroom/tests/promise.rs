@@ -7,6 +7,8 @@
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 #![allow(dead_code, reason = "the program uses the rest")]
 
+#[path = "../examples/promise/lateness.rs"]
+mod lateness;
 #[path = "../examples/promise/own.rs"]
 mod own;
 #[path = "../examples/promise/planning.rs"]
@@ -26,6 +28,8 @@ mod worlds;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use elbowroom::execution::Cause;
+use elbowroom::execution::run::Report;
 use elbowroom::plan::{BoxEnd, Side};
 use sources::Origin;
 use subject::{Planning, Subject};
@@ -176,6 +180,42 @@ fn own_plan(name: &str) -> Subject {
     let found = own::OWN.iter().find(|own| own[0] == name);
     let [name, domain, problem, plan] = found.expect("a plan of that name");
     Subject::of_texts(["own", name], [domain, problem, plan]).expect("a correct test")
+}
+
+/// The brooding ends before a late shot begins, which excuses that the shot fails. It would not if the
+/// shot had been seen to begin, if the brooding had not ended, if anything else had failed, or if something had
+/// been started that has to wait for the shot.
+#[test]
+fn a_late_start_excuses_only_what_it_is_too_late_for() {
+    let name = "an end that needs another end, which must not have come at the start";
+    let subject = own_plan(name);
+    let ready = Ready::new(&subject, SEARCH).expect("a box");
+    let worlds = Worlds::new(&subject.task, &ready.open, ready.envelope());
+    let excuses =
+        |report: &Report, late: &str| lateness::excuses(&subject.task, &ready.open, report, late);
+    let report = (0..400).find_map(|number| {
+        let late = worlds.late_start(number)?;
+        let report = ready.report("guarded", &mut worlds.late(&late, number));
+        let is_failure = report.reasons.first()?.cause == Cause::Failed;
+        (late.action == "(film)" && is_failure).then_some(report)
+    });
+    let report = report.expect("a start that is too late");
+    assert!(excuses(&report, "(film)"), "{report:#?}");
+    assert!(!excuses(&report, "(brood)"), "{report:#?}");
+    let changed = |change: fn(&mut Report)| {
+        let mut report = report.clone();
+        change(&mut report);
+        excuses(&report, "(film)")
+    };
+    assert!(!changed(|report| report.executed[0].ending = None));
+    assert!(!changed(|report| report.reasons[0].action = None));
+    assert!(!changed(
+        |report| report.reasons[0].cause = Cause::GuaranteeLost
+    ));
+    assert!(!changed(|report| {
+        let again = report.executed[0].clone();
+        report.executed.push(again);
+    }));
 }
 
 #[test]

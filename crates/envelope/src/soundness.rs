@@ -203,6 +203,22 @@ impl Soundness {
         envelope: &DecoupledEnvelope,
         moved: Option<BoxEnd>,
     ) -> Result<Option<Broken>, Refusal> {
+        let mut found = self.all_broken(task, plan, envelope, moved, 1)?;
+        Ok(found.pop())
+    }
+
+    /// The same for `most` obligations at most: those that are the better reasons, if any is.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart, and nothing is known to be broken.
+    pub(crate) fn all_broken(
+        &mut self,
+        task: &Task,
+        plan: &ParametrizedPlan,
+        envelope: &DecoupledEnvelope,
+        moved: Option<BoxEnd>,
+        most: usize,
+    ) -> Result<Vec<Broken>, Refusal> {
         let Self {
             reduction,
             obligations,
@@ -219,7 +235,7 @@ impl Soundness {
         let is_point = envelope.is_point();
         let count = direct.len();
         let first = (*suspect + 1).min(count);
-        let mut found = None;
+        let (mut found, mut apart) = (Vec::new(), Vec::new());
         let upwards = (0..count).filter(|_| is_point);
         let downwards = (0..first).rev().chain((first..count).rev());
         for index in upwards.chain(downwards.filter(|_| !is_point)) {
@@ -228,33 +244,43 @@ impl Soundness {
             let is_separation = matches!(obligation.requirement, Requirement::Separation { .. });
             // What happenings read is known only where those that interfere keep their order, so
             // that they do not is the better reason, and the only one with a counterexample.
-            if found.is_some() && !is_separation || direct.stands(envelope, moved) {
+            let is_enough = found.len() >= most || !apart.is_empty();
+            if is_enough && !is_separation || direct.stands(envelope, moved) {
                 continue;
             }
             let Some(schedules) = schedules.get() else {
-                return Ok(None);
+                return Ok(Vec::new());
             };
             *refutations += 1;
             match schedules.possible(&obligation.bad_cases[direct.case]) {
                 Outcome::Impossible(proofs) => direct.proofs = Some(proofs),
                 Outcome::Possible => {
                     *suspect = index;
-                    found = Some(Broken {
+                    let reasons = if is_separation {
+                        &mut apart
+                    } else {
+                        &mut found
+                    };
+                    reasons.push(Broken {
                         requirement: obligation.requirement.clone(),
                         case: obligation.bad_cases[direct.case].clone(),
                     });
-                    if is_separation {
-                        return Ok(found);
+                    if apart.len() >= most {
+                        return Ok(apart);
                     }
                 }
-                Outcome::Unknown(parameter) => {
+                Outcome::Unknown(parameter) if found.is_empty() && apart.is_empty() => {
                     return Err(Refusal::Coupled {
                         name: plan.parameter(parameter).name.clone(),
                     });
                 }
+                Outcome::Unknown(_) => {}
             }
         }
-        if found.is_some() {
+        if !apart.is_empty() {
+            return Ok(apart);
+        }
+        if !found.is_empty() {
             return Ok(found);
         }
         let is_within = DecoupledEnvelope::ranges(plan).includes(envelope);
@@ -274,23 +300,28 @@ impl Soundness {
                 continue;
             }
             let Some(schedules) = schedules.get() else {
-                return Ok(None);
+                return Ok(Vec::new());
             };
             *refutations += 1;
-            match schedules.prove(task, plan, over_all, is_within, (proof.as_ref(), moved))? {
-                Ok(found) => *proof = Some(found),
-                Err(case) => {
-                    return Ok(Some(Broken {
+            match schedules.prove(task, plan, over_all, is_within, (proof.as_ref(), moved)) {
+                Ok(Ok(new)) => *proof = Some(new),
+                Ok(Err(case)) => {
+                    found.push(Broken {
                         requirement: Requirement::OverAll {
                             instance: over_all.instance,
                             condition: over_all.condition.clone(),
                         },
                         case,
-                    }));
+                    });
+                    if found.len() >= most {
+                        break;
+                    }
                 }
+                Err(refusal) if found.is_empty() => return Err(refusal),
+                Err(_) => break,
             }
         }
-        Ok(None)
+        Ok(found)
     }
 
     /// Values and a schedule in the box that break the obligation as said.

@@ -205,7 +205,8 @@ impl Dispatch {
                 .collect(),
             links: network.links,
         };
-        let form = network.network.dispatchable().map_err(|conflict| {
+        let form = network.network.into_dispatchable();
+        let form = form.map_err(|(_, conflict)| {
             let mut behind: Vec<Behind> = grounds(&conflict.steps)
                 .iter()
                 .filter_map(|limit| sources.of(*limit))

@@ -24,6 +24,7 @@ mod dispatcher;
 mod dynamic;
 mod extended;
 mod graph;
+mod order;
 mod recheck;
 mod refutation;
 mod spoiler;

@@ -26,6 +26,7 @@
 
 mod boxes;
 mod grow;
+mod lateness;
 mod nominal;
 mod options;
 mod planning;

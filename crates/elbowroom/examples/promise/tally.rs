@@ -11,6 +11,9 @@ const EXECUTORS: [&str; 2] = ["guarded", "live"];
 /// Of so many runs, one meets the spoiler.
 const SPOILED: u64 = 30;
 
+/// Of so many runs of `guarded`, one meets a start that is late.
+const LATE: u64 = 5;
+
 /// How many runs there were, and how many of them failed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Count {
@@ -44,7 +47,8 @@ impl Tally {
     }
 }
 
-/// The run of that number: kinds of worlds and executors take turns.
+/// The run of that number: kinds of worlds and executors take turns. What is promised after a start that is
+/// late, `guarded` promises alone.
 pub(crate) fn run(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &mut Tally) {
     let executor = EXECUTORS[usize::from(number % 2 == 1)];
     let label = format!("{executor}, run {number}");
@@ -52,6 +56,16 @@ pub(crate) fn run(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
     if is_spoiled && let Some(mut world) = worlds.spoiled() {
         let outcome = ready.run(executor, &mut world);
         return tally.add(Kind::Spoiler, &label, &outcome);
+    }
+    if number.is_multiple_of(2)
+        && (number / 2) % LATE == LATE - 1
+        && let Some(late) = worlds.late_start(number)
+    {
+        let outcome = ready.run_late(&mut worlds.late(&late, number), &late.action);
+        // What a late start excuses does not happen where that start is in time.
+        let outcome =
+            outcome.unwrap_or_else(|| ready.run(executor, &mut worlds.drawn(Kind::Late, number)));
+        return tally.add(Kind::Late, &label, &outcome);
     }
     let kind = if (number / 2).is_multiple_of(2) {
         Kind::Uniform

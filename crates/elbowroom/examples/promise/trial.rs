@@ -14,6 +14,7 @@ use elbowroom::num::Rational;
 use elbowroom::plan::DecoupledEnvelope;
 use elbowroom::sim::{SimWorld, WorldModel};
 
+use super::lateness;
 use super::subject::Subject;
 
 /// A plan made ready for every executor.
@@ -116,6 +117,14 @@ impl<'a> Ready<'a> {
     pub(crate) fn run(&self, executor: &str, world: &mut dyn World) -> Outcome {
         let report = self.report(executor, world);
         self.outcome(&report)
+    }
+
+    /// Runs with `guarded` in a world in which this action starts late; `None` if it ended because of
+    /// that, before anybody could know.
+    pub(crate) fn run_late(&self, world: &mut dyn World, late: &str) -> Option<Outcome> {
+        let report = self.report("guarded", world);
+        let is_excused = lateness::excuses(&self.subject.task, &self.open, &report, late);
+        (!is_excused).then(|| self.outcome(&report))
     }
 
     pub(crate) fn report(&self, executor: &str, world: &mut dyn World) -> Report {

@@ -22,18 +22,27 @@ pub(crate) enum Kind {
     Corner,
     /// As spiteful as what has happened so far allows.
     Spoiler,
+    /// Somewhere in the sixteenth of the interval around what is planned, and one action starts late.
+    Late,
 }
 
 impl Kind {
-    pub(crate) const ALL: [Self; 3] = [Self::Uniform, Self::Corner, Self::Spoiler];
+    pub(crate) const ALL: [Self; 4] = [Self::Uniform, Self::Corner, Self::Spoiler, Self::Late];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Uniform => "uniform",
             Self::Corner => "corners",
             Self::Spoiler => "spoiler",
+            Self::Late => "late start",
         }
     }
+}
+
+/// An action that starts later than it is told to.
+pub(crate) struct LateStart {
+    pub(crate) action: String,
+    model: WorldModel,
 }
 
 /// All worlds inside a box of a plan.
@@ -86,6 +95,36 @@ impl<'a> Worlds<'a> {
     /// The world in which durations are drawn so, with that seed.
     pub(crate) fn drawn(&self, kind: Kind, seed: u64) -> Paced<'_, Durations> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        Paced::new(self.sim(), self.durations(kind, &mut rng))
+    }
+
+    /// A start that is late, as drawn with that seed: of an action of which the plan has no other.
+    pub(crate) fn late_start(&self, seed: u64) -> Option<LateStart> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let single = self.instances.iter().filter(|(_, all)| all.len() == 1);
+        let names: Vec<&String> = single.map(|(name, _)| name).collect();
+        let action = *names.get(rng.random_range(0..names.len().max(1)))?;
+        let times = self.prepared.plan.plan.nodes();
+        let whole = times.map(|(node, _)| &self.prepared.nominal[node]).max()?;
+        let late = whole * Rational::new(rng.random_range(1..=200), 1000);
+        let late = late.max(Rational::new(1, 100)).to_decimal(3);
+        let text = format!(
+            "format = \"elbowroom-world\"\nversion = 1\n\
+             [[delay]]\naction = \"{action}\"\nconstant = {late}\n"
+        );
+        let model = WorldModel::read(&text, self.task.problem()).expect("a world file");
+        let action = action.clone();
+        Some(LateStart { action, model })
+    }
+
+    /// The world in which that action starts late, and durations are as drawn with that seed.
+    pub(crate) fn late<'b>(&self, late: &'b LateStart, seed: u64) -> Paced<'b, Durations> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let world = SimWorld::new(Arc::clone(&self.task), &late.model, 0);
+        Paced::new(world, self.durations(Kind::Late, &mut rng))
+    }
+
+    fn durations(&self, kind: Kind, rng: &mut ChaCha8Rng) -> Durations {
         let mut durations = BTreeMap::new();
         for (name, instances) in &self.instances {
             let values = instances.iter().map(|(id, parameter)| match parameter {
@@ -93,13 +132,13 @@ impl<'a> Worlds<'a> {
                     self.envelope.interval(*parameter),
                     &self.prepared.plan.parameter(*parameter).nominal,
                     kind,
-                    &mut rng,
+                    rng,
                 ),
                 None => self.nominal(*id),
             });
             durations.insert(name.clone(), values.collect());
         }
-        Paced::new(self.sim(), Durations::new(durations))
+        Durations::new(durations)
     }
 
     fn nominal(&self, id: InstanceId) -> Rational {
@@ -140,6 +179,11 @@ fn drawn(interval: &Interval, nominal: &Rational, kind: Kind, rng: &mut ChaCha8R
     }
     let share = Rational::new(rng.random_range(0..=1000_i64), 1000);
     let value = &lower + (&upper - &lower) * share;
+    if kind == Kind::Late {
+        // Of infinitely much room, as much again as is planned.
+        let value = nominal + (value - nominal) / Rational::from(16);
+        return value.min(nominal * Rational::from(2));
+    }
     // Few decimals, where there is room for that.
     let rounded = (value * Rational::from(1000)).floor() * thousandth;
     rounded.max(lower)

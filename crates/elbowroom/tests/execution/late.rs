@@ -5,9 +5,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom::execute::Embedded;
 use elbowroom::execution::run::{Report, RunSettings, Verdict};
-use elbowroom::execution::{Ending, Event, Planner, PlannerAnswer};
+use elbowroom::execution::{
+    Command, Ending, Event, NoPlanner, Passage, Planner, PlannerAnswer, World, WorldError,
+};
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
+use elbowroom::sim::SimWorld;
 
 use crate::lasting::scripted::{Notes, Scripted};
 use crate::scene::{Scene, read};
@@ -134,6 +137,69 @@ fn after_a_start_that_is_late_the_envelope_still_counts() {
     };
     assert_eq!(run("12.5").replans, 0);
     assert!(run("15.5").replans > 0);
+}
+
+/// A world that tells what has happened only now and then.
+struct Ticking<'a> {
+    inner: SimWorld<'a>,
+    every: Rational,
+}
+
+impl World for Ticking<'_> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.inner.command(now, command)
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let told = (until / &self.every).ceil() * &self.every;
+        let mut observations = Vec::new();
+        loop {
+            let passage = self.inner.wait(&told)?;
+            observations.extend(passage.observations);
+            if passage.now >= told {
+                let now = passage.now;
+                return Ok(Passage { now, observations });
+            }
+        }
+    }
+}
+
+/// Pumping fills the tank with as much as it takes time, and ten is planned, fifteen the most. When one hears that
+/// the walk has started late, the pump has run for longer: nothing is known of the rest then, although
+/// there is time for all of it.
+#[test]
+fn a_start_that_is_late_is_no_excuse_for_what_has_left_its_interval() {
+    let domain = "(define (domain tank)
+        (:requirements :durative-actions :fluents :timed-initial-literals)
+        (:predicates (open) (pumped) (walked) (closed)) (:functions (level))
+        (:durative-action pump :parameters () :duration (= ?duration 10)
+          :condition () :effect (and (at end (increase (level) ?duration)) (at end (pumped))))
+        (:durative-action walk :parameters () :duration (= ?duration 10)
+          :condition (over all (open)) :effect (at end (walked)))
+        (:durative-action close :parameters () :duration (= ?duration 1)
+          :condition (and (at start (pumped)) (at start (<= (level) 15))) :effect (at end (closed))))";
+    let problem = "(define (problem full) (:domain tank)
+        (:init (open) (at 60 (not (open))) (= (level) 0)) (:goal (and (walked) (closed))))";
+    let plan = "0.001: (pump) [10]\n0.001: (walk) [10]\n10.002: (close) [1]\n";
+    let scene = Scene::new(domain, problem, Some(plan));
+    let run = |pump: &str| {
+        let model = format!(
+            "[[delay]]\naction = \"walk\"\nconstant = 15.5\n\
+             [[duration]]\naction = \"pump\"\nconstant = {pump}\n"
+        );
+        let model = scene.world(&model);
+        let mut world = Ticking {
+            inner: SimWorld::new(Arc::clone(&scene.task), &model, 1),
+            every: Rational::from(16),
+        };
+        let execution = scene.execution("guarded").planned_by(NoPlanner);
+        execution.run_in(&mut world)
+    };
+    let kept = run("12");
+    assert_eq!((&kept.verdict, kept.replans), (&Verdict::GoalReached, 0));
+    let report = run("20");
+    assert_eq!(report.replans, 1, "{report:#?}");
+    assert_eq!(report.time, Rational::from(16), "{report:#?}");
 }
 
 /// In worlds without a clock, as in the papers' experiments, that is the end.

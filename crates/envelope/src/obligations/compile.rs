@@ -5,7 +5,7 @@ mod guards;
 mod nature;
 
 use std::cell::OnceCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_model::Task;
@@ -53,10 +53,15 @@ impl Obligations {
             over_all: Vec::new(),
         };
         let substitution = Arc::new(substitution.clone());
+        let open = plan.parameters.iter().filter_map(|it| match it.kind {
+            ParameterKind::Duration(instance) => Some(instance),
+            _ => None,
+        });
         let compiler = Compiler {
             task,
             plan,
             order,
+            open: open.collect(),
             substitution,
             nature: Nature::of(task, plan, (nominal, around))?,
         };
@@ -104,6 +109,8 @@ struct Compiler<'a> {
     plan: &'a ParametrizedPlan,
     /// All nodes in nominal order.
     order: Vec<NodeId>,
+    /// The actions whose durations are open.
+    open: BTreeSet<InstanceId>,
     substitution: Arc<Substitution>,
     /// What goes on without a plan, if anything does.
     nature: Option<Nature>,
@@ -240,12 +247,7 @@ impl Compiler<'_> {
                 }],
             });
         }
-        let is_open = self
-            .plan
-            .parameters
-            .iter()
-            .any(|parameter| parameter.kind == ParameterKind::Duration(instance));
-        if is_open {
+        if self.open.contains(&instance) {
             return Ok(());
         }
         for (index, constraint) in body.duration.iter().enumerate() {

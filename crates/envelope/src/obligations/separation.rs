@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Footprint, Task};
 
 use super::{BadCase, Difference, Obligation, Requirement};
@@ -13,9 +14,10 @@ use elbowroom_plan::{Bound, Node, NodeId, StnPlan};
 /// `a` is before `c`: only pairs without such a detour are obligations of their own. Nor are pairs
 /// of timed initials at fixed times: the plan is not to blame for when they happen.
 pub(super) fn separations(task: &Task, plan: &StnPlan, order: &[NodeId]) -> Vec<Obligation> {
+    let fixed = fixed(plan);
     interfering_in_order(task, plan, order)
         .into_iter()
-        .filter(|&(first, second)| !is_fixed(plan, first) || !is_fixed(plan, second))
+        .filter(|(first, second)| !fixed.contains(first) || !fixed.contains(second))
         .map(|(first, second)| Obligation {
             requirement: Requirement::Separation { first, second },
             bad_cases: vec![BadCase {
@@ -31,15 +33,15 @@ pub(super) fn separations(task: &Task, plan: &StnPlan, order: &[NodeId]) -> Vec<
         .collect()
 }
 
-/// Whether the node is a group of timed initials at a time that depends on no parameter.
-pub(super) fn is_fixed(plan: &StnPlan, node: NodeId) -> bool {
-    matches!(plan.nodes[node.index()], Node::Timed(_))
-        && plan.constraints.iter().any(|constraint| {
-            constraint.from == NodeId::ZERO
-                && constraint.to == node
-                && constraint.lower == constraint.upper
-                && matches!(constraint.lower, Bound::Finite(_))
-        })
+/// The groups of timed initials at times that depend on no parameter.
+fn fixed(plan: &StnPlan) -> BTreeSet<NodeId> {
+    let at_fixed_times = plan.constraints.iter().filter(|constraint| {
+        constraint.from == NodeId::ZERO
+            && matches!(plan.nodes[constraint.to.index()], Node::Timed(_))
+            && constraint.lower == constraint.upper
+            && matches!(constraint.lower, Bound::Finite(_))
+    });
+    at_fixed_times.map(|constraint| constraint.to).collect()
 }
 
 /// The interfering pairs, earlier node first, less those connected through a third node.
@@ -48,85 +50,135 @@ pub(crate) fn interfering_in_order(
     plan: &StnPlan,
     order: &[NodeId],
 ) -> Vec<(NodeId, NodeId)> {
-    let footprints: Vec<Footprint> = order
-        .iter()
-        .map(|&node| plan.footprint(task, node))
-        .collect();
-    let mut earlier: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); order.len()];
-    for (a, b) in candidates(&footprints) {
-        earlier[a.max(b)].insert(a.min(b));
-    }
-    let words = order.len().div_ceil(64);
-    let mut ancestors: Vec<Vec<u64>> = Vec::with_capacity(order.len());
-    let mut pairs = Vec::new();
-    for (later, candidates) in earlier.iter().enumerate() {
-        let mut reached = vec![0_u64; words];
-        // Latest first, so that a detour is seen before the direct pair.
-        for &candidate in candidates.iter().rev() {
-            if reached[candidate / 64] >> (candidate % 64) & 1 == 0 {
-                pairs.push((order[candidate], order[later]));
-                for (word, more) in reached.iter_mut().zip(&ancestors[candidate]) {
-                    *word |= more;
-                }
-                reached[candidate / 64] |= 1 << (candidate % 64);
-            }
-        }
-        ancestors.push(reached);
-    }
+    let footprints = order.iter().map(|&node| plan.footprint(task, node));
+    let pairs = nearest_pairs(footprints).into_iter();
     pairs
+        .map(|(first, later)| (order[first], order[later]))
+        .collect()
 }
 
-/// All interfering pairs of positions, found through an index of who touches what.
-fn candidates(footprints: &[Footprint]) -> BTreeSet<(usize, usize)> {
-    #[derive(Default)]
-    struct Users {
-        readers: Vec<usize>,
-        adders: Vec<usize>,
-        deleters: Vec<usize>,
+/// The positions of interfering footprints, the earlier one first, less those connected through others.
+fn nearest_pairs(footprints: impl Iterator<Item = Footprint>) -> Vec<(usize, usize)> {
+    let mut neighbours = Neighbours::default();
+    let mut links: Vec<Vec<usize>> = Vec::new();
+    for (later, footprint) in footprints.enumerate() {
+        links.push(nearest(&neighbours.before(later, &footprint), &links));
     }
-    let mut facts: BTreeMap<_, Users> = BTreeMap::new();
-    let mut fluents: BTreeMap<_, Users> = BTreeMap::new();
-    for (position, footprint) in footprints.iter().enumerate() {
-        for &fact in &footprint.reads {
-            facts.entry(fact).or_default().readers.push(position);
+    let pairs = links.iter().enumerate();
+    pairs
+        .flat_map(|(later, links)| links.iter().map(move |&first| (first, later)))
+        .collect()
+}
+
+/// Those of some positions that no way along `links` leads to from others of them, latest first.
+fn nearest(candidates: &BTreeSet<usize>, links: &[Vec<usize>]) -> Vec<usize> {
+    let mut nearest = Vec::new();
+    let mut reached = BTreeSet::new();
+    let mut open = candidates.clone();
+    let mut undecided = candidates.len();
+    // From the latest on, so that all ways to a position have been followed before it.
+    while undecided > 0
+        && let Some(position) = open.pop_last()
+    {
+        if candidates.contains(&position) && !reached.contains(&position) {
+            nearest.push(position);
+            undecided -= 1;
         }
-        for &fact in &footprint.adds {
-            facts.entry(fact).or_default().adders.push(position);
-        }
-        for &fact in &footprint.deletes {
-            facts.entry(fact).or_default().deleters.push(position);
-        }
-        for &fluent in &footprint.reads_fluents {
-            fluents.entry(fluent).or_default().readers.push(position);
-        }
-        for &fluent in &footprint.shifts {
-            fluents.entry(fluent).or_default().adders.push(position);
-        }
-        for &fluent in &footprint.assigns {
-            fluents.entry(fluent).or_default().deleters.push(position);
-        }
-    }
-    let mut pairs = BTreeSet::new();
-    let mut cross = |left: &[usize], right: &[usize]| {
-        for &a in left {
-            for &b in right {
-                if a != b {
-                    pairs.insert((a.min(b), a.max(b)));
-                }
+        for &earlier in &links[position] {
+            if reached.insert(earlier) {
+                open.insert(earlier);
+                undecided -= usize::from(candidates.contains(&earlier));
             }
         }
-    };
-    for users in facts.values() {
-        cross(&users.readers, &users.adders);
-        cross(&users.readers, &users.deleters);
-        cross(&users.adders, &users.deleters);
     }
-    // For fluents, "adders" shift and "deleters" assign; assignments disturb each other too.
-    for users in fluents.values() {
-        cross(&users.readers, &users.adders);
-        cross(&users.readers, &users.deleters);
-        cross(&users.adders, &users.deleters);
-        cross(&users.deleters, &users.deleters);
-    }
-    pairs
+    nearest
 }
+
+/// What a happening does to a fact or fluent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Use {
+    Read,
+    /// A fact becomes true; a fluent is shifted.
+    Add,
+    /// A fact becomes false.
+    Delete,
+    /// A fluent gets a value.
+    Assign,
+}
+
+/// The latest users of a fact or fluent.
+///
+/// Whoever uses it in one way only goes together with those who use it in the same way, unless they
+/// assign; everybody else interferes. So users come in blocks, each of which interferes with
+/// all of the one before, and by way of that with all earlier ones that are not of its own kind.
+#[derive(Clone, Debug, Default)]
+struct Blocks {
+    previous: Vec<usize>,
+    last: Vec<usize>,
+    /// The use of all in the last block, if they go together with others.
+    together: Option<Use>,
+}
+
+impl Blocks {
+    /// One more user: those before that it interferes with, less those that these are known to come
+    /// after.
+    fn add(&mut self, position: usize, uses: &[Use]) -> &[usize] {
+        let together = match uses {
+            [Use::Assign] => None,
+            [only] => Some(*only),
+            _ => None,
+        };
+        if together.is_none() || together != self.together {
+            self.previous = std::mem::take(&mut self.last);
+            self.together = together;
+        }
+        self.last.push(position);
+        &self.previous
+    }
+}
+
+/// Finds interfering happenings through an index of who touches what.
+#[derive(Default)]
+struct Neighbours {
+    facts: BTreeMap<FactId, Blocks>,
+    fluents: BTreeMap<FluentId, Blocks>,
+}
+
+impl Neighbours {
+    /// The earlier positions that this one interferes with, less those connected through others.
+    fn before(&mut self, position: usize, footprint: &Footprint) -> BTreeSet<usize> {
+        let mut facts: BTreeMap<FactId, Vec<Use>> = BTreeMap::new();
+        let of_facts = [
+            (&footprint.reads, Use::Read),
+            (&footprint.adds, Use::Add),
+            (&footprint.deletes, Use::Delete),
+        ];
+        for (used, own) in of_facts {
+            for &fact in used {
+                facts.entry(fact).or_default().push(own);
+            }
+        }
+        let mut fluents: BTreeMap<FluentId, Vec<Use>> = BTreeMap::new();
+        let of_fluents = [
+            (&footprint.reads_fluents, Use::Read),
+            (&footprint.shifts, Use::Add),
+            (&footprint.assigns, Use::Assign),
+        ];
+        for (used, own) in of_fluents {
+            for &fluent in used {
+                fluents.entry(fluent).or_default().push(own);
+            }
+        }
+        let mut before = BTreeSet::new();
+        for (fact, uses) in facts {
+            before.extend(self.facts.entry(fact).or_default().add(position, &uses));
+        }
+        for (fluent, uses) in fluents {
+            before.extend(self.fluents.entry(fluent).or_default().add(position, &uses));
+        }
+        before
+    }
+}
+
+#[cfg(test)]
+mod tests;

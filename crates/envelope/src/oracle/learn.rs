@@ -12,7 +12,7 @@ use crate::obligations::Refusal;
 
 impl Oracle {
     /// Whether the box, which holds the nominal values, is inside the envelope, and if not, what
-    /// that says about others that do.
+    /// that says about others that do: `most` cuts at most.
     ///
     /// Takes about as long as [`objection`](Self::objection); the accepted box stays what it is.
     ///
@@ -40,18 +40,23 @@ impl Oracle {
         let Some(soundness) = &mut self.soundness else {
             return Ok(Learnt::Unknown);
         };
-        let broken = soundness.broken(&self.task, &self.plan, envelope, None)?;
-        let Some(broken) = broken else {
+        let broken = soundness.all_broken(&self.task, &self.plan, envelope, None, most)?;
+        if broken.is_empty() {
             self.proofs_hold_in_last = true;
             return Ok(Learnt::Nothing);
-        };
-        let row = soundness.row(&self.plan, &broken, envelope);
-        Ok(row.map_or(Learnt::Unknown, |row| {
-            Learnt::Cuts(vec![Cut {
-                rows: vec![row],
+        }
+        let rows = soundness.rows(&self.plan, &broken, envelope);
+        let cuts = broken.into_iter().zip(rows).filter_map(|(broken, row)| {
+            Some(Cut {
+                rows: vec![row?],
                 ground: Ground::Condition(broken),
-            }])
-        }))
+            })
+        });
+        let cuts: Vec<Cut> = cuts.collect();
+        if cuts.is_empty() {
+            return Ok(Learnt::Unknown);
+        }
+        Ok(Learnt::Cuts(cuts))
     }
 
     /// Takes a box that includes the accepted one for the accepted one, if it is inside the envelope;

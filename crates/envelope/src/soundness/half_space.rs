@@ -30,18 +30,31 @@ struct Place {
 }
 
 impl Soundness {
-    /// What every box inside the envelope satisfies because of what is broken in this one; `None`
-    /// if that is nothing linear.
-    pub(crate) fn row(
+    /// What every box inside the envelope satisfies because of each of these, which are broken in this
+    /// one; `None` if that is nothing linear.
+    pub(crate) fn rows(
         &self,
         plan: &ParametrizedPlan,
-        broken: &Broken,
+        broken: &[Broken],
         envelope: &DecoupledEnvelope,
-    ) -> Option<Row> {
-        let case = &broken.case;
+    ) -> Vec<Option<Row>> {
         let places = places(&self.reduction);
+        let widest = self.schedules_in(&DecoupledEnvelope::ranges(plan));
+        let cases = broken.iter().map(|broken| &broken.case);
+        cases
+            .map(|case| self.row(plan, case, envelope, (&places, widest.as_ref())))
+            .collect()
+    }
+
+    fn row(
+        &self,
+        plan: &ParametrizedPlan,
+        case: &BadCase,
+        envelope: &DecoupledEnvelope,
+        (places, widest): (&[Place], Option<&ConsistentNetwork<Delta>>),
+    ) -> Option<Row> {
         let row = |expression: &Linear, is_strict: bool| {
-            let row = half_space(&self.reduction, &places, expression, is_strict)?;
+            let row = half_space(&self.reduction, places, expression, is_strict)?;
             (!row.holds_in(envelope)).then_some(row)
         };
         match (&case.differences[..], &case.inequalities[..]) {
@@ -64,8 +77,10 @@ impl Soundness {
                     let expression = at(&inequality.expression, moment, event)?;
                     // Only near the event, so that the bound itself need not be reached.
                     let row = row(&expression, true)?;
-                    self.is_possible(plan, case, &row, moment, event)
-                        .then_some(row)
+                    let is_possible = widest
+                        .is_some_and(|network| self.is_there(network, case, moment, event))
+                        || self.is_possible(plan, case, &row, moment, event);
+                    is_possible.then_some(row)
                 })
             }
             _ => None,
@@ -92,16 +107,30 @@ impl Soundness {
             }
             corner = corner.with_interval(end.parameter, interval);
         }
-        let Ok(network) = ConsistentNetwork::try_from(self.reduction.network(&corner).network)
-        else {
-            return false;
-        };
+        self.schedules_in(&corner)
+            .is_some_and(|network| self.is_there(&network, case, moment, event))
+    }
+
+    /// The network of all schedules for values in a box, if there are any.
+    fn schedules_in(&self, envelope: &DecoupledEnvelope) -> Option<ConsistentNetwork<Delta>> {
+        ConsistentNetwork::try_from(self.reduction.network(envelope).network).ok()
+    }
+
+    /// Whether the moment can be as close to the event as one likes in all schedules of a network, and so
+    /// in all of one that allows fewer.
+    fn is_there(
+        &self,
+        network: &ConsistentNetwork<Delta>,
+        case: &BadCase,
+        moment: NodeId,
+        event: NodeId,
+    ) -> bool {
         // Just before the event all that comes before it has happened, just after it the same.
         [true, false].into_iter().any(|is_before| {
             case.differences.iter().all(|difference| {
                 entails(
                     &self.reduction,
-                    &network,
+                    network,
                     difference,
                     moment,
                     event,

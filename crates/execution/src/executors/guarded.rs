@@ -134,16 +134,19 @@ impl Guard {
             };
             if let Some(end) = self.dispatch.happened(end) {
                 self.values[parameter] = end - start;
-            } else if let Some(most) = self.envelope.interval(parameter).upper.value() {
-                has_outlived |= &local - start > *most;
+            } else {
+                let elapsed = &local - start;
+                has_outlived |= match &self.envelope.interval(parameter).upper {
+                    End::Closed(most) => elapsed > *most,
+                    End::Open(most) => elapsed >= *most,
+                    End::Infinite => false,
+                };
             }
         }
         let was_whole = self.least == Promise::PartOfEnvelope;
-        let is_borne = if was_whole {
-            reason.cause == Cause::Unreachable || self.promise != Promise::Envelope && !has_outlived
-        } else {
-            true
-        };
+        let is_part = self.promise != Promise::Envelope;
+        let is_borne =
+            !was_whole || !has_outlived && (is_part || reason.cause == Cause::Unreachable);
         let stays_inside = self.envelope.contains(&self.values);
         if !stays_inside || !is_borne || !promise::is_about_time(&reason) {
             return Some(Box::new(reason));

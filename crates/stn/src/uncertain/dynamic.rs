@@ -18,6 +18,12 @@
 //! CPAIOR 2014, where links are brought into a normal form with lower bound 0; here the lower bound
 //! stays where it is, and what falls short of it is handed from the waits to the plain edges).
 //!
+//! An edge found that is not negative asks that its end is not too long after its beginning. Where the end
+//! comes first in any case, that says nothing, nor does a wait of what comes after the link's end in any case:
+//! such edges are left out, where many are found, unless all are asked for. The form stays dispatchable without them: whoever would
+//! reckon with one has done what it comes after, and so has whatever that comes after. Where much waits only
+//! because it waits for what came long before, these are nearly all edges there are.
+//!
 //! O(n³) at worst (Dijkstra's algorithm for each negative node); in the networks of plans, where
 //! ways end after a few edges, in proportion to their size.
 
@@ -36,29 +42,41 @@ use crate::{NodeId, Weight};
 const MOST_STEPS: usize = 10_000;
 
 impl<W: Weight> UncertainNetwork<W> {
-    /// The network's dispatchable form, if it is dynamically controllable.
+    /// The network's dispatchable form with all edges that were found, if it is dynamically controllable:
+    /// what shows that it is.
     ///
     /// # Errors
     /// The cycle that shows that it is not.
     pub fn dynamic(&self) -> Result<Dispatchable<W>, Conflict<W>> {
-        let graph = self.search(true)?;
+        let graph = self.search(true, true)?;
+        Ok(Dispatchable::new(self.clone(), graph))
+    }
+
+    /// The same with what executing it needs.
+    ///
+    /// # Errors
+    /// The cycle that shows that it is not dynamically controllable.
+    pub fn executable(&self) -> Result<Dispatchable<W>, Conflict<W>> {
+        let graph = self.search(true, false)?;
         Ok(Dispatchable::new(self.clone(), graph))
     }
 
     /// Why the network is not dynamically controllable; `None` if it is. Quicker than
     /// [`dynamic`](Self::dynamic), because what only dispatching needs is left out.
     pub fn conflict(&self) -> Option<Conflict<W>> {
-        self.search(false).err()
+        self.search(false, false).err()
     }
 
     /// Whether a strategy that decides with nothing but what has been observed satisfies every
     /// requirement whatever the world does.
     pub fn is_dynamically_controllable(&self) -> bool {
-        self.search(false).is_ok()
+        self.search(false, false).is_ok()
     }
 
-    pub(super) fn search(&self, keeps_edges: bool) -> Result<Graph<W>, Conflict<W>> {
+    /// With all edges that are found if it `is_full`, else without those that say nothing.
+    pub(super) fn search(&self, keeps_edges: bool, is_full: bool) -> Result<Graph<W>, Conflict<W>> {
         let mut graph = Graph::new(self);
+        graph.is_full = is_full;
         let mut search = Search::new(self, &mut graph, keeps_edges);
         for node in self.requirements.nodes() {
             search.settle(node)?;
@@ -289,6 +307,8 @@ impl<'a, W: Weight> Search<'a, W> {
             origin: Origin::Way(way),
         };
         match frame.label {
+            // It waits for that in any case.
+            Some(link) if self.graph.is_after(node, links.link(link).end) => false,
             // The link cannot have ended before: it holds in any case.
             Some(link) if distance >= Extended::from(links.link(link).lower.clone()).negated() => {
                 if node == frame.node {
@@ -301,7 +321,7 @@ impl<'a, W: Weight> Search<'a, W> {
                     self.graph.edges.push(edge);
                     frame.plain.push(id);
                 } else {
-                    self.graph.add(edge);
+                    self.add(edge);
                 }
                 false
             }
@@ -316,12 +336,19 @@ impl<'a, W: Weight> Search<'a, W> {
             None => {
                 let edge = edge(Kind::Plain);
                 if !edge.bound.is_negative() {
-                    self.graph.add(edge);
+                    self.add(edge);
                 } else if self.keeps_edges {
                     self.graph.edges.push(edge);
                 }
                 true
             }
+        }
+    }
+
+    /// Adds an edge that is not negative, unless it says nothing.
+    fn add(&mut self, edge: Edge<W>) {
+        if !self.graph.is_after(edge.from, edge.to) {
+            self.graph.add(edge);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::conflict::{Ground, Step};
 use super::extended::Extended;
+use super::order::Order;
 use super::{LinkId, UncertainNetwork};
 use crate::{ConstraintId, NodeId, Weight};
 
@@ -38,6 +39,11 @@ pub(super) enum Origin {
     Way(WayId),
 }
 
+/// Where searches find more edges than this multiple of the network's, or where there are no more than
+/// that, it is asked whether an edge says anything.
+const FEW: usize = 2;
+const SMALL: usize = 100;
+
 /// A way by its place in [`Graph::ways`].
 pub(super) type WayId = usize;
 
@@ -60,6 +66,13 @@ pub(super) struct Graph<W> {
     pub(super) negative_into: Vec<Vec<EdgeId>>,
     /// For each node, the upper-case edges of the network that end there.
     pub(super) upper_into: Vec<Vec<EdgeId>>,
+    /// For each node, those that it comes after in every execution, because a negative edge of the
+    /// network leads to them, plain or of a link. (That of a link without any duration is not negative.)
+    earlier: Vec<Vec<NodeId>>,
+    /// What follows from that, once it was asked.
+    order: Option<Order>,
+    /// Whether every edge that is found is kept.
+    pub(super) is_full: bool,
     /// The number of edges that are the network's own: two for each link, after those of the
     /// requirements.
     pub(super) given: usize,
@@ -74,10 +87,16 @@ impl<W: Weight> Graph<W> {
             positive_into: vec![Vec::new(); count],
             negative_into: vec![Vec::new(); count],
             upper_into: vec![Vec::new(); count],
+            earlier: vec![Vec::new(); count],
+            order: None,
+            is_full: false,
             given: 0,
         };
         for id in network.requirements.constraint_ids() {
             let constraint = network.requirements.constraint(id);
+            if constraint.bound < W::zero() {
+                graph.earlier[constraint.from.index()].push(constraint.to);
+            }
             graph.add(Edge {
                 from: constraint.from,
                 to: constraint.to,
@@ -100,6 +119,9 @@ impl<W: Weight> Graph<W> {
                 .clone()
                 .map_or_else(Extended::infinity, Into::into);
             let is_upper = upper > Extended::zero();
+            if is_upper {
+                graph.earlier[link.end.index()].push(link.activation);
+            }
             graph.add(Edge {
                 from: link.end,
                 to: link.activation,
@@ -138,6 +160,9 @@ impl<W: Weight> Graph<W> {
             positive_into: self.positive_into,
             negative_into: self.negative_into,
             upper_into: self.upper_into,
+            earlier: self.earlier,
+            order: None,
+            is_full: self.is_full,
             given: self.given,
         }
     }
@@ -152,6 +177,17 @@ impl<W: Weight> Graph<W> {
         }
         self.edges.push(edge);
         id
+    }
+
+    /// Whether a node comes after another in every execution, as far as that is asked: it takes a while to
+    /// find out, and is worth it only where much is found.
+    pub(super) fn is_after(&mut self, later: NodeId, first: NodeId) -> bool {
+        let is_little = self.given > SMALL && self.edges.len() <= FEW * self.given;
+        if self.is_full || is_little {
+            return false;
+        }
+        let order = self.order.get_or_insert_with(|| Order::new(&self.earlier));
+        order.is_after(later, first)
     }
 
     /// The edges of the network behind an edge, from its `from` to its `to`; at most so many.

@@ -105,28 +105,29 @@ impl UncertainNetwork<Rational> {
     /// # Errors
     /// The cycle that shows that the network is not dynamically controllable.
     pub fn dispatchable(&self) -> Result<Dispatchable<Rational>, Conflict> {
-        let graph = self.searched()?;
+        let graph = self.searched(true)?;
         Ok(Dispatchable::new(self.clone(), graph))
     }
 
-    /// The same, of a network that is in the form afterwards.
+    /// [`executable`](Self::executable), in whole numbers where they do, of a network that is in the form
+    /// afterwards.
     ///
     /// # Errors
     /// The network, and the cycle that shows that it is not dynamically controllable.
     #[allow(clippy::result_large_err, reason = "the network is given back")]
     pub fn into_dispatchable(self) -> Result<Dispatchable<Rational>, (Self, Conflict)> {
-        match self.searched() {
+        match self.searched(false) {
             Ok(graph) => Ok(Dispatchable::new(self, graph)),
             Err(conflict) => Err((self, conflict)),
         }
     }
 
-    fn searched(&self) -> Result<Graph<Rational>, Conflict> {
+    fn searched(&self, is_full: bool) -> Result<Graph<Rational>, Conflict> {
         let Some(whole) = self.whole() else {
-            return self.search(true);
+            return self.search(true, is_full);
         };
         let fraction = |number: i64| whole.unit.fraction(number);
-        let found = whole.network.search(true);
+        let found = whole.network.search(true, is_full);
         found
             .map(|graph| graph.map(fraction))
             .map_err(|conflict| conflict.map(fraction))

@@ -47,7 +47,7 @@ impl Recorder for JournalWriter<'_> {
         if !is_kept {
             self.kept.0.store(true, Ordering::SeqCst);
         } else if let Some(desk) = self.desk.as_ref().filter(|_| has_requests) {
-            desk.acknowledge();
+            desk.note_recorded();
         }
     }
 

@@ -93,8 +93,8 @@ impl Front {
 
     fn abandon(&self, name: &str) -> Result<Taken, Refused> {
         let open = self.run()?.0.goals();
-        // What waits to be taken in may be the goal.
-        if !open.iter().any(|known| known == name) && self.desk().is_empty() {
+        // What is not taken in yet may be the goal.
+        if !open.iter().any(|known| known == name) && self.desk().is_clear() {
             let help = match open.as_slice() {
                 [] => "no goals are open".to_owned(),
                 open => format!("these are open: {}", open.join(", ")),
@@ -234,8 +234,11 @@ fn named(name: String) -> Result<String, Refused> {
 
 /// Reads a body.
 fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, Refused> {
-    serde_json::from_slice(body).map_err(|error| {
-        let help = "GET /v1/openapi.json says what belongs into it";
-        Refused::new(422, format!("the body cannot be read: {error}"), help)
-    })
+    let help = "GET /v1/openapi.json says what belongs into it";
+    if body.trim_ascii_start().starts_with(b"[") {
+        // Serde would take the members in order.
+        return Err(Refused::new(422, "the body is a list, not an object", help));
+    }
+    serde_json::from_slice(body)
+        .map_err(|error| Refused::new(422, format!("the body cannot be read: {error}"), help))
 }

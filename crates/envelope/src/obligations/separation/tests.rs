@@ -1,0 +1,53 @@
+//! The nearest interfering pairs, beside the plain way to find them.
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// Some things done to a few facts and fluents.
+fn footprints() -> impl Strategy<Value = Vec<Footprint>> {
+    let uses = prop::collection::vec((0..6, 0..3_u32), 0..4);
+    let footprint = uses.prop_map(|uses| {
+        let mut footprint = Footprint::default();
+        for (kind, number) in uses {
+            let (fact, fluent) = (FactId(number), FluentId(number));
+            match kind {
+                0 => footprint.reads.insert(fact),
+                1 => footprint.adds.insert(fact),
+                2 => footprint.deletes.insert(fact),
+                3 => footprint.reads_fluents.insert(fluent),
+                4 => footprint.shifts.insert(fluent),
+                _ => footprint.assigns.insert(fluent),
+            };
+        }
+        footprint
+    });
+    prop::collection::vec(footprint, 0..25)
+}
+
+/// All pairs are looked at, and kept if no third footprint is between.
+fn plainly(footprints: &[Footprint]) -> Vec<(usize, usize)> {
+    let count = footprints.len();
+    let mut is_before = vec![vec![false; count]; count];
+    let mut pairs = Vec::new();
+    for later in 0..count {
+        for first in (0..later).rev() {
+            if footprints[first].interferes_with(&footprints[later]) && !is_before[first][later] {
+                pairs.push((first, later));
+                for row in &mut is_before[..=first] {
+                    row[later] |= row[first];
+                }
+                is_before[first][later] = true;
+            }
+        }
+    }
+    pairs
+}
+
+proptest! {
+    #[test]
+    fn the_nearest_pairs_are_those_of_a_look_at_all(footprints in footprints()) {
+        let found = nearest_pairs(footprints.iter().cloned());
+        prop_assert_eq!(found, plainly(&footprints));
+    }
+}
