@@ -59,10 +59,11 @@ fn asked(question: &Value) -> Reply {
 /// Without what depends on the clock.
 fn timeless(document: &str) -> String {
     let lines = document.lines().map(|line| {
-        let is_time = line.trim_start().starts_with("\"seconds\":")
-            || line.trim_start().starts_with("\"first_plan_seconds\":");
+        // What the command advises is about its own options.
+        let own = ["\"seconds\":", "\"first_plan_seconds\":", "\"advice\":"];
+        let is_own = own.iter().any(|key| line.trim_start().starts_with(key));
         let key = line.split(':').next().unwrap_or_default();
-        if is_time {
+        if is_own {
             format!("{key}: 0\n")
         } else {
             format!("{line}\n")

@@ -31,6 +31,7 @@ impl Formula {
             match part {
                 Self::All(inner) => kept.extend(inner),
                 part if part == Self::FALSE => return Self::FALSE,
+                part if kept.contains(&part) => {}
                 part => kept.push(part),
             }
         }
