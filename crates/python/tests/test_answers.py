@@ -88,7 +88,7 @@ def test_rules_of_judgement_can_be_chosen() -> None:
 def test_a_plan_is_found_for_each_case_and_is_valid(case: str) -> None:
     problem = elbowroom.read(CASES / case / "domain.pddl", CASES / case / "problem.pddl")
     if case == "kettle":
-        with pytest.raises(elbowroom.RequestError, match="does not handle processes and events"):
+        with pytest.raises(elbowroom.UnsupportedError, match="does not handle processes and events"):
             problem.plan(time_limit=20, first=True)
         return
     plan = problem.plan(time_limit=20, first=True)
