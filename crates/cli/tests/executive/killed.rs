@@ -310,10 +310,6 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
         };
         // A goal that was taken in is not among the goals at once.
         own.await_state(|_| begins_with_snapshot() && reached(&journal).contains(&name));
-        assert!(
-            step < 4 || reached(&journal).contains("step-2"),
-            "the earlier segments are lost"
-        );
         own.kill();
         for segment in segments(&journal) {
             let replayed = command::elbowroom(&["run", "--replay", &segment]);
@@ -324,6 +320,11 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
     own.post("/v1/stop", &Value::Null);
     assert_eq!(own.end().status.code(), Some(0));
     assert!(!new.exists(), "half a segment is left");
+    // What was there before may have been in the segment that was removed above.
+    let reached = reached(&journal);
+    for name in ["step-3", "step-4"] {
+        assert!(reached.contains(name), "{name} was lost: {reached:?}");
+    }
     let begun = lines(&place, "begun");
     let tickets: BTreeSet<_> = begun.iter().filter_map(|it| it.split(' ').next()).collect();
     assert_eq!(tickets.len(), begun.len(), "begun twice: {begun:#?}");
