@@ -24,9 +24,10 @@ pub(crate) struct Segments {
 impl JournalFile {
     /// The same journal, which is begun anew when it has become long.
     pub(crate) fn in_segments(self, segments: Option<Segments>) -> Self {
-        if segments.is_some() {
+        if let Some(segments) = segments {
             // What a killed program has left half done.
             let _ = fs::remove_file(beside(&self.path, "new"));
+            close_up(&self.path, segments.kept);
         }
         Self { segments, ..self }
     }
@@ -78,11 +79,48 @@ impl JournalFile {
     }
 }
 
-/// Gives a segment that is over a further name, and each earlier one the next number; the oldest one
-/// is forgotten.
+/// Takes back what a program that was killed in [`keep`] has done of it: a segment that has its further
+/// name already is not over, and where a number is missing, the earlier segments are not yet, or not
+/// any more, where they are looked for.
+fn close_up(path: &Path, kept: usize) {
+    let first = beside(path, "1");
+    if kept > 0 && is_one_file(path, &first) {
+        let _ = fs::remove_file(first);
+    }
+    let mut next = 1;
+    for number in 1..=kept {
+        let segment = beside(path, &number.to_string());
+        if !segment.exists() {
+            continue;
+        }
+        // A name that is not free is never taken.
+        if number > next && fs::rename(segment, beside(path, &next.to_string())).is_err() {
+            return;
+        }
+        next += 1;
+    }
+}
+
+/// Whether these are two names for one file.
+#[cfg(unix)]
+fn is_one_file(one: &Path, other: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let number = |path| fs::metadata(path).map(|it| (it.dev(), it.ino()));
+    matches!((number(one), number(other)), (Ok(one), Ok(other)) if one == other)
+}
+
+/// Elsewhere, that cannot be asked; the segment is then kept twice.
+#[cfg(not(unix))]
+fn is_one_file(_: &Path, _: &Path) -> bool {
+    false
+}
+
+/// Gives a segment that is over a further name, and each earlier one the next number, up to the first
+/// number that is free; if none is, the oldest one is forgotten.
 fn keep(path: &Path, kept: usize) -> io::Result<()> {
     let numbered = |number: usize| beside(path, &number.to_string());
-    for number in (1..kept).rev() {
+    let free = (1..kept).find(|number| !numbered(*number).exists());
+    for number in (1..free.unwrap_or(kept)).rev() {
         match fs::rename(numbered(number), numbered(number + 1)) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => {}
@@ -165,6 +203,60 @@ mod tests {
             }
             let files = fs::read_dir(&folder).expect("the folder").count();
             assert_eq!(files, kept + 1, "nothing else is left");
+            fs::remove_dir_all(&folder).expect("the folder is there");
+        }
+    }
+
+    /// Wherever a program is killed while the earlier segments get their next numbers, the next one finds
+    /// them all, without a number that is missing or a segment that is there twice.
+    #[test]
+    fn segments_whose_numbers_were_being_changed_are_all_found() {
+        const KEPT: usize = 5;
+        let segments = Some(Segments {
+            size: 1,
+            kept: KEPT,
+        });
+        // After so many of the steps: three segments get the next number, and the last one its first.
+        for step in 0..=4 {
+            let folder = folder(&format!("renumbered-{step}"));
+            let path = folder.join("run.journal");
+            let numbered = |number: usize| folder.join(format!("run.journal.{number}"));
+            let Ok(journal) = JournalFile::create(&path) else {
+                panic!("it can be made");
+            };
+            let mut journal = journal.in_segments(segments);
+            journal.write("{\"event\":\"header\"}\n");
+            for number in 1..4 {
+                journal.begin_anew(&format!("{{\"snapshot\":{number}}}"));
+            }
+            drop(journal);
+            let whole = |count: usize| {
+                let found = (1..).take_while(|number| numbered(*number).exists());
+                assert_eq!(found.count(), count, "step {step}");
+                let files = fs::read_dir(&folder).expect("the folder").count();
+                assert_eq!(files, count + 1, "step {step}: nothing else is left");
+                for number in 1..=count {
+                    let text = read(&numbered(number));
+                    let of = format!("{{\"snapshot\":{}}}", count - number);
+                    assert_eq!(text.contains(&of), number < count, "step {step}: {text}");
+                }
+            };
+            whole(3);
+            for number in (1..4).rev().take(step) {
+                fs::rename(numbered(number), numbered(number + 1)).expect("renamed");
+            }
+            if step == 4 {
+                fs::hard_link(&path, numbered(1)).expect("a second name");
+            }
+            let text = fs::read_to_string(&path).expect("it is there");
+            let (read, length) = (Journal::read(&text).expect("whole"), text.len() as u64);
+            let Ok(journal) = JournalFile::go_on(&path, &read, length) else {
+                panic!("it can be gone on with");
+            };
+            let mut journal = journal.in_segments(segments);
+            whole(3);
+            assert!(journal.begin_anew("{\"snapshot\":4}"), "step {step}");
+            whole(4);
             fs::remove_dir_all(&folder).expect("the folder is there");
         }
     }
