@@ -62,7 +62,7 @@ fn in_a_problem_of_table_2_the_bounds_are_a_point_apart() {
     assert_eq!(columns.len(), 1);
     let optimum = &columns[0];
     assert!(optimum.upper - optimum.lower <= 0.01, "{optimum:?}");
-    // Too light and too heavy, or too heavy twice, is the end. Both draws are normal, with mean 85 and deviation 25.
+    // Too heavy, and then wrong, is the end. Draws are normal, with mean 85 and deviation 25; wrong is below 60 or above 110.
     let (heavy, wrong) = (0.1587, 0.3173);
     let least = heavy * wrong;
     assert!(

@@ -1,0 +1,291 @@
+//! Where numbers, and what is drawn for them, are cut: where that decides a condition, at once, after amounts that are
+//! known, or drawn a second time. So of a number from which nothing but known amounts has been taken nothing is lost
+//! by the cut.
+
+use std::collections::BTreeSet;
+
+use elbowroom_sim::Side as Part;
+
+use super::{Amount, By, Changed, FAR, Span, UNIT};
+use crate::timed::act::{Act, Snap};
+use crate::timed::world::{Facts, unknown_shape};
+use crate::timed::{NotTabulated, TimedWorld};
+
+/// The most places at which the values of a number, or of what is drawn, are cut.
+const MOST_CUTS: usize = 64;
+
+/// After how many known amounts a condition may decide where to cut.
+const MOST_SUMMED: usize = 8;
+
+impl Amount {
+    /// The most by which the number can change, if it is then no further than that way.
+    fn cut(&self, way: i64) -> i64 {
+        match self.change {
+            Changed::Set | Changed::Added => way,
+            Changed::Taken => -way - 1,
+        }
+    }
+}
+
+impl TimedWorld {
+    /// Enters where numbers are cut, and how what is drawn may come out.
+    pub(in crate::timed) fn cut(&mut self) -> Result<(), NotTabulated> {
+        for place in 0..self.numbers.len() {
+            self.cut_number(place);
+        }
+        for act in 0..self.acts.len() {
+            let of_start = self.draws(&self.acts[act].start)?;
+            self.acts[act].start.draws = of_start;
+            if let Some((_, end)) = &self.acts[act].rest {
+                let of_end = self.draws(end)?;
+                if let Some((_, end)) = &mut self.acts[act].rest {
+                    end.draws = of_end;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn amounts_of(&self, number: usize) -> impl Iterator<Item = &Amount> {
+        let snaps = self.acts.iter().flat_map(|act| {
+            let end = act.rest.iter().map(|(_, end)| end);
+            std::iter::once(&act.start).chain(end)
+        });
+        let amounts = snaps.flat_map(|snap| &snap.amounts);
+        amounts.filter(move |amount| amount.number == number)
+    }
+
+    /// Those of actions with which it is not over.
+    fn amounts_before_goal(&self, number: usize) -> impl Iterator<Item = &Amount> {
+        let acts = self.acts.iter().filter(|act| !act.wins(&self.goal));
+        let snaps = acts.flat_map(|act| {
+            let end = act.rest.iter().map(|(_, end)| end);
+            std::iter::once(&act.start).chain(end)
+        });
+        let amounts = snaps.flat_map(|snap| &snap.amounts);
+        amounts.filter(move |amount| amount.number == number)
+    }
+
+    /// Values that are known from the beginning, or once they are set.
+    fn anchors(&self, number: usize) -> BTreeSet<i64> {
+        let set = self.amounts_of(number).filter_map(|amount| match amount {
+            Amount {
+                change: Changed::Set,
+                by: By::Known(value),
+                ..
+            } => Some(*value),
+            _ => None,
+        });
+        set.chain([self.numbers[number].initial.low]).collect()
+    }
+
+    /// The values at which conditions change, each once.
+    fn thresholds(&self, number: usize) -> BTreeSet<i64> {
+        let first = self.facts.len();
+        let asked_for = self.asked_for();
+        let tests = self.tests.iter().enumerate();
+        let own = tests.filter(|(place, test)| {
+            test.number == number && asked_for & (1 << (first + place)) != 0
+        });
+        own.flat_map(|(_, test)| test.edges()).collect()
+    }
+
+    /// The facts and comparisons that some condition reads.
+    fn asked_for(&self) -> Facts {
+        let of_act = |act: &Act| {
+            let rest = act.rest.as_ref();
+            let rest = rest.map_or(0, |(over_all, end)| {
+                over_all.mentions() | end.needs.mentions()
+            });
+            act.start.needs.mentions() | rest
+        };
+        let of_acts = self.acts.iter().fold(0, |all, act| all | of_act(act));
+        of_acts | self.goal.mentions()
+    }
+
+    /// What known amounts add up to, those of fewer amounts first.
+    fn sums(&self, number: usize) -> Vec<i64> {
+        let steps = self
+            .amounts_before_goal(number)
+            .filter_map(|amount| match amount {
+                Amount {
+                    change: Changed::Added,
+                    by: By::Known(value),
+                    ..
+                } => Some(*value),
+                Amount {
+                    change: Changed::Taken,
+                    by: By::Known(value),
+                    ..
+                } => Some(-*value),
+                _ => None,
+            });
+        let steps: BTreeSet<i64> = steps.collect();
+        let ends: BTreeSet<i64> = &self.anchors(number) | &self.thresholds(number);
+        let range = ends.last().unwrap_or(&0) - ends.first().unwrap_or(&0);
+        let mut all = vec![0];
+        let mut seen = BTreeSet::from([0]);
+        let mut last = vec![0];
+        for _ in 0..MOST_SUMMED {
+            let mut next = Vec::new();
+            for sum in &last {
+                for step in &steps {
+                    let longer: i64 = sum + step;
+                    if longer.abs() <= range && seen.insert(longer) {
+                        next.push(longer);
+                    }
+                }
+            }
+            all.extend(&next);
+            last = next;
+        }
+        all
+    }
+
+    fn cut_number(&mut self, place: usize) {
+        let sums = self.sums(place);
+        let anchors = self.anchors(place);
+        let mut edges = BTreeSet::new();
+        let mut known = BTreeSet::new();
+        let (lowest, highest) = (anchors.first().copied(), anchors.last().copied());
+        let only = |one: Changed, other: Changed| {
+            self.amounts_of(place).all(|amount| match amount.by {
+                By::Known(value) => match amount.change {
+                    Changed::Set => true,
+                    change => (change == one && value >= 0) || (change == other && value <= 0),
+                },
+                By::Drawn { .. } => amount.change == one && self.is_never_negative(amount),
+            })
+        };
+        let only_falls = only(Changed::Taken, Changed::Added);
+        // A number that only rises is never below all that are known, and one that only falls never above.
+        if let Some(lowest) = lowest.filter(|_| only(Changed::Added, Changed::Taken)) {
+            edges.insert(lowest - 1);
+        }
+        for sum in sums {
+            for edge in self.thresholds(place) {
+                let is_beyond = only_falls && highest.is_some_and(|highest| edge - sum > highest);
+                if edges.len() < MOST_CUTS && !is_beyond {
+                    edges.insert(edge - sum);
+                }
+            }
+            for anchor in &anchors {
+                if known.len() < MOST_CUTS {
+                    known.insert(anchor + sum);
+                }
+            }
+        }
+        let drawn = self.amounts_of(place).filter(|amount| amount.is_drawn());
+        for (anchor, half) in drawn.flat_map(|amount| self.halves(amount)) {
+            if edges.len() < MOST_CUTS {
+                edges.insert(anchor + half);
+            }
+        }
+        let number = &mut self.numbers[place];
+        number.edges = edges.into_iter().collect();
+        number.known = known.into_iter().collect();
+    }
+
+    /// From where on what is drawn leads to a threshold in two steps that are alike, and by how much in each.
+    fn halves(&self, amount: &Amount) -> Vec<(i64, i64)> {
+        if amount.change == Changed::Set {
+            return Vec::new();
+        }
+        let anchors = self.anchors(amount.number);
+        let thresholds = self.thresholds(amount.number);
+        let ways = anchors.iter().flat_map(|anchor| {
+            let half = move |edge: &i64| (*anchor, (edge - *anchor).div_euclid(2));
+            thresholds.iter().map(half)
+        });
+        let decides = |(_, half): &(i64, i64)| self.may_be_beyond(amount, amount.cut(*half));
+        ways.filter(decides).collect()
+    }
+
+    /// How likely what is drawn is to be at most that; `None` if its shape is not known.
+    fn share(&self, amount: &Amount, value: i64) -> Option<f64> {
+        let By::Drawn { rule, planned } = &amount.by else {
+            return None;
+        };
+        #[allow(clippy::cast_precision_loss, reason = "far below 2^52")]
+        let value = value as f64 / UNIT as f64;
+        rule.share(value, Part::UpTo, *planned, self.model.resolution.to_f64())
+    }
+
+    /// Whether what is drawn may be more than that, and may be less.
+    fn may_be_beyond(&self, amount: &Amount, value: i64) -> bool {
+        let share = self.share(amount, value);
+        share.is_some_and(|share| share > 1e-9 && share < 1.0 - 1e-9)
+    }
+
+    fn is_never_negative(&self, amount: &Amount) -> bool {
+        self.share(amount, -1).is_some_and(|share| share <= 0.0)
+    }
+
+    /// How what a happening draws may come out.
+    fn draws(&self, snap: &Snap) -> Result<Vec<(f64, Vec<Span>)>, NotTabulated> {
+        let mut all: Vec<(f64, Vec<Span>)> = vec![(1.0, Vec::new())];
+        for amount in &snap.amounts {
+            let parts = match &amount.by {
+                By::Known(value) => vec![(1.0, Span::point(*value))],
+                By::Drawn { .. } => self.parts(amount).ok_or_else(unknown_shape)?,
+            };
+            let longer = all.iter().flat_map(|(weight, before)| {
+                parts.iter().map(move |(p, span)| {
+                    let mut longer = before.clone();
+                    longer.push(*span);
+                    (weight * p, longer)
+                })
+            });
+            all = longer.collect();
+        }
+        Ok(all)
+    }
+
+    /// What is drawn, cut where that decides something, with how likely each part is.
+    fn parts(&self, amount: &Amount) -> Option<Vec<(f64, Span)>> {
+        let lowest = if self.is_never_negative(amount) {
+            0
+        } else {
+            -FAR
+        };
+        let mut parts = Vec::new();
+        let (mut low, mut before) = (lowest, 0.0);
+        for high in self.cuts(amount).into_iter().chain([FAR]) {
+            let until = if high < FAR {
+                self.share(amount, high)?
+            } else {
+                1.0
+            };
+            let p: f64 = until - before;
+            if p > 0.0 {
+                parts.push((p, Span { low, high }));
+            }
+            (low, before) = (high.saturating_add(1), until);
+        }
+        Some(parts)
+    }
+
+    /// Where what is drawn decides something.
+    fn cuts(&self, amount: &Amount) -> BTreeSet<i64> {
+        let number = amount.number;
+        let from = match amount.change {
+            Changed::Set => BTreeSet::from([0]),
+            Changed::Added | Changed::Taken => self.anchors(number),
+        };
+        let ways = self.sums(number).into_iter().flat_map(|sum| {
+            let thresholds = self.thresholds(number).into_iter();
+            let ways =
+                thresholds.flat_map(|edge| from.iter().map(move |anchor| edge - anchor - sum));
+            ways.collect::<Vec<_>>()
+        });
+        let halves = self.halves(amount).into_iter().map(|(_, half)| half);
+        let mut cuts = BTreeSet::new();
+        for way in ways.chain(halves) {
+            let cut = amount.cut(way);
+            if cuts.len() < MOST_CUTS && self.may_be_beyond(amount, cut) {
+                cuts.insert(cut);
+            }
+        }
+        cuts
+    }
+}
