@@ -156,3 +156,16 @@ fn the_fingerprint_of_an_experiment_depends_on_what_it_says_and_stays() {
     let different: std::collections::BTreeSet<_> = others.iter().chain([&same]).collect();
     assert_eq!(different.len(), others.len() + 1);
 }
+
+/// An executor that was not made ready as it should be, without the table of `policy` or with another first plan,
+/// says nothing about executors.
+#[test]
+fn who_is_interrupted_while_getting_ready_makes_no_trial() {
+    let experiment = experiment();
+    let asked = std::sync::atomic::AtomicU64::new(0);
+    let only_at_first = |_| asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) == 0;
+    let results = run(&experiment, WHOLE, &only_at_first).expect("a correct test");
+    assert!(results.is_interrupted);
+    let mut cells = results.cells.iter().flatten();
+    assert!(cells.all(|cell| cell.runs == 0), "{:?}", results.cells);
+}

@@ -64,6 +64,10 @@ impl Setting<'_> {
             return Ok(results);
         }
         let mut common = self.common(goes_on)?;
+        // Whoever was interrupted while getting ready may lack a table, or a plan that was to be chosen.
+        if !goes_on() {
+            return Ok(results);
+        }
         for place in &common.columns {
             beginnings::merge(&mut results.beginnings, &place.beginnings);
         }
