@@ -205,7 +205,7 @@ impl Dispatch {
                 .collect(),
             links: network.links,
         };
-        let form = network.network.into_dispatchable();
+        let form = network.network.into_executable();
         let form = form.map_err(|(_, conflict)| {
             let mut behind: Vec<Behind> = grounds(&conflict.steps)
                 .iter()

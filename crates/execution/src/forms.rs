@@ -57,7 +57,7 @@ impl Forms {
         if let Some(same) = same {
             return same.form();
         }
-        let found = match network.into_dispatchable() {
+        let found = match network.into_executable() {
             Ok(form) => Known::Controllable(Arc::new(form)),
             Err((network, conflict)) => Known::Refused(Arc::new(network), grounds(&conflict.steps)),
         };

@@ -140,7 +140,7 @@ fn whole_numbers_change_nothing() {
             upper: link.upper.map(seventh),
         });
         let fractions = UncertainNetwork::new(requirements, links.collect()).unwrap();
-        let whole = fractions.clone().into_dispatchable();
+        let whole = fractions.clone().into_executable();
         for (one, other) in [
             (fractions.dynamic(), fractions.dispatchable()),
             (

@@ -217,7 +217,8 @@ mod tests {
             kept: KEPT,
         });
         // After so many of the steps: three segments get the next number, and the last one its first.
-        for step in 0..=4 {
+        // Elsewhere it is not known that two names are those of one file.
+        for step in 0..=(if cfg!(unix) { 4 } else { 3 }) {
             let folder = folder(&format!("renumbered-{step}"));
             let path = folder.join("run.journal");
             let numbered = |number: usize| folder.join(format!("run.journal.{number}"));

@@ -52,7 +52,8 @@ impl<W: Weight> UncertainNetwork<W> {
         Ok(Dispatchable::new(self.clone(), graph))
     }
 
-    /// The same with what executing it needs.
+    /// The same without edges and waits that say nothing while it is executed: those between points of which one
+    /// comes after the other anyway.
     ///
     /// # Errors
     /// The cycle that shows that it is not dynamically controllable.

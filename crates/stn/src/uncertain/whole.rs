@@ -115,7 +115,7 @@ impl UncertainNetwork<Rational> {
     /// # Errors
     /// The network, and the cycle that shows that it is not dynamically controllable.
     #[allow(clippy::result_large_err, reason = "the network is given back")]
-    pub fn into_dispatchable(self) -> Result<Dispatchable<Rational>, (Self, Conflict)> {
+    pub fn into_executable(self) -> Result<Dispatchable<Rational>, (Self, Conflict)> {
         match self.searched(false) {
             Ok(graph) => Ok(Dispatchable::new(self, graph)),
             Err(conflict) => Err((self, conflict)),
