@@ -22,7 +22,7 @@ mod spec;
 mod spoiling;
 mod vary;
 
-pub use action_sets::{action_sets, action_sets_to_tabulate};
+pub use action_sets::ActionSets;
 pub use analyst::{Analyst, WholeRegion};
 pub use candidates::{Candidate, Candidates, Limits, Pace};
 pub use execution::{Execution, Listener, execute, read_goal};

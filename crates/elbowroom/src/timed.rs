@@ -60,6 +60,7 @@ mod moments;
 mod numbers;
 mod policy;
 mod projection;
+mod sets;
 mod state;
 mod within;
 mod world;
@@ -72,6 +73,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) use act::{Act, Event, Needs};
 pub(crate) use chances::{Chances, Ends};
 pub use policy::Policy;
+pub use sets::supported;
 pub use within::Within;
 pub(crate) use world::{Facts, TimedWorld};
 
@@ -91,6 +93,9 @@ pub struct Settings {
     /// Sets of actions, such as those of plans: whoever does nothing but these is no better than the
     /// best, but is easier to reckon with.
     pub plans: Vec<Vec<String>>,
+    /// Further sets of actions: those of plans for when one of the [plans](Self::plans) has failed, with what they
+    /// need of it ([`supported`]). They are only looked at where everything happens at known times, after the plans.
+    pub fallbacks: Vec<Vec<String>>,
 }
 
 impl Default for Settings {
@@ -103,6 +108,7 @@ impl Default for Settings {
             horizon: None,
             only: None,
             plans: Vec::new(),
+            fallbacks: Vec::new(),
         }
     }
 }
@@ -208,6 +214,12 @@ pub fn optimum(
         if known.upper - known.lower <= settings.gap {
             return Ok(known);
         }
+        if found.is_bounded() {
+            // What is left between the bounds is not due to a grid.
+            known.stop = Stop::TooManyStates;
+            known.within = search.best.filter(|best| best.lower >= known.lower);
+            return Ok(known);
+        }
     }
     let mut found = refined(&world, known, settings, &|_| true, goes_on)?;
     if found.stop == Stop::TooManyStates
@@ -227,6 +239,13 @@ pub fn optimum(
         found.within = Some(best);
     }
     Ok(found)
+}
+
+/// Whether the process knows all that there is in a task and in a world, and everything happens at known times, if it
+/// happens.
+pub fn happens_at_known_times(task: &Task, model: &WorldModel) -> bool {
+    let world = TimedWorld::new(task, model, &Settings::default());
+    world.is_ok_and(|world| moments::cells(&world).is_some())
 }
 
 /// Whether the process knows all that there is in a task and in a world.

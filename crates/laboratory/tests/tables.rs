@@ -56,8 +56,12 @@ fn in_the_tightest_problem_of_table_1_hardly_anything_need_be_lost() {
 /// the rings: the model lets one pick a workpiece up again that has been thrown away while it was picked up.
 #[test]
 fn in_a_problem_of_table_2_the_bounds_are_a_point_apart() {
-    let mut experiment = experiment("table2_one");
+    let mut experiment = experiment("table2_optimum");
     experiment.columns.truncate(1);
+    // With the largest battery there is one plan only, and what is done when it has failed.
+    for group in &mut experiment.together {
+        group.rows.drain(..group.rows.len() - 1);
+    }
     let columns = optimum_of(&experiment);
     assert_eq!(columns.len(), 1);
     let optimum = &columns[0];

@@ -2,6 +2,8 @@
 
 #[path = "timed/enclosed.rs"]
 mod enclosed;
+#[path = "timed/sets.rs"]
+mod sets;
 #[path = "timed/twin.rs"]
 mod twin;
 

@@ -1,9 +1,16 @@
 //! The actions of plans that differ: what a bound within plans goes by.
 
-use elbowroom_model::{Situation, Task};
-use elbowroom_sim::WorldModel;
+use std::sync::Arc;
 
-use super::{Candidate, Candidates, Embedded, Limits};
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::run::{PlanningTime, RunSettings};
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_sim::WorldModel;
+use indexmap::IndexMap;
+
+use super::{Candidates, Embedded, Limits, Replanning, Rollouts, Tryout};
+use crate::flow;
 use crate::timed::{self, Settings};
 
 /// How many plans there are at most.
@@ -14,59 +21,135 @@ const MOST_PLANS: usize = 8;
 const MOST_SEARCHES: usize = 8;
 const OTHER_STATES: u64 = 10_000;
 
-/// The [sets of actions](Settings::plans) within which a bound is looked for: those of plans that differ, as
-/// the embedded planner makes them from the beginning, also for slow and scarce variants.
-pub fn action_sets(
-    task: &Task,
-    world: &WorldModel,
-    embedded: Embedded<'_>,
-    goes_on: &dyn Fn() -> bool,
-) -> Vec<Vec<String>> {
-    sets(task, world, embedded, &|_| true, goes_on)
+/// In how many samples of the world the first plan is begun to see what comes after it, how many states may be looked
+/// at for all plans that come after it, and how many of these there are at most.
+const SAMPLES: u64 = 24;
+const LATER_STATES: u64 = 10_000;
+const MOST_FALLBACKS: usize = 4;
+
+/// Sets of actions within which a bound is looked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ActionSets {
+    /// Those of plans that differ, as the embedded planner makes them from the beginning, also for slow and scarce
+    /// variants: [`Settings::plans`].
+    pub plans: Vec<Vec<String>>,
+    /// Where everything happens at known times, those of plans that it makes when the first plan has failed in a
+    /// sample of the world, with what they need of the plans before: [`Settings::fallbacks`].
+    pub fallbacks: Vec<Vec<String>>,
 }
 
-/// The same for a [policy](timed::Policy); none where there would be no table for the first of them either.
-pub fn action_sets_to_tabulate(
-    task: &Task,
-    world: &WorldModel,
-    embedded: Embedded<'_>,
-    goes_on: &dyn Fn() -> bool,
-) -> Vec<Vec<String>> {
-    let is_of_use = |first: &[String]| {
-        let settings = Settings {
-            only: Some(first.to_vec()),
-            ..Settings::default()
+impl ActionSets {
+    /// For the yardstick.
+    pub fn new(
+        task: &Task,
+        world: &WorldModel,
+        embedded: Embedded<'_>,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
+        Self::of(task, world, embedded, &|_| true, goes_on)
+    }
+
+    /// For a [policy](timed::Policy); none where there would be no table for the first of them either.
+    pub fn to_tabulate(
+        task: &Task,
+        world: &WorldModel,
+        embedded: Embedded<'_>,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
+        let is_of_use = |first: &[String]| {
+            let settings = Settings {
+                only: Some(first.to_vec()),
+                ..Settings::default()
+            };
+            timed::knows(task, world, &settings)
         };
-        timed::knows(task, world, &settings)
-    };
-    sets(task, world, embedded, &is_of_use, goes_on)
+        Self::of(task, world, embedded, &is_of_use, goes_on)
+    }
+
+    fn of(
+        task: &Task,
+        world: &WorldModel,
+        embedded: Embedded<'_>,
+        is_of_use: &dyn Fn(&[String]) -> bool,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
+        let limits = Limits {
+            most_states: embedded.most_states,
+            improve_states: embedded.improve_states,
+            other_states: OTHER_STATES,
+            searches: MOST_SEARCHES,
+        };
+        // What is only thought of gets no numbers.
+        let thought = task.with_own_table();
+        let situation = Situation::initial(&thought);
+        let replanning = Replanning {
+            all_states: LATER_STATES,
+            ..Replanning::within(&embedded)
+        };
+        let mut source =
+            Candidates::new(&thought, &situation, Some(world), embedded.settings, limits);
+        let mut next = || source.next(&mut |_| goes_on()).map(|found| found.plan);
+        let Some(first) = next().filter(|first| is_of_use(&names(first))) else {
+            return Self::default();
+        };
+        let others = std::iter::from_fn(next).take(MOST_PLANS - 1);
+        let mut plans = vec![names(&first)];
+        plans.extend(others.map(|plan| names(&plan)));
+        let fallbacks = if timed::happens_at_known_times(task, world) {
+            fallbacks(&thought, world, replanning, &first, goes_on)
+        } else {
+            Vec::new()
+        };
+        Self { plans, fallbacks }
+    }
 }
 
-fn sets(
+/// See [`ActionSets::fallbacks`]; those of plans that are made most often first.
+fn fallbacks(
     task: &Task,
     world: &WorldModel,
-    embedded: Embedded<'_>,
-    is_of_use: &dyn Fn(&[String]) -> bool,
-    goes_on: &dyn Fn() -> bool,
+    replanning: Replanning,
+    first: &TimeTriggeredPlan,
+    goes_on: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Vec<String>> {
-    let limits = Limits {
-        most_states: embedded.most_states,
-        improve_states: embedded.improve_states,
-        other_states: OTHER_STATES,
-        searches: MOST_SEARCHES,
+    let rollouts = Rollouts {
+        world: Arc::new(world.clone()),
+        executor: ExecutorSpec::default(),
+        settings: RunSettings {
+            planning_time: PlanningTime::Seconds(Rational::ZERO),
+            ..RunSettings::default()
+        },
+        flow: flow::Settings::default(),
+        likelihoods: Arc::default(),
+        replanning: Some(replanning),
+        is_ready: true,
     };
-    // What is only thought of gets no numbers.
-    let thought = task.with_own_table();
-    let situation = Situation::initial(&thought);
-    let mut source = Candidates::new(&thought, &situation, Some(world), embedded.settings, limits);
-    let names = |candidate: Candidate| -> Vec<String> {
-        let steps = candidate.plan.steps.into_iter();
-        steps.map(|step| step.action.name.clone()).collect()
-    };
-    let mut next = || source.next(&mut |_| goes_on()).map(names);
-    let Some(first) = next().filter(|first| is_of_use(first)) else {
-        return Vec::new();
-    };
-    let others = std::iter::from_fn(next).take(MOST_PLANS - 1);
-    std::iter::once(first).chain(others).collect()
+    let mut tryout = Tryout::new(task, rollouts, goes_on);
+    let mut found: IndexMap<Vec<String>, usize> = IndexMap::new();
+    for sample in 0..SAMPLES {
+        if !goes_on() {
+            break;
+        }
+        let mut before = names(first);
+        for plan in tryout.new_plans(first, sample) {
+            let own = names(&plan);
+            // What goes on as the plans before is none of its own.
+            if own.iter().any(|name| !before.contains(name))
+                && let Ok(mut set) = timed::supported(task, world, &own, &before)
+            {
+                set.sort_unstable();
+                set.dedup();
+                *found.entry(set).or_default() += 1;
+            }
+            before.extend(own);
+        }
+    }
+    found.sort_by(|_, one, _, other| other.cmp(one));
+    found.into_keys().take(MOST_FALLBACKS).collect()
+}
+
+/// The names of a plan's actions.
+fn names(plan: &TimeTriggeredPlan) -> Vec<String> {
+    let steps = plan.steps.iter();
+    steps.map(|step| step.action.name.clone()).collect()
 }

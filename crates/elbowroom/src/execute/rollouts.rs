@@ -125,11 +125,31 @@ impl<'a> Tryout<'a> {
     /// Whether the goal is reached in a sample of the world, beginning with this plan. The same
     /// plan succeeds in the same samples, whatever else was tried out.
     pub fn succeeds(&mut self, plan: &TimeTriggeredPlan, sample: u64) -> bool {
+        self.run(plan, sample, &mut Vec::new()) == Some(Verdict::GoalReached)
+    }
+
+    /// The new plans that are made in a sample of the world, beginning with this plan, without what is under way when
+    /// they begin.
+    pub(super) fn new_plans(
+        &mut self,
+        plan: &TimeTriggeredPlan,
+        sample: u64,
+    ) -> Vec<TimeTriggeredPlan> {
+        let mut made = Vec::new();
+        self.run(plan, sample, &mut made);
+        made
+    }
+
+    /// How a run ends, and the plans that are `made` in it; `None` if the plan is none of the problem's.
+    fn run(
+        &mut self,
+        plan: &TimeTriggeredPlan,
+        sample: u64,
+        made: &mut Vec<TimeTriggeredPlan>,
+    ) -> Option<Verdict> {
         let rollouts = &self.rollouts;
         // Plans that were made later may be about facts that have no number here yet.
-        let Some(plan) = renumbered(&self.task, plan) else {
-            return false;
-        };
+        let plan = renumbered(&self.task, plan)?;
         let task = Arc::new(self.task.with_own_table());
         let (first, later) = if rollouts.is_ready {
             (Some(plan), None)
@@ -146,11 +166,12 @@ impl<'a> Tryout<'a> {
             .planned_by(Scripted {
                 first: later,
                 planner: &mut *self.planner,
+                made,
             })
             .prepared_by(preparer);
         let seed = SEED.wrapping_add(sample);
         let report = execution.run_in(&mut *rollouts.world.world(&task, seed));
-        report.verdict == Verdict::GoalReached
+        Some(report.verdict)
     }
 }
 
@@ -158,14 +179,21 @@ impl<'a> Tryout<'a> {
 struct Scripted<'p> {
     first: Option<TimeTriggeredPlan>,
     planner: &'p mut dyn Planner,
+    /// All others that it gave.
+    made: &'p mut Vec<TimeTriggeredPlan>,
 }
 
 impl Planner for Scripted<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        match self.first.take() {
-            Some(plan) => PlannerAnswer::from(PlanAnswer::Plan(plan)),
-            None => self.planner.plan(task, situation),
+        if let Some(plan) = self.first.take() {
+            return PlannerAnswer::from(PlanAnswer::Plan(plan));
         }
+        let answer = self.planner.plan(task, situation);
+        if let PlanAnswer::Plan(plan) = &answer.answer {
+            let steps = plan.new_steps(situation).to_vec();
+            self.made.push(TimeTriggeredPlan { steps });
+        }
+        answer
     }
 }
 

@@ -225,6 +225,15 @@ impl Act {
             || rest.is_some_and(|(over_all, end)| reads(over_all) || reads(&end.needs))
     }
 
+    /// The facts that it reads.
+    pub(super) fn mentions(&self) -> Facts {
+        let rest = self.rest.as_ref();
+        let later = rest.map_or(0, |(over_all, end)| {
+            over_all.mentions() | end.needs.mentions()
+        });
+        self.start.needs.mentions() | later
+    }
+
     pub(super) fn has_negation(&self) -> bool {
         let rest = self.rest.as_ref();
         self.start.needs.has_negation()

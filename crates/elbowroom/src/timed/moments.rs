@@ -15,186 +15,21 @@
 //! From above they may be longer: what begins in a cell and takes n whole cells and something is ready n cells later,
 //! which is no later than it is, and may end at any time from then on. There are far fewer states then.
 
+mod search;
 mod stretched;
 mod waiting;
 
 use elbowroom_sim::Distribution;
 
-use super::above::Above;
+use super::Side;
 use super::act::Occurs;
-use super::below::{Below, Manner};
 use super::chances::{Chances, NEVER};
 use super::state::{Phase, State};
-use super::within::{constant, fitting};
+use super::within::constant;
 use super::world::{Facts, TimedWorld};
-use super::{Grid, NotTabulated, SLACK, Settings, Side, Stop, graph, step};
 
+pub(super) use search::{Effort, Keeping, bounds};
 pub(super) use stretched::{Alike, Reasons};
-
-/// Bounds from both sides where everything happens at known times.
-pub(super) struct Found {
-    pub(super) grid: Grid,
-    /// How many cells there are, seen from below.
-    pub(super) cells: usize,
-    /// The world within which the bound from below is reached.
-    pub(super) within: Option<TimedWorld>,
-}
-
-/// Bounds from both sides where everything happens at known times; `None` where it does not, or if `goes_on` says
-/// so.
-pub(super) fn bounds(
-    world: &TimedWorld,
-    settings: &Settings,
-    effort: Effort,
-    goes_on: &dyn Fn() -> bool,
-) -> Result<Option<Found>, NotTabulated> {
-    let Some(cells) = cells(world) else {
-        return Ok(None);
-    };
-    let grid = Grid {
-        step: step(world, cells),
-        lower: 0.0,
-        upper: 1.0,
-        states: 0,
-    };
-    let mut search = Search {
-        settings,
-        goes_on,
-        found: Found {
-            grid,
-            cells,
-            within: None,
-        },
-        has: [false; 2],
-    };
-    let within = world.keeping_to(&settings.plans);
-    // Of the worlds in which more is possible the one with the fewest states first.
-    let above = world.seen_from(Side::Above);
-    let freer = above.without_numbers_over_all()?;
-    let chances = super::chances(&freer, cells, Side::Above)?;
-    let leaner = freer.without_certainties(&chances);
-    let kinder: Vec<TimedWorld> = leaner.into_iter().chain([freer, above]).collect();
-    for share in effort.shares {
-        let most_states = settings.most_states / share;
-        // From either side in turn, as one does not know which is the harder one.
-        for turn in 0..within.len().max(kinder.len()) {
-            let mut goes_on = match within.get(turn) {
-                Some(world) => search.look_from_below(world, most_states)?,
-                None => true,
-            };
-            goes_on &= search.has[0] || !effort.gives_up;
-            if let Some(world) = kinder.get(turn).filter(|_| goes_on) {
-                goes_on = search.look_from_above(world, most_states)?;
-            }
-            if !goes_on {
-                return Ok(None);
-            }
-        }
-    }
-    Ok(Some(search.found))
-}
-
-/// How much is tried for bounds.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Effort {
-    /// Each bound may have one in so many of all states that there may be, one of these after the other until bounds
-    /// are close.
-    shares: &'static [usize],
-    /// Whether nothing more is tried once the first world within plans has too many states.
-    gives_up: bool,
-}
-
-impl Effort {
-    /// For the yardstick.
-    pub(super) const WHOLE: Self = Self {
-        shares: &[16, 4],
-        gives_up: false,
-    };
-    /// For a policy, for which a run waits.
-    pub(super) const QUICK: Self = Self {
-        shares: &[16],
-        gives_up: true,
-    };
-}
-
-struct Search<'a> {
-    settings: &'a Settings,
-    goes_on: &'a dyn Fn() -> bool,
-    found: Found,
-    /// Whether there are values from below, and from above.
-    has: [bool; 2],
-}
-
-impl TimedWorld {
-    /// How whoever keeps to plans acts.
-    pub(super) fn by_moments(&self, settings: &Settings) -> Manner {
-        Manner::ByMoments(self.in_plans(&settings.plans))
-    }
-}
-
-impl Search<'_> {
-    fn is_close(&self) -> bool {
-        let gap = self.found.grid.upper - self.found.grid.lower;
-        self.has == [true; 2] && gap <= self.settings.gap
-    }
-
-    /// Whether to go on.
-    fn look_from_below(
-        &mut self,
-        world: &TimedWorld,
-        most_states: usize,
-    ) -> Result<bool, NotTabulated> {
-        if self.is_close() {
-            return Ok(true);
-        }
-        let mut left = most_states;
-        let chances = super::chances(world, self.found.cells, Side::Below)?;
-        let below = Below::new(world, &chances, world.by_moments(self.settings));
-        let value = graph::value(&below, &mut left, self.goes_on);
-        self.has[0] |= value.is_ok();
-        self.found.grid.states += most_states - left;
-        match value {
-            Ok(lower) if lower - SLACK > self.found.grid.lower => {
-                self.found.grid.lower = lower - SLACK;
-                self.found.within = Some(world.clone());
-            }
-            Err(Stop::Interrupted) => return Ok(false),
-            Ok(_) | Err(_) => {}
-        }
-        Ok(true)
-    }
-
-    /// Whether to go on.
-    fn look_from_above(
-        &mut self,
-        world: &TimedWorld,
-        most_states: usize,
-    ) -> Result<bool, NotTabulated> {
-        let mut wanted = self.settings.first_cells.max(1);
-        while !self.is_close() {
-            // The last grid is the one on which nothing is given away.
-            let (step, cells) = match fitting(world, wanted, Side::Above) {
-                Some(fit) if fit.cells < self.found.cells => (fit.step(), fit.cells),
-                _ => (step(world, self.found.cells), self.found.cells),
-            };
-            let mut left = most_states;
-            let chances = Chances::new(world, step, cells + 1, Side::Above)?;
-            let value = graph::value(&Above::by_moments(world, &chances), &mut left, self.goes_on);
-            self.has[1] |= value.is_ok();
-            self.found.grid.states += most_states - left;
-            match value {
-                Ok(value) => self.found.grid.upper = self.found.grid.upper.min(value + SLACK),
-                Err(Stop::Interrupted) => return Ok(false),
-                Err(_) => break,
-            }
-            if cells == self.found.cells {
-                break;
-            }
-            wanted *= 2;
-        }
-        Ok(true)
-    }
-}
 
 /// How many cells there are if all known times are whole numbers of cells; `None` if something may
 /// happen at any time, or if that takes too many.

@@ -153,16 +153,17 @@ impl Policy {
         let Some(within) = found.within else {
             return Ok(None);
         };
-        let chances = super::chances(&within, found.cells, Side::Below)?;
-        let step = exact_step(&within, found.cells);
+        let moments::Keeping { world, manner } = within;
+        let chances = super::chances(&world, found.cells, Side::Below)?;
+        let step = exact_step(&world, found.cells);
         let optimum = TimedOptimum {
             lower: found.grid.lower,
             upper: found.grid.upper,
             grids: vec![found.grid],
             ..TimedOptimum::unknown()
         };
-        let acts = (found.cells, within.by_moments(settings));
-        Ok(Self::of(within, chances, optimum, step, acts).filled(settings, goes_on))
+        let acts = (found.cells, manner);
+        Ok(Self::of(world, chances, optimum, step, acts).filled(settings, goes_on))
     }
 
     /// The policy in the whole process, if the bounds get close.

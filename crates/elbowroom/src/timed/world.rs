@@ -213,40 +213,6 @@ impl TimedWorld {
             || self.acts[act].changes_numbers()
     }
 
-    /// The actions that are in one of the plans, as bits.
-    pub(super) fn in_plans(&self, plans: &[Vec<String>]) -> u64 {
-        let acts = self.acts.iter().enumerate();
-        let is_asked_for = |act: &Act| plans.iter().flatten().any(|name| *name == act.name);
-        let asked_for = acts.filter(|(_, act)| is_asked_for(act));
-        asked_for.fold(0, |all, (index, _)| all | 1 << index)
-    }
-
-    /// For each of these plans, and once each: the world without the actions that are only in others; the world
-    /// itself if there are no plans.
-    pub(super) fn keeping_to(&self, plans: &[Vec<String>]) -> Vec<Self> {
-        let of_any = self.in_plans(plans);
-        let mut own: Vec<u64> = Vec::new();
-        for plan in plans {
-            let of_plan = self.in_plans(std::slice::from_ref(plan));
-            if of_plan != 0 && !own.contains(&of_plan) {
-                own.push(of_plan);
-            }
-        }
-        if own.is_empty() {
-            return vec![self.clone()];
-        }
-        let kept = own.into_iter().map(|own| {
-            let mut keeping = self.clone();
-            let acts = keeping.acts.into_iter().enumerate();
-            let is_kept = |index: usize| (own | !of_any) & (1 << index) != 0;
-            let acts = acts.filter(|(index, _)| is_kept(*index));
-            keeping.acts = acts.map(|(_, act)| act).collect();
-            keeping.see_what_changes();
-            keeping
-        });
-        kept.collect()
-    }
-
     /// The same world, as a bound from that side sees comparisons that may or may not hold.
     pub(super) fn seen_from(&self, side: Bounding) -> Self {
         Self {

@@ -1,6 +1,6 @@
 //! The row for the best of all executors: see [`timed`](crate::timed).
 
-use elbowroom::execute::action_sets;
+use elbowroom::execute::ActionSets;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -73,8 +73,10 @@ fn bounds(
         threads,
     };
     let (task, world) = setting.scene(column)?;
+    let sets = ActionSets::new(&task, &world, setting.embedded(), goes_on);
     let settings = Settings {
-        plans: action_sets(&task, &world, setting.embedded(), goes_on),
+        plans: sets.plans,
+        fallbacks: sets.fallbacks,
         ..Settings::default()
     };
     let found = optimum(&task, &world, &settings, goes_on);

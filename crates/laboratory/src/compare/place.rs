@@ -15,8 +15,8 @@ use super::beginnings::Beginning;
 use super::trials::{PLANS, PREPARED, Setting, world};
 use super::{Column, ExperimentError, Planning};
 use elbowroom::execute::{
-    Analyst, Choice, Chooser, Known, Likeliest, Rehearse, RememberingPlanner, RememberingPreparer,
-    Replanning, Rollouts, SharedLikeliest, SharedRehearse, action_sets_to_tabulate,
+    ActionSets, Analyst, Choice, Chooser, Known, Likeliest, Rehearse, RememberingPlanner,
+    RememberingPreparer, Replanning, Rollouts, SharedLikeliest, SharedRehearse,
 };
 use elbowroom::timed::{Policy, Settings};
 
@@ -75,14 +75,15 @@ impl Setting<'_> {
             .any(ExecutorSpec::asks_outlook);
         let outlook = asks_outlook.then(|| {
             let most_states = self.experiment.table_states;
-            let plans = if self.experiment.planner == Planning::Embedded && most_states > 0 {
-                action_sets_to_tabulate(task, &world, self.embedded(), goes_on)
+            let sets = if self.experiment.planner == Planning::Embedded && most_states > 0 {
+                ActionSets::to_tabulate(task, &world, self.embedded(), goes_on)
             } else {
-                Vec::new()
+                ActionSets::default()
             };
             let settings = Settings {
                 most_states,
-                plans,
+                plans: sets.plans,
+                fallbacks: sets.fallbacks,
                 ..Settings::default()
             };
             let policy = Policy::close(task, &world, &settings, goes_on);

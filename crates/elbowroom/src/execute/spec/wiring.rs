@@ -18,8 +18,8 @@ use elbowroom_text::Diagnostics;
 
 use super::{EMBEDDED, NOBODY, RunSpec};
 use crate::execute::{
-    Analyst, Chooser, Choosing, Embedded, Execution, External, FirstPlan, Known, Likeliest,
-    Rehearse, Replanning, Rollouts, SharedRehearse, Spoiling, action_sets_to_tabulate,
+    ActionSets, Analyst, Chooser, Choosing, Embedded, Execution, External, FirstPlan, Known,
+    Likeliest, Rehearse, Replanning, Rollouts, SharedRehearse, Spoiling,
 };
 use crate::timed::{Policy, Settings};
 use crate::{BoxTextError, ChanceError, flow, parse_box};
@@ -382,13 +382,14 @@ impl RunSpec {
         let is_embedded = matches!(self.whom()?, Whom::Embedded);
         let outlook = model.as_ref().filter(|_| self.executor.asks_outlook());
         let outlook = outlook.and_then(|model| {
-            let plans = if is_embedded {
-                action_sets_to_tabulate(task, model, self.embedded(), &|| true)
+            let sets = if is_embedded {
+                ActionSets::to_tabulate(task, model, self.embedded(), &|| true)
             } else {
-                Vec::new()
+                ActionSets::default()
             };
             let settings = Settings {
-                plans,
+                plans: sets.plans,
+                fallbacks: sets.fallbacks,
                 ..Settings::default()
             };
             let policy = Policy::close(task, model, &settings, &|| true);

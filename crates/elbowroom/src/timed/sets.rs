@@ -1,0 +1,124 @@
+//! Sets of actions: what one needs of another before it can begin, and the worlds of those who keep to one.
+
+use elbowroom_model::Task;
+use elbowroom_sim::WorldModel;
+
+use super::act::Act;
+use super::world::{Facts, TimedWorld};
+use super::{NotTabulated, Settings};
+
+/// Actions, and as few of others as make possible from the beginning what all of them together would, as far as that
+/// is easily seen: nothing is made false, and numbers are what it takes.
+///
+/// # Errors
+/// When there is something in the task or in the world that the process does not know.
+pub fn supported(
+    task: &Task,
+    model: &WorldModel,
+    actions: &[String],
+    others: &[String],
+) -> Result<Vec<String>, NotTabulated> {
+    let settings = Settings {
+        only: Some(actions.iter().chain(others).cloned().collect()),
+        ..Settings::default()
+    };
+    let world = TimedWorld::new(task, model, &settings)?;
+    let others = others.iter().filter(|other| !actions.contains(other));
+    let mut all: Vec<String> = actions.iter().chain(others).cloned().collect();
+    let reachable = world.reachable(&all);
+    let mut place = actions.len();
+    while place < all.len() {
+        let without = all.remove(place);
+        let is_enough =
+            |name: &String| !reachable.contains(name) || world.reachable(&all).contains(name);
+        if !actions.iter().all(is_enough) {
+            all.insert(place, without);
+            place += 1;
+        }
+    }
+    Ok(all)
+}
+
+impl TimedWorld {
+    /// The actions that are in one of these sets, as bits.
+    pub(super) fn in_sets(&self, sets: &[Vec<String>]) -> u64 {
+        let acts = self.acts.iter().enumerate();
+        let is_asked_for = |act: &Act| sets.iter().flatten().any(|name| *name == act.name);
+        let asked_for = acts.filter(|(_, act)| is_asked_for(act));
+        asked_for.fold(0, |all, (index, _)| all | 1 << index)
+    }
+
+    /// For each of some sets of actions, and once each: the world of these actions, and of those that are in none of the
+    /// sets and in none of `others`, as far as they are [detours](Self::with_detours).
+    pub(super) fn keeping_to(&self, sets: &[Vec<String>], others: &[Vec<String>]) -> Vec<Self> {
+        let of_any = self.in_sets(sets) | self.in_sets(others);
+        let mut own: Vec<u64> = Vec::new();
+        for set in sets {
+            let of_set = self.in_sets(std::slice::from_ref(set));
+            if of_set != 0 && !own.contains(&of_set) {
+                own.push(of_set);
+            }
+        }
+        let kept = own.into_iter();
+        kept.map(|own| self.with_detours(own, !of_any)).collect()
+    }
+
+    /// The world of the `own` actions, and of those others that can start from what these make true, and make
+    /// true what these need.
+    fn with_detours(&self, own: u64, others: u64) -> Self {
+        let is_among = |acts: u64, index: usize| acts & (1 << index) != 0;
+        let events = self.events.iter();
+        let mut given = events.fold(self.initial | self.tested, |facts, event| {
+            facts | event.adds
+        });
+        let mut needed = self.goal.mentions();
+        for (index, act) in self.acts.iter().enumerate() {
+            if is_among(own, index) {
+                given |= act.adds();
+                needed |= act.mentions();
+            }
+        }
+        let is_detour = |act: &Act| {
+            let start = act.start.needs.conjunction().unwrap_or(0);
+            let is_of_use = act.adds() & needed & !start != 0 || act.helps();
+            act.start.needs.is_possible(given) && is_of_use
+        };
+        let mut keeping = self.clone();
+        let acts = keeping.acts.into_iter().enumerate();
+        let kept = acts.filter(|(index, act)| {
+            is_among(own, *index) || (is_among(others, *index) && is_detour(act))
+        });
+        keeping.acts = kept.map(|(_, act)| act).collect();
+        keeping.see_what_changes();
+        keeping
+    }
+
+    /// Those of these actions that may start if nothing is made false and numbers are what it takes.
+    fn reachable(&self, names: &[String]) -> Vec<String> {
+        let events = self.events.iter();
+        let mut facts: Facts = events.fold(self.initial | self.tested, |facts, event| {
+            facts | event.adds
+        });
+        let is_asked_for = |name: &str| names.iter().any(|asked| asked.eq_ignore_ascii_case(name));
+        let mut waiting: Vec<_> = self
+            .acts
+            .iter()
+            .filter(|act| is_asked_for(&act.name))
+            .collect();
+        let mut reachable = Vec::new();
+        loop {
+            let before = waiting.len();
+            waiting.retain(|act| {
+                let can_start = act.start.needs.is_possible(facts);
+                if can_start {
+                    facts |= act.adds() | act.adds_by_failing();
+                    reachable.push(act.name.clone());
+                }
+                !can_start
+            });
+            if waiting.len() == before {
+                return reachable;
+            }
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Sets of actions for when a plan has failed.
+
+use elbowroom::execute::{ActionSets, Embedded};
+use elbowroom_laboratory::timed::{Settings, optimum, supported};
+use elbowroom_sim::WorldModel;
+
+use super::task;
+
+/// A casting weighs 6 as planned, and is sold from 5 on. Whoever has cast too little melts it down, and
+/// has time to cast with the second mould, which always does. A mould is good for once.
+const DOMAIN: &str = "
+(define (domain foundry)
+  (:requirements :strips :fluents :durative-actions :timed-initial-literals)
+  (:predicates (free) (first-mould) (cast) (second) (open) (sold))
+  (:functions (weight))
+  (:durative-action cast-first :parameters () :duration (= ?duration 10)
+    :condition (and (at start (free)) (at start (first-mould)) (over all (open)))
+    :effect (and (at start (not (free))) (at start (not (first-mould))) (at end (cast)) (at end (increase (weight) 6))))
+  (:durative-action sell-first :parameters () :duration (= ?duration 2)
+    :condition (and (at start (cast)) (at start (>= (weight) 5)) (over all (open)))
+    :effect (at end (sold)))
+  (:durative-action melt :parameters () :duration (= ?duration 3)
+    :condition (and (at start (cast)) (over all (open)))
+    :effect (and (at start (not (cast))) (at end (free)) (at end (assign (weight) 0))))
+  (:durative-action cast-second :parameters () :duration (= ?duration 30)
+    :condition (and (at start (free)) (over all (open)))
+    :effect (and (at start (not (free))) (at end (second))))
+  (:durative-action sell-second :parameters () :duration (= ?duration 2)
+    :condition (and (at start (second)) (over all (open)))
+    :effect (at end (sold))))";
+
+const PROBLEM: &str = "
+(define (problem one) (:domain foundry)
+  (:init (free) (first-mould) (open) (= (weight) 0) (at 50 (not (open))))
+  (:goal (sold)))";
+
+const WORLD: &str = r#"
+format = "elbowroom-world"
+version = 1
+
+[[amount]]
+action = "cast-first"
+fluent = "weight"
+normal = { mean = 6, deviation = 1, minimum = 0 }
+"#;
+
+fn named(names: &[&str]) -> Vec<String> {
+    names.iter().map(|name| format!("({name})")).collect()
+}
+
+#[test]
+fn a_set_gets_what_it_needs_of_the_plan_before_and_no_more() {
+    let task = task(DOMAIN, PROBLEM);
+    let world = WorldModel::read(WORLD, task.problem()).expect("it is a world");
+    let with = |actions: &[&str], others: &[&str]| {
+        supported(&task, &world, &named(actions), &named(others)).expect("it can be tabulated")
+    };
+    let before = ["sell-first", "cast-first"];
+    assert_eq!(
+        with(&["melt", "sell-second"], &before),
+        named(&["melt", "sell-second", "cast-first"])
+    );
+    // What can begin by itself needs nothing, and neither does what none of the others makes possible.
+    assert_eq!(
+        with(&["cast-second", "sell-second"], &before),
+        named(&["cast-second", "sell-second"])
+    );
+    assert_eq!(with(&["sell-second"], &before), named(&["sell-second"]));
+}
+
+/// The planner's plan casts once, which succeeds in five of six cases. What is done in the others is no plan from the
+/// beginning.
+#[test]
+fn what_is_done_when_the_plan_has_failed_is_found_in_samples() {
+    let task = task(DOMAIN, PROBLEM);
+    let world = WorldModel::read(WORLD, task.problem()).expect("it is a world");
+    let sets = ActionSets::new(&task, &world, Embedded::default(), &|| true);
+    let mut later = named(&["cast-first", "cast-second", "melt", "sell-second"]);
+    later.sort_unstable();
+    assert!(sets.fallbacks.contains(&later), "{sets:?}");
+    let settings = |fallbacks: Vec<Vec<String>>| Settings {
+        plans: vec![named(&["cast-first", "sell-first"])],
+        fallbacks,
+        ..Settings::default()
+    };
+    let lower = |settings: &Settings| {
+        optimum(&task, &world, settings, &|| true)
+            .expect("it can be tabulated")
+            .lower
+    };
+    assert!(lower(&settings(sets.fallbacks)) > 0.99);
+    // Without them it is found among all actions, where these are few.
+    assert!(lower(&settings(Vec::new())) > 0.99);
+}
