@@ -279,18 +279,19 @@ fn in_words(refusal: &Refusal) -> String {
     }
 }
 
-#[test]
-#[allow(clippy::print_stdout, reason = "says what was attacked")]
-fn schedules_in_boxes_of_random_plans_with_processes_and_events_pass_the_judge() {
-    let worlds = std::env::var("ELBOWROOM_WORLDS").ok();
-    let worlds = worlds.and_then(|text| text.parse().ok()).unwrap_or(600);
-    let mut rng = ChaCha8Rng::seed_from_u64(2006);
+/// Boxes of random plans in random worlds, attacked with the judge.
+fn attack(
+    worlds: usize,
+    rng: &mut ChaCha8Rng,
+    world: fn(&mut ChaCha8Rng) -> (String, String),
+    plan_of: fn(&mut ChaCha8Rng) -> (String, String),
+) -> Count {
     let mut count = Count::default();
     for _ in 0..worlds {
-        let (domain, problem) = world(&mut rng);
+        let (domain, problem) = world(rng);
         let task = Arc::new(task_of(&domain, &problem));
         for _ in 0..4 {
-            let (fixed, open) = plan(&mut rng);
+            let (fixed, open) = plan_of(rng);
             let (planned, _) = read_plan(&Source::new("plan", fixed), &task).expect("a plan");
             if !validate(&task, &planned, &Settings::default()).is_valid() {
                 continue;
@@ -312,12 +313,12 @@ fn schedules_in_boxes_of_random_plans_with_processes_and_events_pass_the_judge()
                 continue;
             }
             for _ in 0..6 {
-                let envelope = some_box(&plan, &mut rng);
+                let envelope = some_box(&plan, rng);
                 if envelope == point {
                     continue;
                 }
                 let is_inside = oracle.objection(&envelope).expect("within reach").is_none();
-                let refuted = refuted(&task, &plan, &envelope, &mut rng);
+                let refuted = refuted(&task, &plan, &envelope, rng);
                 match refuted {
                     Some((valuation, verdict)) if is_inside => panic!(
                         "{domain}\n{problem}\n{open}\n{envelope:?}\n{valuation:?}\n{verdict:?}"
@@ -329,6 +330,20 @@ fn schedules_in_boxes_of_random_plans_with_processes_and_events_pass_the_judge()
             }
         }
     }
+    count
+}
+
+/// So many, or as many as the environment asks for.
+fn worlds(so_many: usize) -> usize {
+    let asked = std::env::var("ELBOWROOM_WORLDS").ok();
+    asked.and_then(|text| text.parse().ok()).unwrap_or(so_many)
+}
+
+#[test]
+#[allow(clippy::print_stdout, reason = "says what was attacked")]
+fn schedules_in_boxes_of_random_plans_with_processes_and_events_pass_the_judge() {
+    let mut rng = ChaCha8Rng::seed_from_u64(2006);
+    let count = attack(worlds(600), &mut rng, world, plan);
     println!("{count:#?}");
     let refused: usize = count.refused.values().sum();
     assert!(
@@ -341,6 +356,75 @@ fn schedules_in_boxes_of_random_plans_with_processes_and_events_pass_the_judge()
         count.not_as_they_are * 100 < count.valid,
         "many plans are not accepted as they are"
     );
+}
+
+/// A domain and a problem in which numbers race: each rises on its own from some time on, and what is
+/// watched is how they stand to each other.
+fn race(rng: &mut ChaCha8Rng) -> (String, String) {
+    let mut domain = "(define (domain d) (:predicates (on0) (on1) (on2) (done0) (done1) (seen))
+        (:functions (x0) (x1) (x2)) (:action look :effect (seen))\n"
+        .to_owned();
+    for index in 0..3 {
+        let rate = ["1", "2", "1/2"].choose(rng).expect("some");
+        writeln!(
+            domain,
+            "(:action act{index} :effect (on{index}))
+            (:process rise{index} :precondition (on{index})
+             :effect (increase (x{index}) (* #t {rate})))"
+        )
+        .expect("text");
+    }
+    for index in 0..rng.random_range(1..3) {
+        let early = rng.random_range(0..3);
+        let late = (early + rng.random_range(1..3)) % 3;
+        let (below, above) = (number(rng, 1..=10), number(rng, 1..=10));
+        writeln!(
+            domain,
+            "(:event turn{index} :precondition (and (not (done{index})) (<= (x{early}) {below})
+              (> (x{late}) {above})) :effect (done{index}))"
+        )
+        .expect("text");
+    }
+    let problem = "(define (problem p) (:domain d) (:init (= (x0) 0) (= (x1) 0) (= (x2) 0))
+        (:goal (and (not (done0)) (not (done1)))))";
+    (domain + ")", problem.to_owned())
+}
+
+/// A plan for such a race: who begins when, and some looks in between.
+fn plan_of_a_race(rng: &mut ChaCha8Rng) -> (String, String) {
+    let (mut fixed, mut open) = (String::new(), String::new());
+    let mut starts: Vec<i64> = (0..=16).collect();
+    starts.shuffle(rng);
+    let actions = ["act0", "act1", "act2", "look", "look", "look"];
+    for (index, (start, action)) in starts.into_iter().zip(actions).enumerate() {
+        let start = Rational::new(start, 2);
+        writeln!(fixed, "{start}: ({action})").expect("text");
+        write!(
+            open,
+            "action instance n{index} : ({action});
+            parameter s{index} default {start};
+            c: n{index} - .zero in [s{index}, s{index}];\n"
+        )
+        .expect("text");
+    }
+    (fixed, open)
+}
+
+/// Between two happenings, an event's condition may come to hold and cease to hold again: only what
+/// is demanded of the time between them keeps boxes from that.
+#[test]
+#[allow(clippy::print_stdout, reason = "says what was attacked")]
+fn schedules_in_boxes_of_random_races_pass_the_judge() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1871);
+    let count = attack(worlds(60), &mut rng, race, plan_of_a_race);
+    println!("{count:#?}");
+    assert!(
+        count.inside > count.valid,
+        "few boxes are found to be inside"
+    );
+    assert!(count.broken * 4 > count.valid, "few boxes are too large");
+    assert_eq!(count.refused, BTreeMap::new());
+    assert_eq!(count.not_as_they_are, 0);
 }
 
 fn kettle(file: &str) -> (Arc<Task>, Source) {
@@ -377,22 +461,25 @@ fn the_kettle_boils_before_the_tea_is_poured() {
     assert_eq!(found.intervals(), expected);
 }
 
-/// Two numbers rise, the first one from s on, the second one from 5 on. The event would happen from 9
-/// on, where the second one is above 4, if the first one were at most 6 then, as it is until s + 6.
-/// At the plan's happenings it is never so.
+/// Two numbers that rise, and an event that watches both.
+const CLIMB: &str = "(define (domain d)
+    (:predicates (clashed) (seen))
+    (:functions (x) (y))
+    (:durative-action climb :duration (= ?duration 10) :condition (and)
+     :effect (increase (x) (* #t 1)))
+    (:durative-action follow :duration (= ?duration 10) :condition (and)
+     :effect (increase (y) (* #t 1)))
+    (:action look :effect (seen))
+    (:event clash :precondition (and (not (clashed)) (<= (x) 6) (> (y) 4))
+     :effect (clashed)))";
+
+/// x rises from s on, and y from 5 on. From 9 on, y is above 4; the event would happen then if x were
+/// at most 6, as it is until s + 6. At the plan's happenings it is never so.
 #[test]
 fn no_event_may_happen_between_two_happenings() {
-    let domain = "(define (domain d)
-        (:predicates (clashed))
-        (:functions (x) (y))
-        (:durative-action climb :duration (= ?duration 10) :condition (and)
-         :effect (increase (x) (* #t 1)))
-        (:durative-action follow :duration (= ?duration 10) :condition (and)
-         :effect (increase (y) (* #t 1)))
-        (:event clash :precondition (and (not (clashed)) (<= (x) 6) (> (y) 4))
-         :effect (clashed)))";
     let problem = "(define (problem p) (:domain d)
         (:init (= (x) 0) (= (y) 0)) (:goal (not (clashed))))";
+    let task = Arc::new(task_of(CLIMB, problem));
     let plan = "durative-action instance first : (climb);
         durative-action instance second : (follow);
         parameter s default 1;
@@ -400,9 +487,12 @@ fn no_event_may_happen_between_two_happenings() {
         c: first.end - first.start in [10, 10];
         c: second.start - .zero in [5, 5];
         c: second.end - second.start in [10, 10];";
-    let found = largest(&Arc::new(task_of(domain, problem)), plan.as_bytes());
-    let expected = Interval::closed(Rational::ZERO, Rational::from(3));
-    assert_eq!(found.intervals(), [expected]);
+    let until = |last: i64| [Interval::closed(Rational::ZERO, Rational::from(last))];
+    assert_eq!(largest(&task, plan).intervals(), until(3));
+    // At 8, x is above 6 as planned and y is not above 4. From there on one of the two has to be as
+    // it is, be it needed or not.
+    let looking = format!("{plan} action instance eye : (look); c: eye - .zero in [8, 8];");
+    assert_eq!(largest(&task, &looking).intervals(), until(2));
 }
 
 /// A plan with fixed times keeps its order, and the executor as much freedom as all that leaves.
