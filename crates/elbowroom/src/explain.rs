@@ -45,6 +45,15 @@ pub struct Explanation {
     pub plays: Vec<String>,
 }
 
+impl Explanation {
+    /// Whether only the course of processes and events is known to become another one, with which
+    /// the plan may work as well.
+    pub(crate) fn may_be_harmless(&self, task: &Task) -> bool {
+        let is_accepted = self.schedule.is_some() && self.verdict.is_none();
+        is_accepted && !task.autonomous().is_empty()
+    }
+}
+
 /// By how much something fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Shortfall {
