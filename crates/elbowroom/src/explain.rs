@@ -207,6 +207,19 @@ impl<'a> Explainer<'a> {
         }))
     }
 
+    /// What the judge says of the plan at these values if all happens as early as possible; `None` as in
+    /// [`verdict`](Self::verdict), and where there is no schedule.
+    pub(crate) fn verdict_at(&self, valuation: Valuation) -> Option<String> {
+        let network = self.plan.plan.network(&valuation);
+        let network = ConsistentNetwork::try_from(network).ok()?;
+        let schedule = network.earliest_schedule(network_node(NodeId::ZERO)).into();
+        self.verdict(&Counterexample {
+            valuation,
+            schedule,
+            moment: None,
+        })
+    }
+
     /// What the judge says about the example; `None` where it cannot be asked, because something
     /// else than the plan's own numbers is left open, or if it finds nothing wrong.
     fn verdict(&self, example: &Counterexample) -> Option<String> {

@@ -322,7 +322,7 @@ fn a_plan_that_may_survive_another_course_is_not_said_to_fail() {
     assert!(reason.contains("the event (boils)"), "{reason}");
     // Where the water must not boil meanwhile, it does fail.
     let found = fetching("(over all (not (boiled)))");
-    assert_eq!(found.verdict, Verdict::Outside);
+    assert_eq!(found.verdict, Verdict::Outside, "{found:?}");
     let reason = found.reason.expect("a reason");
     assert!(reason.contains("boil"), "{reason}");
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::answers::Unwatched;
-use elbowroom::answers::envelope::{EnvelopeRequest, envelope};
+use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, envelope};
 use elbowroom_envelope::{Guarantee, Oracle, irr, sharpen};
 use elbowroom_model::Task;
 use elbowroom_num::{Interval, Rational};
@@ -97,4 +97,28 @@ fn a_plan_with_fixed_times_leaves_durations_open() {
     assert!(found.intervals().iter().all(has_room), "{found:?}");
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     assert_eq!(refuted(&task, &plan, &found, &mut rng), None);
+}
+
+/// The lower end is where the order of the happenings ends, which is no action that takes long.
+#[test]
+fn an_action_is_not_said_to_fit_into_itself() {
+    let domain = "(define (domain d) (:predicates (boiled) (fetched)) (:functions (heat))
+        (:process heats :effect (increase (heat) (* #t 1)))
+        (:event boils :precondition (and (not (boiled)) (>= (heat) 10)) :effect (boiled))
+        (:durative-action fetch :duration (= ?duration 5) :condition (and)
+         :effect (at end (fetched))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (heat) 0)) (:goal (fetched)))";
+    let task = Arc::new(task_of(domain, problem));
+    let (plan, _) = read_plan(&Source::new("plan", "0: (fetch) [5]"), &task).expect("a plan");
+    let outcome = envelope(&EnvelopeRequest::new(&task, plan), &mut Unwatched);
+    let answer = outcome.expect("within reach").answer;
+    let EnvelopeFinding::Envelope { parameters, .. } = answer.finding else {
+        panic!("{:?}", answer.finding);
+    };
+    let limit = |limit: &Option<String>| limit.clone().expect("a reason");
+    assert_eq!(
+        limit(&parameters[0].lower_limit),
+        "(fetch) must not end before it starts"
+    );
+    assert!(limit(&parameters[0].upper_limit).contains("the event (boils)"));
 }

@@ -110,6 +110,7 @@ impl Comparison {
 mod tests {
     use super::*;
 
+    #[allow(clippy::unnecessary_wraps, reason = "an instance that is answered")]
     fn answered(states: u64, milliseconds: u64) -> Option<Answered> {
         Some(Answered {
             states,

@@ -96,7 +96,7 @@ fn of_folder(folder: &Path, selection: &Selection) -> Result<Vec<Instance>, Stri
             }
             let count = counts.entry(own.clone()).or_default();
             *count += 1;
-            if (*count - 1) % every.max(1) != 0 {
+            if !(*count - 1).is_multiple_of(every.max(1)) {
                 continue;
             }
         }

@@ -161,12 +161,13 @@ pub(super) fn answer(
         if let Some(objection) = objection {
             let explainer = Explainer::new(&request.task, &plan);
             let why_not = explainer.objection(&oracle, &boxed, &objection);
-            verdict = if why_not.may_be_harmless(&request.task) {
-                Verdict::Undecided
+            (verdict, reason) = if !why_not.may_be_harmless(&request.task) {
+                (Verdict::Outside, Some(why_not.reason))
+            } else if let Some(violation) = violation_at_an_end(&explainer, &boxed) {
+                (Verdict::Outside, Some(violation))
             } else {
-                Verdict::Outside
+                (Verdict::Undecided, Some(why_not.reason))
             };
-            reason = Some(why_not.reason);
         }
     }
     Ok(ConformalBox {
@@ -174,6 +175,20 @@ pub(super) fn answer(
         verdict,
         reason,
         intervals,
+    })
+}
+
+/// What the judge says against the plan where all durations are as short, or as long, as the box
+/// allows.
+fn violation_at_an_end(explainer: &Explainer<'_>, boxed: &DecoupledEnvelope) -> Option<String> {
+    Side::BOTH.into_iter().find_map(|side| {
+        let mut valuation = explainer.plan.nominal();
+        for (index, interval) in boxed.intervals().iter().enumerate() {
+            if let Some(value) = side.of(interval).value() {
+                valuation[index.into()] = value.clone();
+            }
+        }
+        explainer.verdict_at(valuation)
     })
 }
 
