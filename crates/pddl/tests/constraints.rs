@@ -167,5 +167,5 @@ fn forms_that_belong_elsewhere_are_told_so() {
     let sections = "(:init) (:goal (and)) (:constraints (sometime (always (lit))))";
     assert_snapshot!(mistakes(read_sections(sections)), @"problem.pddl:2:48: error: `(always …)` does not belong here; constraints on the course stand under `:constraints`, and do not nest");
     assert_snapshot!(mistakes(read_actions("(:action a :precondition (within 3 (lit)))")), @"domain.pddl:6:27: error: `(within …)` does not belong here; constraints on the course stand under `:constraints`, and do not nest");
-    assert_snapshot!(mistakes(read_actions("(:action a :effect (preference p (lit)))")), @"domain.pddl:6:20: error: `(preference …)` does not belong here; preferences stand among conditions, in goals and under `:constraints`");
+    assert_snapshot!(mistakes(read_actions("(:action a :effect (preference p (lit)))")), @"domain.pddl:6:21: error: `(preference …)` does not belong here; preferences stand among conditions, in goals and under `:constraints`");
 }
