@@ -45,6 +45,15 @@ pub struct Explanation {
     pub plays: Vec<String>,
 }
 
+impl Explanation {
+    /// Whether only the course of processes and events is known to become another one, with which
+    /// the plan may work as well.
+    pub(crate) fn may_be_harmless(&self, task: &Task) -> bool {
+        let is_accepted = self.schedule.is_some() && self.verdict.is_none();
+        is_accepted && !task.autonomous().is_empty()
+    }
+}
+
 /// By how much something fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Shortfall {
@@ -196,6 +205,19 @@ impl<'a> Explainer<'a> {
         Some(most.map_or(Shortfall::Boundless, |most| {
             Shortfall::Time(&most + self.task.epsilon())
         }))
+    }
+
+    /// What the judge says of the plan at these values if all happens as early as possible; `None` as in
+    /// [`verdict`](Self::verdict), and where there is no schedule.
+    pub(crate) fn verdict_at(&self, valuation: Valuation) -> Option<String> {
+        let network = self.plan.plan.network(&valuation);
+        let network = ConsistentNetwork::try_from(network).ok()?;
+        let schedule = network.earliest_schedule(network_node(NodeId::ZERO)).into();
+        self.verdict(&Counterexample {
+            valuation,
+            schedule,
+            moment: None,
+        })
     }
 
     /// What the judge says about the example; `None` where it cannot be asked, because something

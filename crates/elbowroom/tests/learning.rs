@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use elbowroom::answers::Unwatched;
 use elbowroom::answers::learn::{
-    DurationsLearnt, InsideRequest, LearnAnswer, LearnRequest, Log, Settings, Verdict, learn,
+    ConformalBox, DurationsLearnt, InsideRequest, LearnAnswer, LearnRequest, Log, Settings,
+    Verdict, learn,
 };
 use elbowroom::answers::run::{RunRequest, simulate};
 use elbowroom::envelope::Guarantee;
@@ -273,6 +274,57 @@ fn too_few_samples_are_told() {
             .iter()
             .all(|interval| interval.needed.is_some())
     );
+}
+
+/// The water boils 10 after the beginning, and the fetching takes up to 14 in the logs, but 5 in the plan.
+fn fetching(throughout: &str) -> ConformalBox {
+    let domain = format!(
+        "(define (domain d) (:predicates (boiled) (fetched)) (:functions (heat))
+        (:process heats :effect (increase (heat) (* #t 1)))
+        (:event boils :precondition (and (not (boiled)) (>= (heat) 10)) :effect (boiled))
+        (:durative-action fetch :duration (= ?duration 5) :condition {throughout}
+         :effect (at end (fetched))))"
+    );
+    let problem = "(define (problem p) (:domain d) (:init (= (heat) 0)) (:goal (fetched)))";
+    let read = read_problem(
+        &Source::new("domain.pddl", domain),
+        &Source::new("problem.pddl", problem),
+    );
+    let task = Arc::new(Task::new(read.expect("no mistakes").0));
+    let plan = read_plan(&Source::new("plan", "0: (fetch) [5]"), &task);
+    let logs = (0..40).map(|number| Log {
+        name: number.to_string(),
+        records: vec![Record {
+            action: "(fetch)".to_owned(),
+            commanded: Some(0.0),
+            start: Some(0.0),
+            end: 4.0 + f64::from(number % 11),
+            outcome: Outcome::Succeeded,
+            planned: Some(5.0),
+        }],
+        course: None,
+    });
+    let inside = InsideRequest {
+        task,
+        plan: plan.expect("a plan").0.into(),
+        guarantee: Guarantee::Dynamic,
+        probability: 0.9,
+    };
+    let found = learnt(logs.collect(), Some(inside)).inside;
+    found.expect("it was asked")
+}
+
+#[test]
+fn a_plan_that_may_survive_another_course_is_not_said_to_fail() {
+    let found = fetching("(and)");
+    assert_eq!(found.verdict, Verdict::Undecided);
+    let reason = found.reason.expect("a reason");
+    assert!(reason.contains("the event (boils)"), "{reason}");
+    // Where the water must not boil meanwhile, it does fail.
+    let found = fetching("(over all (not (boiled)))");
+    assert_eq!(found.verdict, Verdict::Outside, "{found:?}");
+    let reason = found.reason.expect("a reason");
+    assert!(reason.contains("boil"), "{reason}");
 }
 
 /// Only what was believed counts, and a log that ends early has actions that are still running.

@@ -11,7 +11,7 @@ use elbowroom_model::Situation;
 use elbowroom_model::validate::{Settings, Verdict, validate};
 use elbowroom_pddl::{ProblemText, Source, read_plan, write_problem};
 use insta::assert_snapshot;
-use reading::{mistakes, problem, read_sections, task};
+use reading::{mistakes, problem, read_actions, read_sections, task};
 
 const DOMAIN: &str = "(define (domain d)
 (:types room ball - object)
@@ -152,7 +152,7 @@ fn constraints_that_make_no_sense_are_mistakes() {
     };
     assert!(wrong("(lit)").contains("does not say when it must hold"));
     assert!(wrong("(not (always (lit)))").contains("does not say when it must hold"));
-    assert!(wrong("(always (sometime (lit)))").contains("unknown predicate `sometime`"));
+    assert!(wrong("(always (sometime (lit)))").contains("do not nest"));
     assert!(wrong("(within (lit))").contains("expected `(within time condition)`"));
     assert!(wrong("(within soon (lit))").contains("unknown function `soon`"));
     assert!(wrong("(hold-during 3 2 (lit))").contains("must be later"));
@@ -160,4 +160,12 @@ fn constraints_that_make_no_sense_are_mistakes() {
     assert!(wrong("(allways (lit))").contains("does not say when it must hold"));
     let nested = wrong("(preference p (preference q (always (lit))))");
     assert!(nested.contains("a preference cannot stand here"));
+}
+
+#[test]
+fn forms_that_belong_elsewhere_are_told_so() {
+    let sections = "(:init) (:goal (and)) (:constraints (sometime (always (lit))))";
+    assert_snapshot!(mistakes(read_sections(sections)), @"problem.pddl:2:48: error: `(always …)` does not belong here; constraints on the course stand under `:constraints`, and do not nest");
+    assert_snapshot!(mistakes(read_actions("(:action a :precondition (within 3 (lit)))")), @"domain.pddl:6:27: error: `(within …)` does not belong here; constraints on the course stand under `:constraints`, and do not nest");
+    assert_snapshot!(mistakes(read_actions("(:action a :effect (preference p (lit)))")), @"domain.pddl:6:21: error: `(preference …)` does not belong here; preferences stand among conditions, in goals and under `:constraints`");
 }

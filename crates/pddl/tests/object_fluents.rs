@@ -111,10 +111,26 @@ fn mistakes_say_what_to_do() {
     };
     assert_snapshot!(read("(position r)"), @"problem.pddl:4:20: error: `position` is a function, and no predicate; compare its value with an object, as in `(= (f) object)`");
     assert_snapshot!(read("(> (position r) 3)"), @"problem.pddl:4:23: error: the values of `position` are objects, not numbers; compare it with an object, as in `(= (f) object)`");
-    assert_snapshot!(read("(= (position r) 3)"), @"problem.pddl:4:35: error: unknown object `3`; did you mean `a`?");
+    assert_snapshot!(read("(= (position r) 3)"), @"problem.pddl:4:35: error: `3` is a number, not an object; expected the name of an object, or a `?variable`");
     assert_snapshot!(read("(= (position r home) home)"), @"problem.pddl:4:22: error: `position` takes 1 argument, not 2; expected `(position ?r)`");
     assert_snapshot!(read("(= (positon r) home)"), @r#"
 problem.pddl:4:23: error: unknown function `positon`; declare it under `:functions`
 problem.pddl:4:34: error: unknown function `home`; declare it under `:functions`
 "#);
+}
+
+#[test]
+fn a_value_of_another_type_is_told() {
+    let warnings = |domain: &str, goal: &str| {
+        let problem = problem(&format!("(:goal {goal})"));
+        let read = read_problem(&Source::new("domain.pddl", domain), &problem);
+        let (_, warnings) = read.expect("no mistake");
+        let lines: Vec<_> = warnings.iter().map(ToString::to_string).collect();
+        lines.join("\n")
+    };
+    assert_snapshot!(warnings(DOMAIN, "(= (position r) r)"), @"problem.pddl:4:35: warning: `r` is of type robot, but `position` asks for place");
+    let domain = DOMAIN.replace("(position ?r) undefined", "(position ?r) ?r");
+    assert_ne!(domain, DOMAIN);
+    assert_snapshot!(warnings(&domain, "(seen home)"), @"domain.pddl:8:72: warning: `?r` is of type robot, but `position` asks for place");
+    assert_snapshot!(warnings(DOMAIN, "(= (position r) home)"), @"");
 }

@@ -230,9 +230,39 @@ fn mistakes_in_processes_and_events_say_what_to_do() {
     assert_snapshot!(read("(:process p :effect (at start (lit)))"), @"domain.pddl:6:21: error: `(at …)` does not belong here; a process has no start and no end of its own");
     assert_snapshot!(read("(:process p :effect (when (lit) (increase (level) (* #t 1))))"), @"domain.pddl:6:21: error: a conditional effect of a process; write a process of its own, with the condition as its precondition");
     assert_snapshot!(read("(:process p :effect (increase (level) 1))"), @"domain.pddl:6:21: error: `(increase …)` is no change that goes on; effects of a process are `(increase (f) (* #t rate))`");
-    assert_snapshot!(read("(:event e :effect (increase (level) (* #t 1)))"), @"domain.pddl:6:40: error: `#t` means nothing here; it belongs into continuous effects of durative actions, which stand outside of `at start` and `at end`");
+    assert_snapshot!(read("(:event e :effect (increase (level) (* #t 1)))"), @"domain.pddl:6:40: error: `#t` means nothing here; it belongs into effects of processes, and into continuous effects of durative actions, which stand outside of `at start` and `at end`");
     assert_snapshot!(read("(:event)"), @"domain.pddl:6:2: error: an event without a name; expected `(:event name …)`");
     assert_snapshot!(read("(:event e :condition (lit) :effect (not (lit)))"), @"domain.pddl:6:11: error: unknown keyword `:condition` in event `e`; did you mean `:precondition`?");
     assert_snapshot!(read("(:event e :effect (lit)) (:event e :effect (lit))"), @"domain.pddl:6:34: error: an event `e` is declared already; give each its own name");
     assert_snapshot!(read("(:constraint c)"), @"domain.pddl:6:14: error: a constraint `c` without a condition; expected `:condition` and what must hold in each state");
+}
+
+#[test]
+fn what_happens_by_itself_stands_in_no_plan() {
+    let task = plus(
+        "(:process fill :effect (increase (x) (* #t 1))) (:event e :precondition (p) :effect (not (p)))",
+        "(:init (= (x) 0)) (:goal (and))",
+    );
+    let read = |plan: &str| mistakes(read_plan(&Source::new("plan", plan), &task));
+    assert_snapshot!(read("1: (e)"), @"plan:1:5: error: `e` is an event; events and processes happen by themselves, and do not stand in plans");
+    assert_snapshot!(read("1: (fill) [3]"), @"plan:1:5: error: `fill` is a process; events and processes happen by themselves, and do not stand in plans");
+}
+
+/// `at` is a predicate of many domains.
+#[test]
+fn an_event_and_a_goal_have_no_start_and_no_end() {
+    let domain = "(define (domain d) (:predicates (at ?x ?y) (done))
+(:event e :precondition (at start (done)) :effect (not (done))))";
+    let read = |domain: &str, goal: &str| {
+        let problem =
+            format!("(define (problem p) (:domain d) (:objects start b) (:init) (:goal {goal}))");
+        mistakes(elbowroom_pddl::read_problem(
+            &Source::new("domain.pddl", domain),
+            &Source::new("problem.pddl", problem),
+        ))
+    };
+    assert_snapshot!(read(domain, "(done)"), @"domain.pddl:2:25: error: `(at …)` does not belong here; time specifiers belong into durative actions, and do not nest");
+    let domain = domain.replace("(at start (done))", "(done)");
+    assert_snapshot!(read(&domain, "(at end (done))"), @"problem.pddl:1:67: error: `(at …)` does not belong here; time specifiers belong into durative actions, and do not nest");
+    assert_snapshot!(read(&domain, "(at start b)"), @"none");
 }

@@ -15,7 +15,7 @@ use elbowroom::report::table::Table;
 use crate::args::{LearnArgs, ProblemArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
-use crate::limits::push_paragraph;
+use crate::limits::{push_paragraph, push_wrapped};
 use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
 use crate::words::counted;
@@ -321,6 +321,12 @@ fn conformal(text: &mut String, inside: &ConformalBox, look: Look) {
              intervals, but the plan does not survive everything in them.",
             styled(BAD, "outside")
         ),
+        Verdict::Undecided => format!(
+            "{}: with a probability of at least {percent} %, all durations of the next run lie in these \
+             intervals, but processes and events may take another course in them, and whether the plan \
+             survives that is not known.",
+            styled(HINT, "undecided")
+        ),
         Verdict::TooFew => format!(
             "{}: there are too few samples to promise {percent} %.",
             styled(BAD, "too few")
@@ -332,6 +338,9 @@ fn conformal(text: &mut String, inside: &ConformalBox, look: Look) {
     };
     text.push('\n');
     push_paragraph(text, &verdict, look.width);
+    if let Some(reason) = &inside.reason {
+        push_wrapped(text, reason, 2, look.width);
+    }
     if inside.intervals.is_empty() {
         return;
     }

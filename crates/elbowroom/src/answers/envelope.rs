@@ -343,8 +343,7 @@ impl Subject<'_> {
 
     /// That processes and events take another course than in the plan need not break it.
     fn refuse_harmless(&self, place: &str, why_not: &Explanation) -> Result<(), FlowError> {
-        let may_be_harmless = why_not.schedule.is_some() && why_not.verdict.is_none();
-        if self.request.task.autonomous().is_empty() || !may_be_harmless {
+        if !why_not.may_be_harmless(&self.request.task) {
             return Ok(());
         }
         let reason = &why_not.reason;

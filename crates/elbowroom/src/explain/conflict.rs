@@ -156,14 +156,10 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
         }
     }
     needs.reverse();
-    let reason = if walked
+    let mut orders = walked
         .iter()
-        .any(|origin| is_own_separation(explainer, *origin))
-    {
-        explainer.own_separation()
-    } else {
-        sentence(&needs, &rooms)
-    };
+        .filter_map(|origin| own_order(explainer, *origin, valuation));
+    let reason = orders.next().unwrap_or_else(|| sentence(&needs, &rooms));
     Some(Conflict {
         reason,
         excess: -negative.total,
@@ -200,11 +196,14 @@ impl Explainer<'_> {
             let own = bounds.iter().filter(move |(_, side)| *side == wanted);
             own.map(|(index, _)| &plan.constraints[*index])
         };
-        let is_separation = |it| is_own_separation(self, Edge::AtLeast(it));
-        if takes.is_empty() && constraints(Side::Lower).any(is_separation) {
-            return Some(self.own_separation());
-        }
         let nominal = self.plan.nominal();
+        let mut orders =
+            constraints(Side::Lower).filter_map(|it| own_order(self, Edge::AtLeast(it), &nominal));
+        if takes.is_empty()
+            && let Some(order) = orders.next()
+        {
+            return Some(order);
+        }
         let mut needs = takes;
         for constraint in constraints(Side::Lower) {
             if matches!(constraint.lower, Bound::Finite(_)) {
@@ -278,14 +277,26 @@ fn sentence(needs: &[String], rooms: &[Room]) -> String {
     }
 }
 
-/// Whether the edge keeps start and end of one action apart, because they interfere.
-fn is_own_separation(explainer: &Explainer<'_>, origin: Edge<'_>) -> bool {
-    match origin {
-        Edge::AtLeast(constraint) => {
-            constraint.reason == Reason::Interference
-                && explainer.plan.plan.duration_of(constraint).is_some()
+/// What the edge says if it keeps start and end of one action in their order: because they interfere,
+/// or because of constraints on the course, or processes and events.
+fn own_order(explainer: &Explainer<'_>, origin: Edge<'_>, valuation: &Valuation) -> Option<String> {
+    let Edge::AtLeast(constraint) = origin else {
+        return None;
+    };
+    let id = explainer.plan.plan.duration_of(constraint)?;
+    match constraint.reason {
+        Reason::Interference => Some(explainer.own_separation()),
+        Reason::Course | Reason::Pinned => {
+            let least = constraint.lower.at(valuation)?;
+            let is_order = least <= *explainer.task.epsilon();
+            is_order.then(|| {
+                format!(
+                    "{} must not end before it starts",
+                    explainer.action_name(id)
+                )
+            })
         }
-        Edge::AtMost(_) | Edge::Beginning => false,
+        _ => None,
     }
 }
 

@@ -144,6 +144,13 @@ impl Reader {
                 }
                 scope.unknowns.push(name);
             }
+            for name in &scope.unknowns[first..] {
+                if scope.variable(name).is_some() {
+                    self.report
+                        .error(node.span, format!("`{name}` is a parameter already"))
+                        .advise("a number that the plan chooses needs a name of its own");
+                }
+            }
             let all = (0_u32..).take(scope.unknowns.len());
             scope.controls = all.skip(first).collect();
         }

@@ -32,7 +32,8 @@ impl Reader {
                 reader.comparison(comparison, node, parts, scope)
             });
         }
-        if self.names.predicates.contains_key(head.as_ref()) && !is_connective(&head) {
+        let has_time = time_specifier(node).is_some_and(|(_, what)| !self.is_application(what));
+        if self.names.predicates.contains_key(head.as_ref()) && !is_connective(&head) && !has_time {
             return self.with_values(parts, scope, |reader, scope| {
                 reader
                     .atom(node, scope)

@@ -29,6 +29,15 @@ const MODALS: &[(&str, &str)] = &[
 /// The name of preferences without one.
 const ANONYMOUS: &str = "anonymous";
 
+/// Where forms of that name belong, which is not among the conditions on a state.
+pub(super) fn belongs_elsewhere(name: &str) -> Option<&'static str> {
+    if name == "preference" {
+        return Some("preferences stand among conditions, in goals and under `:constraints`");
+    }
+    let is_modal = MODALS.iter().any(|(modal, _)| *modal == name);
+    is_modal.then_some("constraints on the course stand under `:constraints`, and do not nest")
+}
+
 /// A preference found in a condition.
 #[derive(Debug)]
 pub(super) struct Soft {

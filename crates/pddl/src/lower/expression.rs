@@ -105,8 +105,8 @@ impl Reader {
                 self.report
                     .error(node.span, "`#t` means nothing here")
                     .advise(
-                        "it belongs into continuous effects of durative actions, \
-                         which stand outside of `at start` and `at end`",
+                        "it belongs into effects of processes, and into continuous effects of \
+                         durative actions, which stand outside of `at start` and `at end`",
                     );
                 WRONG
             }

@@ -35,13 +35,18 @@ impl Reader {
     fn application(&mut self, node: &Node, scope: &Scope) -> Option<(PredicateId, Vec<Term>)> {
         let (name, arguments) = node.form()?;
         let overloads = self.names.object_functions.get(name.as_ref())?;
-        let count = |id: PredicateId| self.problem.predicates[id.index()].parameters.len();
-        let fits = |id: &&PredicateId| count(**id) == arguments.len() + 1;
-        let predicate = *overloads.iter().find(fits).unwrap_or(&overloads[0]);
+        let predicate = self.overload(overloads, arguments.len());
         let parameters = &self.problem.predicates[predicate.index()].parameters;
         let parameters = parameters[..parameters.len() - 1].to_vec();
         let arguments = self.arguments(&name, node, arguments, &parameters, scope)?;
         Some((predicate, arguments))
+    }
+
+    /// Of the functions of one name, that with so many arguments.
+    fn overload(&self, overloads: &[PredicateId], arguments: usize) -> PredicateId {
+        let count = |id: PredicateId| self.problem.predicates[id.index()].parameters.len();
+        let fits = |id: &&PredicateId| count(**id) == arguments + 1;
+        *overloads.iter().find(fits).unwrap_or(&overloads[0])
     }
 
     /// The variable that stands for the value of a function.
@@ -51,6 +56,17 @@ impl Reader {
             .last()
             .expect("an object function has a value")
             .clone()
+    }
+
+    /// The value that a function is compared with, or gets.
+    fn given_value(&mut self, fluent: &Node, value: &Node, scope: &Scope) -> Option<Term> {
+        let given = self.term(value, scope)?;
+        let (name, arguments) = fluent.form()?;
+        let overloads = self.names.object_functions.get(name.as_ref())?;
+        let predicate = self.overload(overloads, arguments.len());
+        let asked = self.value_variable(predicate);
+        self.check_type(given, value.span, &name, &asked, scope);
+        Some(given)
     }
 
     /// Reads a condition in which object functions may be applied where arguments stand.
@@ -118,7 +134,7 @@ impl Reader {
             arguments.push(if is_undefined {
                 Term::Variable(scope.variables.len())
             } else {
-                match reader.term(value, scope) {
+                match reader.given_value(fluent, value, scope) {
                     Some(value) => value,
                     None => return Condition::TRUE,
                 }
@@ -168,7 +184,7 @@ impl Reader {
         let value = if value.is(UNDEFINED) {
             Some(None)
         } else {
-            self.term(value, scope).map(Some)
+            self.given_value(fluent, value, scope).map(Some)
         };
         let (Some((predicate, arguments)), Some(value)) = (application, value) else {
             return;
@@ -248,7 +264,7 @@ impl Reader {
         if value.is(UNDEFINED) {
             return Some((predicate, arguments, None));
         }
-        match self.term(value, &scope)? {
+        match self.given_value(fluent, value, &scope)? {
             Term::Object(value) => Some((predicate, arguments, Some(value))),
             Term::Variable(_) => None,
         }

@@ -2,7 +2,10 @@
 
 use elbowroom_model::problem::{Atom, Fluent, FunctionId, ObjectId, PredicateId, Term, Variable};
 
+use elbowroom_num::Rational;
+
 use crate::lower::Reader;
+use crate::lower::constraints::belongs_elsewhere;
 use crate::lower::scope::Scope;
 use crate::source::Span;
 use crate::syntax::Node;
@@ -100,6 +103,15 @@ impl Reader {
         if let Some(&object) = self.names.objects.get(word.as_ref()) {
             return Some(Term::Object(object));
         }
+        if word.parse::<Rational>().is_ok() {
+            self.report
+                .error(
+                    node.span,
+                    format!("`{}` is a number, not an object", node.quote()),
+                )
+                .advise("expected the name of an object, or a `?variable`");
+            return None;
+        }
         let near = self
             .report
             .nearest(&word, self.names.objects.keys().map(String::as_str));
@@ -146,7 +158,7 @@ impl Reader {
     }
 
     /// Warns when an argument need not be of the parameter's type.
-    fn check_type(
+    pub(super) fn check_type(
         &mut self,
         term: Term,
         span: Span,
@@ -210,6 +222,11 @@ impl Reader {
                     format!("`{name}` is a function, and no predicate"),
                 )
                 .advise("compare its value with an object, as in `(= (f) object)`");
+            return;
+        }
+        if let Some(advice) = belongs_elsewhere(name) {
+            let message = format!("`{}` does not belong here", node.quote());
+            self.report.error(node.head_span(), message).advise(advice);
             return;
         }
         let is_function = self.names.functions.contains_key(name);

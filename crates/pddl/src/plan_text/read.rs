@@ -277,6 +277,15 @@ impl<'a> PlanReader<'a> {
             let near = self
                 .report
                 .nearest(&name, self.schemas.keys().map(String::as_str));
+            let problem = self.task.problem();
+            let is_event = problem.events.iter().any(|event| event.name == name);
+            if is_event || problem.processes.iter().any(|own| own.name == name) {
+                let kind = if is_event { "an event" } else { "a process" };
+                self.report
+                    .error(span(&word.range), format!("`{}` is {kind}", word.text))
+                    .advise("events and processes happen by themselves, and do not stand in plans");
+                return None;
+            }
             self.report
                 .error(span(&word.range), format!("unknown action `{}`", word.text))
                 .advise("the domain has no action of this name")

@@ -1,15 +1,18 @@
 //! What each technique of the embedded planner is worth: states evaluated to the first plan, with
-//! all techniques, and with one of them switched off, or with one search of the portfolio alone.
+//! all techniques, and with one of them switched off, or with one search of the portfolio alone; and
+//! what that comes to on all instances together.
 //!
 //! ```text
-//! ablation [--states N] [--seconds S] [--without TECHNIQUE]… [--search NAME]… [--set NAME=VALUE]…
-//!          [--only TEXT]… FOLDER|DOMAIN PROBLEM…
+//! ablation [--states N] [--seconds S] [--processor-time] [--memory MEGABYTES]
+//!          [--without TECHNIQUE]… [--search NAME]… [--set NAME=VALUE]…
+//!          [--only TEXT]… [--every K] FOLDER|DOMAIN PROBLEM…
 //! ```
 //!
-//! Without `--without` and `--search`, each technique is switched off in turn. The table is
-//! Markdown. A search that has found nothing after N states (50,000) or S seconds (60) is shown as
-//! a dash with the states it has evaluated; only the number of states makes that the same on each
-//! machine.
+//! Without `--without` and `--search`, each technique that plays a part before the first plan is
+//! switched off in turn. The tables are Markdown. A search that has found nothing after N states (50,000) or S seconds (60; with
+//! `--processor-time`, of the processor) is shown as a dash with the states it has evaluated; only
+//! the number of states makes that the same on each machine. `--only` and `--every` are those of
+//! the example `coverage`.
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,
@@ -17,26 +20,40 @@
 )]
 #![allow(clippy::disallowed_methods, reason = "a benchmark looks at the clock")]
 
+#[path = "../coverage/clock.rs"]
+mod clock;
 #[path = "../coverage/instances.rs"]
 mod instances;
+mod summary;
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use clock::Clock;
 use elbowroom_model::Situation;
 use elbowroom_planner::{Answer, Counts, Settings, Technique, Tuning, TuningError, plan};
-use instances::{Instance, instances, task};
+use instances::{Instance, Selection, instances, task};
+use summary::{Answered, Comparison};
+
+/// What only better plans are looked for with.
+const AFTER_THE_FIRST_PLAN: [Technique; 3] = [
+    Technique::Rescheduling,
+    Technique::Repair,
+    Technique::Leniency,
+];
 
 struct Options {
     states: u64,
     time: Duration,
+    counts_processor_time: bool,
+    memory: Option<usize>,
     tuning: Tuning,
     /// A heading, and how to search.
     variants: Vec<(String, Tuning)>,
-    only: Vec<String>,
+    selection: Selection,
     files: Vec<PathBuf>,
 }
 
@@ -54,9 +71,11 @@ fn options() -> Result<Options, String> {
     let mut options = Options {
         states: 50_000,
         time: Duration::from_secs(60),
+        counts_processor_time: false,
+        memory: None,
         tuning: Tuning::default(),
         variants: Vec::new(),
-        only: Vec::new(),
+        selection: Selection::default(),
         files: Vec::new(),
     };
     let (mut without, mut searches) = (Vec::new(), Vec::new());
@@ -71,6 +90,9 @@ fn options() -> Result<Options, String> {
             let number: Result<u64, _> = value.parse();
             number.map_err(|_| format!("{argument} takes a number, not {value}"))
         };
+        let size = |number: u64| {
+            usize::try_from(number).map_err(|_| format!("{argument} takes a smaller number"))
+        };
         match argument.as_str() {
             "--states" => options.states = number(value()?)?,
             "--seconds" => options.time = Duration::from_secs(number(value()?)?),
@@ -84,12 +106,16 @@ fn options() -> Result<Options, String> {
                 let name = value()?;
                 searches.push((name.parse().map_err(wrong)?, name));
             }
-            "--only" => options.only.push(value()?),
+            "--only" => options.selection.only.push(value()?),
+            "--every" => options.selection.every = Some(size(number(value()?)?)?),
+            "--memory" => options.memory = Some(size(number(value()?)?)? << 20),
+            "--processor-time" => options.counts_processor_time = true,
             _ => options.files.push(PathBuf::from(argument)),
         }
     }
     if without.is_empty() && searches.is_empty() {
-        without.extend(Technique::ALL.iter().map(|(technique, _)| *technique));
+        let all = Technique::ALL.iter().map(|(technique, _)| *technique);
+        without.extend(all.filter(|own| !AFTER_THE_FIRST_PLAN.contains(own)));
     }
     let base = &options.tuning;
     options.variants.push(("all".to_owned(), base.clone()));
@@ -109,19 +135,26 @@ fn options() -> Result<Options, String> {
 }
 
 fn table(options: &Options) -> Result<(), String> {
-    let instances = instances(&options.files, &options.only)?;
+    let instances = instances(&options.files, &options.selection)?;
     let headings = options.variants.iter().map(|(heading, _)| heading.as_str());
     println!(
         "| instance | actions | {} |",
         headings.collect::<Vec<_>>().join(" | ")
     );
     println!("|---|--:|{}", "--:|".repeat(options.variants.len()));
+    // What became of each instance, for each variant.
+    let mut outcomes: Vec<Vec<Option<Answered>>> = vec![Vec::new(); options.variants.len()];
     for instance in &instances {
         let mut line = String::new();
         let mut actions = 0;
-        for (_, tuning) in &options.variants {
-            let (text, counts) = cell(options, tuning, instance);
-            actions = actions.max(counts.actions);
+        for ((_, tuning), outcomes) in options.variants.iter().zip(&mut outcomes) {
+            let Cell {
+                text,
+                actions: own,
+                answered,
+            } = cell(options, tuning, instance);
+            actions = actions.max(own);
+            outcomes.push(answered);
             let _ = write!(line, " {text} |");
         }
         println!(
@@ -129,33 +162,63 @@ fn table(options: &Options) -> Result<(), String> {
             instance.domain, instance.name
         );
     }
+    let headings = options.variants.iter().map(|(heading, _)| heading.as_str());
+    println!();
+    print!("{}", Comparison::table(headings.zip(&outcomes)));
     Ok(())
 }
 
-/// How many states were evaluated to the first plan, in words.
-fn cell(options: &Options, tuning: &Tuning, instance: &Instance) -> (String, Counts) {
+/// What one search came to.
+struct Cell {
+    /// How many states were evaluated to the first plan, in words.
+    text: String,
+    actions: u64,
+    /// `None` if there was neither a plan nor a proof.
+    answered: Option<Answered>,
+}
+
+fn cell(options: &Options, tuning: &Tuning, instance: &Instance) -> Cell {
+    let cell = |text: String, counts: Counts, answered| Cell {
+        text,
+        actions: counts.actions,
+        answered,
+    };
     let task = match task(instance) {
         Ok(task) => task,
-        Err(outcome) => return (outcome.to_owned(), Counts::default()),
+        Err(outcome) => return cell(outcome.to_owned(), Counts::default(), None),
     };
     let situation = Situation::initial(&task);
-    let settings = Settings {
+    let mut settings = Settings {
         first_plan_only: true,
         tuning: tuning.clone(),
         ..Settings::default()
     };
-    let begin = Instant::now();
+    settings.max_memory = options.memory.unwrap_or(settings.max_memory);
+    let clock = Clock::now(options.counts_processor_time);
     let answer = plan(&task, &situation, &settings, &mut |progress| {
-        if progress.counts.evaluated >= options.states || begin.elapsed() >= options.time {
+        if progress.counts.evaluated >= options.states || clock.elapsed() >= options.time {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
         }
     });
+    let answered = |counts: &Counts| {
+        Some(Answered {
+            states: counts.evaluated,
+            time: clock.elapsed(),
+        })
+    };
     match answer {
-        Answer::Plan { counts, .. } => (counts.evaluated.to_string(), counts),
-        Answer::Unsolvable { counts, .. } => (format!("no plan, {}", counts.evaluated), counts),
-        Answer::NoneFound { counts, .. } => (format!("– in {}", counts.evaluated), counts),
-        Answer::Unsupported(_) => ("unsupported".to_owned(), Counts::default()),
+        Answer::Plan { counts, .. } => {
+            cell(counts.evaluated.to_string(), counts, answered(&counts))
+        }
+        Answer::Unsolvable { counts, .. } => {
+            let text = format!("no plan, {}", counts.evaluated);
+            cell(text, counts, answered(&counts))
+        }
+        Answer::NoneFound { counts, .. } => {
+            cell(format!("– in {}", counts.evaluated), counts, None)
+        }
+        Answer::Unsupported(_) => cell("unsupported".to_owned(), Counts::default(), None),
     }
 }

@@ -1,5 +1,6 @@
 //! The problems to run: those of a folder of benchmarks, or files.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use elbowroom_model::Task;
@@ -14,17 +15,27 @@ pub(crate) struct Instance {
     pub(crate) problem_file: PathBuf,
 }
 
+/// Which instances of a folder are wanted.
+#[derive(Debug, Default)]
+pub(crate) struct Selection {
+    /// Those whose lines contain one of the texts; all of them if there are no texts.
+    pub(crate) only: Vec<String>,
+    /// Each one of so many of a domain, beginning with the first, if the domain has durative
+    /// actions.
+    pub(crate) every: Option<usize>,
+}
+
 /// The problems that the arguments name: a folder with a `manifest.csv`, or a domain and problems.
-/// Of a folder, the lines that contain one of the texts; all of them if there are no texts.
 ///
 /// The first line of a manifest names its columns: `domain`, `instance`, `domain_file` and
-/// `problem_file`, in any order; there may be a `collection` and others.
+/// `problem_file`, in any order; there may be a `collection`, `durative_actions` (how many the domain
+/// has), and others.
 ///
 /// # Errors
 /// When there is nothing to run.
-pub(crate) fn instances(files: &[PathBuf], only: &[String]) -> Result<Vec<Instance>, String> {
+pub(crate) fn instances(files: &[PathBuf], selection: &Selection) -> Result<Vec<Instance>, String> {
     match files {
-        [folder] => of_folder(folder, only),
+        [folder] => of_folder(folder, selection),
         [domain, problems @ ..] => {
             let stem = |path: &Path| {
                 let stem = path.file_stem().unwrap_or_default();
@@ -42,7 +53,7 @@ pub(crate) fn instances(files: &[PathBuf], only: &[String]) -> Result<Vec<Instan
     }
 }
 
-fn of_folder(folder: &Path, only: &[String]) -> Result<Vec<Instance>, String> {
+fn of_folder(folder: &Path, selection: &Selection) -> Result<Vec<Instance>, String> {
     // `.` has no name.
     let folder = folder.canonicalize();
     let folder = &folder.map_err(|error| format!("there is no such folder: {error}"))?;
@@ -57,7 +68,9 @@ fn of_folder(folder: &Path, only: &[String]) -> Result<Vec<Instance>, String> {
     };
     let (domain, instance) = (column("domain")?, column("instance")?);
     let files = [column("domain_file")?, column("problem_file")?];
-    let collection = column("collection").ok();
+    let (collection, durative) = (column("collection").ok(), column("durative_actions").ok());
+    let Selection { only, every } = selection;
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     let mut instances = Vec::new();
     for line in lines.filter(|line| !line.trim().is_empty()) {
         if !only.is_empty() && !only.iter().any(|text| line.contains(text.as_str())) {
@@ -76,8 +89,19 @@ fn of_folder(folder: &Path, only: &[String]) -> Result<Vec<Instance>, String> {
                 .to_string_lossy()
                 .into_owned(),
         };
+        let own = format!("{own}/{}", cell(domain)?);
+        if let Some(every) = *every {
+            if durative.map(cell).transpose()? == Some("0") {
+                continue;
+            }
+            let count = counts.entry(own.clone()).or_default();
+            *count += 1;
+            if !(*count - 1).is_multiple_of(every.max(1)) {
+                continue;
+            }
+        }
         instances.push(Instance {
-            domain: format!("{own}/{}", cell(domain)?),
+            domain: own,
             name: cell(instance)?.to_owned(),
             domain_file: folder.join(cell(files[0])?),
             problem_file: folder.join(cell(files[1])?),

@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! coverage [--limit SECONDS] [--processor-time] [--memory MEGABYTES] [--first] [--only TEXT]…
-//!          [--plans] [--threads N]
+//!          [--every K] [--plans] [--threads N]
 //!          [--set NAME=VALUE]… [--without TECHNIQUE]… [--search NAME] FOLDER|DOMAIN PROBLEM…
 //! ```
 //!
 //! FOLDER holds a `manifest.csv`, whose first line names its columns: `domain`, `instance`,
 //! `domain_file` and `problem_file` must be among them, `collection` may. `--only` keeps the lines
-//! that contain one of the texts. With a domain and problems instead, these are run. With
+//! that contain one of the texts, and `--every` each Kth of the instances of a domain with durative
+//! actions. With a domain and problems instead, these are run. With
 //! `--plans`, plans are printed to standard error. `--set` changes a constant of the search
 //! (`embedded/tuning.rs`), `--without` switches a technique off, and `--search` runs one search of
 //! the portfolio alone. With `--processor-time`, limits and times are those of the processor, as
@@ -21,6 +22,7 @@
 )]
 #![allow(clippy::disallowed_methods, reason = "a benchmark looks at the clock")]
 
+mod clock;
 mod instances;
 
 use std::ops::ControlFlow;
@@ -28,13 +30,14 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use clock::Clock;
 use elbowroom_model::Situation;
 use elbowroom_planner::{Answer, Found, Progress, Settings, TuningError, plan};
-use instances::{Instance, instances, task};
+use instances::{Instance, Selection, instances, task};
 
 struct Options {
     limit: Duration,
-    only: Vec<String>,
+    selection: Selection,
     prints_plans: bool,
     counts_processor_time: bool,
     settings: Settings,
@@ -44,7 +47,7 @@ struct Options {
 fn main() -> ExitCode {
     let run_all = || {
         let options = options()?;
-        let instances = instances(&options.files, &options.only)?;
+        let instances = instances(&options.files, &options.selection)?;
         println!(
             "domain,instance,outcome,first_seconds,first_makespan,best_makespan,total_seconds,\
              read_seconds,actions,states,megabytes,first_metric,best_metric"
@@ -66,7 +69,7 @@ fn main() -> ExitCode {
 fn options() -> Result<Options, String> {
     let mut options = Options {
         limit: Duration::from_secs(30),
-        only: Vec::new(),
+        selection: Selection::default(),
         prints_plans: false,
         counts_processor_time: false,
         settings: Settings::default(),
@@ -104,7 +107,11 @@ fn options() -> Result<Options, String> {
             }
             "--without" => tuning.without.push(value()?.parse().map_err(wrong)?),
             "--search" => tuning.only = Some(value()?.parse().map_err(wrong)?),
-            "--only" => options.only.push(value()?),
+            "--only" => options.selection.only.push(value()?),
+            "--every" => {
+                let every: Result<usize, _> = value()?.parse();
+                options.selection.every = Some(every.map_err(|_| "--every takes a number")?);
+            }
             "--first" => options.settings.first_plan_only = true,
             "--plans" => options.prints_plans = true,
             "--processor-time" => options.counts_processor_time = true,
@@ -202,35 +209,4 @@ fn run(options: &Options, instance: &Instance) {
         counts.evaluated,
         counts.memory >> 20
     );
-}
-
-/// Measures time from a moment on.
-struct Clock {
-    begin: Instant,
-    /// The processor time at the moment, if that is what is measured.
-    spent: Option<Duration>,
-}
-
-impl Clock {
-    fn now(counts_processor_time: bool) -> Self {
-        Self {
-            begin: Instant::now(),
-            spent: processor_time().filter(|_| counts_processor_time),
-        }
-    }
-
-    fn elapsed(&self) -> Duration {
-        let spent = self.spent.zip(processor_time());
-        spent.map_or_else(
-            || self.begin.elapsed(),
-            |(begin, now)| now.saturating_sub(begin),
-        )
-    }
-}
-
-/// The processor time of the main thread, in which the planner runs.
-fn processor_time() -> Option<Duration> {
-    let text = std::fs::read_to_string("/proc/self/schedstat").ok()?;
-    let nanoseconds = text.split_whitespace().next()?.parse().ok()?;
-    Some(Duration::from_nanos(nanoseconds))
 }

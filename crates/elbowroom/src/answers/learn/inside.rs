@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::AnyPlan;
 use crate::answers::envelope::{EnvelopeRequest, envelope};
 use crate::answers::{RequestError, Watcher, exact};
+use crate::explain::Explainer;
 use crate::flow::FlowError;
 
 /// Asks for intervals that hold all durations of the next execution of a plan at once, with a
@@ -37,6 +38,9 @@ pub struct ConformalBox {
     pub probability: f64,
     /// Whether the plan survives whatever lies in the intervals.
     pub verdict: Verdict,
+    /// Why the plan does not survive everything in the intervals, or why that is not known.
+    #[serde(default)]
+    pub reason: Option<String>,
     /// The intervals, in the order of the plan's parameters.
     pub intervals: Vec<ConformalInterval>,
 }
@@ -50,6 +54,9 @@ pub enum Verdict {
     Inside,
     /// The first holds, but the plan does not survive everything in the intervals.
     Outside,
+    /// The first holds, but the course of processes and events may become another one in the
+    /// intervals, and whether the plan survives that is not known.
+    Undecided,
     /// There are too few samples for some action.
     TooFew,
     /// The plan does not work even as planned.
@@ -106,6 +113,7 @@ pub(super) fn answer(
         return Ok(ConformalBox {
             probability: request.probability,
             verdict: Verdict::NoEnvelope,
+            reason: None,
             intervals: Vec::new(),
         });
     };
@@ -145,18 +153,42 @@ pub(super) fn answer(
         });
         boxed = boxed.with_interval(duration.index.into(), interval);
     }
+    let mut reason = None;
     if verdict == Verdict::Inside {
         let mut oracle =
             Oracle::new(&request.task, &plan, request.guarantee).map_err(FlowError::from)?;
         let objection = oracle.objection(&boxed).map_err(FlowError::from)?;
-        if objection.is_some() {
-            verdict = Verdict::Outside;
+        if let Some(objection) = objection {
+            let explainer = Explainer::new(&request.task, &plan);
+            let why_not = explainer.objection(&oracle, &boxed, &objection);
+            (verdict, reason) = if !why_not.may_be_harmless(&request.task) {
+                (Verdict::Outside, Some(why_not.reason))
+            } else if let Some(violation) = violation_at_an_end(&explainer, &boxed) {
+                (Verdict::Outside, Some(violation))
+            } else {
+                (Verdict::Undecided, Some(why_not.reason))
+            };
         }
     }
     Ok(ConformalBox {
         probability: request.probability,
         verdict,
+        reason,
         intervals,
+    })
+}
+
+/// What the judge says against the plan where all durations are as short, or as long, as the box
+/// allows.
+fn violation_at_an_end(explainer: &Explainer<'_>, boxed: &DecoupledEnvelope) -> Option<String> {
+    Side::BOTH.into_iter().find_map(|side| {
+        let mut valuation = explainer.plan.nominal();
+        for (index, interval) in boxed.intervals().iter().enumerate() {
+            if let Some(value) = side.of(interval).value() {
+                valuation[index.into()] = value.clone();
+            }
+        }
+        explainer.verdict_at(valuation)
     })
 }
 

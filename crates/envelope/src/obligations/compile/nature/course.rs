@@ -3,6 +3,7 @@
 mod ahead;
 mod fire;
 mod needs;
+mod part;
 mod work;
 
 use std::cell::OnceCell;
@@ -20,6 +21,7 @@ use crate::linear::Linear;
 use crate::obligations::dnf::{Alternatives, Wanted};
 use crate::obligations::timeline::{Reading, Timeline};
 use crate::obligations::{Inequality, Obligations, Refusal, Requirement};
+use part::Part;
 
 /// How many turns of events and processes there may be between two happenings of the plan.
 const MOST_TURNS: usize = 200;
@@ -151,16 +153,22 @@ impl<'a> Course<'a> {
         self.expect_order(next)?;
         for _ in 0..MOST_TURNS {
             self.settle()?;
+            self.demand_conditions_now(!self.has_moved())?;
             let until = time_of(next);
-            if let Some(turn) = self.next_turn(&until)? {
-                self.expect_later(&turn)?;
-                self.advance(turn, false)?;
-                self.must_go_on = false;
-                self.happens_now()?;
+            let turn = self.next_turn(&until)?;
+            let is_arrival = turn.is_none();
+            let part = self.part_until(turn.unwrap_or(until))?;
+            if let Some(pause) = part.pause.clone() {
+                let part = self.part_until(pause)?;
+                self.turn_after(part)?;
+                continue;
+            }
+            if !is_arrival {
+                self.turn_after(part)?;
                 continue;
             }
             self.expect_order(next)?;
-            self.advance(until, true)?;
+            self.advance(part, true)?;
             let before = self.occurred.len();
             self.happens_now()?;
             if self.occurred.len() > before {
@@ -175,6 +183,14 @@ impl<'a> Course<'a> {
             "there are more than {MOST_TURNS} events and turns of processes before the next \
              happening"
         )))
+    }
+
+    /// Goes on to a turn, or a pause.
+    fn turn_after(&mut self, part: Part) -> Result<(), Refusal> {
+        self.expect_later(&part.to)?;
+        self.advance(part, false)?;
+        self.must_go_on = false;
+        self.happens_now()
     }
 
     /// In the end.
@@ -256,12 +272,7 @@ impl<'a> Course<'a> {
     /// [`demand`](Self::demand), of the course that is followed: it goes on as it does, unless the
     /// order of what falls together is not known.
     fn expect(&mut self, course: &str, broken: Alternatives) -> Result<(), Refusal> {
-        let holds = |inequality: &Inequality| {
-            let value = &inequality.expression;
-            let value = value.value(&self.nature.times, &self.nature.values);
-            value.is_negative() || value.is_zero() && !inequality.is_strict
-        };
-        if broken.iter().any(|case| case.iter().all(holds)) {
+        if self.is_nominally(&broken) {
             return Err(self.obstacle(
                 "as planned, things fall together whose order is not known then: happenings, \
                  events, or processes that start or stop",
@@ -269,6 +280,16 @@ impl<'a> Course<'a> {
         }
         self.demand(course, broken);
         Ok(())
+    }
+
+    /// Whether one of the alternatives comes about in the schedule that is followed.
+    fn is_nominally(&self, alternatives: &Alternatives) -> bool {
+        let holds = |inequality: &Inequality| {
+            let value = &inequality.expression;
+            let value = value.value(&self.nature.times, &self.nature.values);
+            value.is_negative() || value.is_zero() && !inequality.is_strict
+        };
+        alternatives.iter().any(|case| case.iter().all(holds))
     }
 
     /// The condition is as wanted at this moment.
@@ -312,49 +333,18 @@ impl<'a> Course<'a> {
     }
 
     /// Goes on to a later moment; `is_arrival` at the next happening.
-    fn advance(&mut self, to: Linear, is_arrival: bool) -> Result<(), Refusal> {
-        self.demand_conditions_now(!self.has_moved())?;
-        let elapsed = to.minus(&self.at);
-        let mut then = self.now.clone();
-        for (fluent, rate) in &self.rates {
-            let value = self.view(&self.now).value(&Expression::Fluent(*fluent))?;
-            let change = rate.times(&elapsed).ok_or_else(|| Refusal::NotLinear {
-                place: "processes and events".to_owned(),
-                expression: self.compiler.task.fluent_name(*fluent),
-            })?;
-            then.put_value(*fluent, Some(value.plus(&change)));
-        }
-        let (mut expected, mut demands) = (Vec::new(), Vec::new());
-        let autonomous = self.nature_of_task();
-        let (before, after) = (self.view(&self.now), self.view(&then));
-        for event in &autonomous.events {
-            let broken =
-                before.broken_throughout((&after, &elapsed), &event.snap.condition, false)?;
-            expected.push((course_of(event, false), broken));
-        }
-        for (process, on) in autonomous.processes.iter().zip(&self.at_work) {
-            let broken = before.broken_throughout((&after, &elapsed), &process.condition, *on)?;
-            expected.push((turn_of(&process.name, *on), broken));
-        }
-        for (id, conditions) in &self.running {
-            let (before, after) = (self.view_of(&self.now, *id), self.view_of(&then, *id));
-            for condition in conditions {
-                self.refuse_derived_numbers(condition, before.reading.place)?;
-                let broken = before.broken_throughout((&after, &elapsed), condition, true)?;
-                demands.push((self.need(*id, condition), broken));
-            }
-        }
-        for (course, broken) in expected {
+    fn advance(&mut self, part: Part, is_arrival: bool) -> Result<(), Refusal> {
+        for (course, broken) in part.expected {
             self.expect(&course, broken)?;
         }
-        for (course, broken) in demands {
+        for (course, broken) in part.demanded {
             self.demand(&course, broken);
         }
         // The timeline itself knows what changes because of the plan alone.
         let moved = self.rates.keys().copied();
         (self.fluents).extend(moved.filter(|fluent| self.nature.fluents.contains(fluent)));
-        self.now = then;
-        self.at = to;
+        self.now = part.then;
+        self.at = part.to;
         self.fired.clear();
         self.demand_conditions_on_arrival(is_arrival)
     }

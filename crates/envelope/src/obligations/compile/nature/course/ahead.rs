@@ -85,7 +85,7 @@ impl Course<'_> {
 
 /// After how much time, in the schedule that is followed, the numbers of a condition reach its
 /// bounds; and, if that can be said, in all schedules.
-fn zeros(
+pub(super) fn zeros(
     view: &View<'_>,
     condition: &Condition,
 ) -> Result<Vec<(Rational, Option<Linear>)>, Refusal> {

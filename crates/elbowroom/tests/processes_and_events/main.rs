@@ -1,18 +1,17 @@
 //! Envelopes of plans with processes and events: random worlds and random plans in them. What a box
 //! promises is attacked with the judge, which follows each course on its own, by polynomials.
 
+mod by_hand;
+mod races;
+#[path = "../shared/mod.rs"]
 mod shared;
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::answers::Unwatched;
-use elbowroom::answers::envelope::{EnvelopeRequest, envelope};
 use elbowroom_envelope::obligations::Refusal;
-use elbowroom_envelope::{Guarantee, Oracle, irr, sharpen};
+use elbowroom_envelope::{Guarantee, Oracle};
 use elbowroom_model::Task;
 use elbowroom_model::validate::{Settings, Verdict, validate};
 use elbowroom_num::{Interval, Rational};
@@ -57,6 +56,25 @@ fn condition(rng: &mut ChaCha8Rng) -> String {
     }
 }
 
+/// What an event watches. A number may pass through all that makes it happen between two happenings,
+/// and of two numbers one may come too early for the other.
+fn watched(rng: &mut ChaCha8Rng) -> String {
+    match rng.random_range(0..4) {
+        0 | 1 => comparison(rng),
+        2 => {
+            let (fluent, lower) = (rng.random_range(0..3), number(rng, -6..=8));
+            let upper = &lower + number(rng, 0..=2);
+            format!("(and (>= (x{fluent}) {lower}) (<= (x{fluent}) {upper}))")
+        }
+        _ => {
+            let fluent = rng.random_range(0..3);
+            let (below, above) = (number(rng, -4..=8), number(rng, -4..=8));
+            let other = (fluent + 1) % 3;
+            format!("(and (<= (x{fluent}) {below}) (> (x{other}) {above}))")
+        }
+    }
+}
+
 /// A change of a number, at once.
 fn change(rng: &mut ChaCha8Rng) -> String {
     let operator = ["increase", "decrease", "assign"].choose(rng).expect("few");
@@ -92,7 +110,7 @@ fn world(rng: &mut ChaCha8Rng) -> (String, String) {
             Some(rest) => rest.trim_end_matches(')').to_owned() + ")",
             None => format!("(not {own})"),
         };
-        let (when, mut effect) = (comparison(rng), undone);
+        let (when, mut effect) = (watched(rng), undone);
         if rng.random_bool(0.6) {
             effect += &change(rng);
         }
@@ -260,18 +278,19 @@ fn in_words(refusal: &Refusal) -> String {
     }
 }
 
-#[test]
-#[allow(clippy::print_stdout, reason = "says what was attacked")]
-fn schedules_in_boxes_of_random_plans_with_processes_and_events_pass_the_judge() {
-    let worlds = std::env::var("ELBOWROOM_WORLDS").ok();
-    let worlds = worlds.and_then(|text| text.parse().ok()).unwrap_or(600);
-    let mut rng = ChaCha8Rng::seed_from_u64(2006);
+/// Boxes of random plans in random worlds, attacked with the judge.
+fn attack(
+    worlds: usize,
+    rng: &mut ChaCha8Rng,
+    world: fn(&mut ChaCha8Rng) -> (String, String),
+    plan_of: fn(&mut ChaCha8Rng) -> (String, String),
+) -> Count {
     let mut count = Count::default();
     for _ in 0..worlds {
-        let (domain, problem) = world(&mut rng);
+        let (domain, problem) = world(rng);
         let task = Arc::new(task_of(&domain, &problem));
         for _ in 0..4 {
-            let (fixed, open) = plan(&mut rng);
+            let (fixed, open) = plan_of(rng);
             let (planned, _) = read_plan(&Source::new("plan", fixed), &task).expect("a plan");
             if !validate(&task, &planned, &Settings::default()).is_valid() {
                 continue;
@@ -293,12 +312,12 @@ fn schedules_in_boxes_of_random_plans_with_processes_and_events_pass_the_judge()
                 continue;
             }
             for _ in 0..6 {
-                let envelope = some_box(&plan, &mut rng);
+                let envelope = some_box(&plan, rng);
                 if envelope == point {
                     continue;
                 }
                 let is_inside = oracle.objection(&envelope).expect("within reach").is_none();
-                let refuted = refuted(&task, &plan, &envelope, &mut rng);
+                let refuted = refuted(&task, &plan, &envelope, rng);
                 match refuted {
                     Some((valuation, verdict)) if is_inside => panic!(
                         "{domain}\n{problem}\n{open}\n{envelope:?}\n{valuation:?}\n{verdict:?}"
@@ -310,6 +329,20 @@ fn schedules_in_boxes_of_random_plans_with_processes_and_events_pass_the_judge()
             }
         }
     }
+    count
+}
+
+/// So many, or as many as the environment asks for.
+fn worlds(so_many: usize) -> usize {
+    let asked = std::env::var("ELBOWROOM_WORLDS").ok();
+    asked.and_then(|text| text.parse().ok()).unwrap_or(so_many)
+}
+
+#[test]
+#[allow(clippy::print_stdout, reason = "says what was attacked")]
+fn schedules_in_boxes_of_random_plans_with_processes_and_events_pass_the_judge() {
+    let mut rng = ChaCha8Rng::seed_from_u64(2006);
+    let count = attack(worlds(600), &mut rng, world, plan);
     println!("{count:#?}");
     let refused: usize = count.refused.values().sum();
     assert!(
@@ -322,48 +355,4 @@ fn schedules_in_boxes_of_random_plans_with_processes_and_events_pass_the_judge()
         count.not_as_they_are * 100 < count.valid,
         "many plans are not accepted as they are"
     );
-}
-
-fn kettle(file: &str) -> (Arc<Task>, Source) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/kettle");
-    let task = shared::task(&folder.join("domain.pddl"), &folder.join("problem.pddl"));
-    (
-        Arc::new(task.expect("a case without mistakes")),
-        shared::source(&folder.join(file)),
-    )
-}
-
-/// The box is worked by hand in the problem file.
-#[test]
-fn the_kettle_boils_before_the_tea_is_poured() {
-    let (task, text) = kettle("tea.stn");
-    let plan = Arc::new(format::read(&text, &task).expect("a readable plan"));
-    let mut oracle = Oracle::new(&task, &plan, Guarantee::Weak).expect("within reach");
-    let settings = elbowroom_envelope::Settings::default();
-    let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(()));
-    let found = run
-        .expect("within reach")
-        .envelope
-        .expect("it works as planned");
-    let found = sharpen(&mut oracle, &found, &mut || ControlFlow::Continue(()));
-    let found = found.expect("within reach").expect("it was found inside");
-    let number = |text: &str| text.parse::<Rational>().expect("a number");
-    let expected = [("6", "10"), ("8.001", "28")]
-        .map(|(lower, upper)| Interval::closed(number(lower), number(upper)));
-    assert_eq!(found.intervals(), expected);
-}
-
-/// A plan with fixed times keeps its order, and the executor as much freedom as all that leaves.
-#[test]
-fn a_plan_with_fixed_times_leaves_durations_open() {
-    let (task, text) = kettle("tea.plan");
-    let (plan, _) = read_plan(&text, &task).expect("a readable plan");
-    let request = EnvelopeRequest::new(&task, plan);
-    let outcome = envelope(&request, &mut Unwatched).expect("within reach");
-    let plan = outcome.plan.expect("a network");
-    let found = outcome.envelope.expect("it works as planned");
-    let has_room = |own: &Interval| own.width().is_none_or(|width| width.is_positive());
-    assert!(found.intervals().iter().all(has_room), "{found:?}");
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    assert_eq!(refuted(&task, &plan, &found, &mut rng), None);
 }

@@ -1,0 +1,102 @@
+//! What a part has to keep to, in which nothing turns and all numbers change at constant rates.
+
+use elbowroom_model::ground::{Condition, Expression};
+use elbowroom_num::Rational;
+
+use super::super::condition::View;
+use super::ahead::zeros;
+use super::{Course, course_of, turn_of};
+use crate::linear::Linear;
+use crate::obligations::Refusal;
+use crate::obligations::dnf::Alternatives;
+use crate::obligations::timeline::Timeline;
+
+/// A part from now on.
+pub(super) struct Part {
+    pub(super) to: Linear,
+    /// What holds and counts when it ends.
+    pub(super) then: Timeline,
+    /// How the course can become another one than that which is followed.
+    pub(super) expected: Vec<(String, Alternatives)>,
+    /// How what must hold throughout can fail to.
+    pub(super) demanded: Vec<(String, Alternatives)>,
+    /// A moment before its end at which to look again: it is too long for one look. Of a condition
+    /// that is false, for example, one part is false at first and another one later.
+    pub(super) pause: Option<Linear>,
+}
+
+impl Course<'_> {
+    /// The part that ends at a moment.
+    pub(super) fn part_until(&self, to: Linear) -> Result<Part, Refusal> {
+        let elapsed = to.minus(&self.at);
+        let mut then = self.now.clone();
+        for (fluent, rate) in &self.rates {
+            let value = self.view(&self.now).value(&Expression::Fluent(*fluent))?;
+            let change = rate.times(&elapsed).ok_or_else(|| Refusal::NotLinear {
+                place: "processes and events".to_owned(),
+                expression: self.compiler.task.fluent_name(*fluent),
+            })?;
+            then.put_value(*fluent, Some(value.plus(&change)));
+        }
+        let (mut expected, mut demanded) = (Vec::new(), Vec::new());
+        let mut pauses = Vec::new();
+        let autonomous = self.nature_of_task();
+        let (before, after) = (self.view(&self.now), self.view(&then));
+        let length = before.nominally(&elapsed);
+        for event in &autonomous.events {
+            let condition = &event.snap.condition;
+            let broken = before.broken_throughout((&after, &elapsed), condition, false)?;
+            self.pause_in(&before, condition, (&broken, &length), &mut pauses)?;
+            expected.push((course_of(event, false), broken));
+        }
+        for (process, on) in autonomous.processes.iter().zip(&self.at_work) {
+            let condition = &process.condition;
+            let broken = before.broken_throughout((&after, &elapsed), condition, *on)?;
+            self.pause_in(&before, condition, (&broken, &length), &mut pauses)?;
+            expected.push((turn_of(&process.name, *on), broken));
+        }
+        for (id, conditions) in &self.running {
+            let (before, after) = (self.view_of(&self.now, *id), self.view_of(&then, *id));
+            for condition in conditions {
+                self.refuse_derived_numbers(condition, before.reading.place)?;
+                let broken = before.broken_throughout((&after, &elapsed), condition, true)?;
+                self.pause_in(&before, condition, (&broken, &length), &mut pauses)?;
+                demanded.push((self.need(*id, condition), broken));
+            }
+        }
+        // Of several at one moment, the first that was found.
+        let first = pauses
+            .into_iter()
+            .reduce(|first, other| if other.0 < first.0 { other } else { first });
+        Ok(Part {
+            pause: first.map(|(_, later)| self.at.plus(&later)),
+            to,
+            then,
+            expected,
+            demanded,
+        })
+    }
+
+    /// The moments within the part at which numbers of a condition reach their bounds, if as
+    /// planned it does not count as being the same throughout.
+    fn pause_in(
+        &self,
+        view: &View<'_>,
+        condition: &Condition,
+        (broken, length): (&Alternatives, &Rational),
+        pauses: &mut Vec<(Rational, Linear)>,
+    ) -> Result<(), Refusal> {
+        if !self.is_nominally(broken) {
+            return Ok(());
+        }
+        for (elapsed, later) in zeros(view, condition)? {
+            if let Some(later) = later
+                && elapsed.is_positive()
+                && elapsed < *length
+            {
+                pauses.push((elapsed, later));
+            }
+        }
+        Ok(())
+    }
+}
