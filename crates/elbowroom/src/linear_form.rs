@@ -141,7 +141,8 @@ fn unfolded(
     most_places: usize,
 ) -> Result<Vec<BadCase>, Refusal> {
     let mut cuts = Vec::new();
-    if !order.cuts(over_all, most_places, &mut Vec::new(), &mut cuts) {
+    let events = over_all.events(false);
+    if !order.cuts((over_all, &events), most_places, &mut Vec::new(), &mut cuts) {
         return Err(Refusal::TooManyCases {
             place: plan.plan.instance(over_all.instance).action.name.clone(),
             limit: most_places,
@@ -154,8 +155,8 @@ fn unfolded(
             Difference::before(over_all.start, moment),
             Difference::before(moment, over_all.end),
         ];
-        let events = over_all.events.iter().zip(&happened);
-        differences.extend(events.map(|(&event, &has_happened)| {
+        let placed = events.iter().zip(&happened);
+        differences.extend(placed.map(|(&event, &has_happened)| {
             if has_happened {
                 Difference::not_after(event, moment)
             } else {
@@ -163,10 +164,10 @@ fn unfolded(
             }
         }));
         let cut = |node: NodeId| {
-            let position = over_all.events.iter().position(|event| *event == node);
+            let position = events.iter().position(|event| *event == node);
             position.is_some_and(|position| happened[position])
         };
-        for mut inequalities in over_all.cases(task, &plan.plan, &cut)? {
+        for mut inequalities in over_all.cases(task, &plan.plan, false, &cut)? {
             inequalities.extend(over_all.assumptions.iter().cloned());
             cases.push(BadCase {
                 differences: differences.clone(),
@@ -193,7 +194,7 @@ impl Order {
         let network = network.map_err(|_| Refusal::NoNominalSchedule)?;
         let mut windows = BTreeMap::new();
         for own in over_all {
-            for &node in own.events.iter().chain([&own.start, &own.end]) {
+            for &node in own.events(false).iter().chain([&own.start, &own.end]) {
                 let seen_from = || network.windows(network_node(node));
                 windows.entry(node).or_insert_with(seen_from);
             }
@@ -211,16 +212,16 @@ impl Order {
     /// these are no more than `most`.
     fn cuts(
         &self,
-        over_all: &OverAll,
+        (over_all, events): (&OverAll, &[NodeId]),
         most: usize,
         happened: &mut Vec<bool>,
         found: &mut Vec<Vec<bool>>,
     ) -> bool {
-        let Some(&event) = over_all.events.get(happened.len()) else {
+        let Some(&event) = events.get(happened.len()) else {
             found.push(happened.clone());
             return found.len() <= most;
         };
-        let placed = over_all.events.iter().zip(happened.iter());
+        let placed = events.iter().zip(happened.iter());
         let mut can_be = [
             !self.is_never_after(event, over_all.start),
             !self.is_never_after(over_all.end, event),
@@ -235,7 +236,7 @@ impl Order {
         for has_happened in [false, true] {
             if can_be[usize::from(has_happened)] {
                 happened.push(has_happened);
-                let is_complete = self.cuts(over_all, most, happened, found);
+                let is_complete = self.cuts((over_all, events), most, happened, found);
                 happened.pop();
                 if !is_complete {
                     return false;

@@ -275,6 +275,15 @@ impl Reduction {
         BoxNetwork { network, edges }
     }
 
+    /// The times of the classes, from those of all nodes.
+    pub(crate) fn class_times(&self, schedule: &Schedule) -> Vec<Rational> {
+        let mut times = vec![Rational::ZERO; self.class_count];
+        for ((class, offset), time) in self.places.iter().zip(schedule.iter()) {
+            times[class.index()] = time - offset;
+        }
+        times
+    }
+
     /// The times of all nodes, from those of the classes; class 0 holds time zero.
     pub fn times(&self, class_times: &[Rational]) -> Schedule {
         self.places

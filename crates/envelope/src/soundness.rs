@@ -43,6 +43,8 @@ pub use sound_box::SoundBox;
 pub(crate) struct Soundness {
     reduction: Reduction,
     obligations: Obligations,
+    /// The schedule from which the order of happenings was taken.
+    schedule: Schedule,
     direct: Vec<DirectCase>,
     over_all: Vec<Option<Proof>>,
     /// Whether these proofs are about boxes within the ranges of the parameters.
@@ -160,14 +162,22 @@ impl Soundness {
                 });
             }
         }
+        let point = DecoupledEnvelope::point(valuation);
+        let is_in_ranges = DecoupledEnvelope::ranges(plan).includes(&point);
         for over_all in &obligations.over_all {
-            check_over_all(task, plan, &reduction, over_all, &schedule)?;
+            check_over_all(
+                (task, plan),
+                &reduction,
+                over_all,
+                (&schedule, is_in_ranges),
+            )?;
         }
         let over_all = vec![None; obligations.over_all.len()];
         let numbers = numbers(&reduction, &obligations);
         Ok(Some(Self {
             reduction,
             obligations,
+            schedule,
             direct,
             over_all,
             is_in_ranges: true,
@@ -228,6 +238,7 @@ impl Soundness {
             numbers,
             suspect,
             refutations,
+            ..
         } = self;
         let mut schedules = Lazy::Unmade(reduction, envelope, numbers.as_ref());
         // What deviates adds up, so in a box later conditions are the first to break, and the one that
@@ -407,24 +418,23 @@ fn check_products(
 /// The same for an over-all condition, read at any place of its moment among the events of the
 /// nominal schedule. Other places come to light with a box.
 fn check_over_all(
-    task: &Task,
-    plan: &ParametrizedPlan,
+    (task, plan): (&Task, &ParametrizedPlan),
     reduction: &Reduction,
     over_all: &OverAll,
-    nominal: &Schedule,
+    (nominal, is_in_ranges): (&Schedule, bool),
 ) -> Result<(), Refusal> {
     let (start, end) = (&nominal[over_all.start], &nominal[over_all.end]);
     let mut moments = vec![start];
+    let events = over_all.events(is_in_ranges);
     moments.extend(
-        over_all
-            .events
+        events
             .iter()
             .map(|event| &nominal[*event])
             .filter(|&time| time > start && time < end),
     );
     for moment in moments {
         let cut = |node: NodeId| nominal[node] <= *moment;
-        for mut inequalities in over_all.cases(task, &plan.plan, &cut)? {
+        for mut inequalities in over_all.cases(task, &plan.plan, is_in_ranges, &cut)? {
             inequalities.extend(over_all.assumptions.iter().cloned());
             let case = BadCase {
                 differences: Vec::new(),

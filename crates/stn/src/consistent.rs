@@ -13,6 +13,8 @@ pub struct ConsistentNetwork<W = Rational> {
     network: Network<W>,
     schedule: Schedule<W>,
     repair: Repair<W>,
+    /// The times that nodes had before they were moved, in order, if these are remembered.
+    former: Option<Vec<(NodeId, W)>>,
 }
 
 /// A snapshot of the size of a network, to go back to.
@@ -22,6 +24,8 @@ pub struct ConsistentNetwork<W = Rational> {
 pub struct Checkpoint {
     node_count: usize,
     constraint_count: usize,
+    /// How many moves are remembered.
+    moves: usize,
 }
 
 impl<W: Weight> Default for ConsistentNetwork<W> {
@@ -41,6 +45,7 @@ impl<W: Weight> TryFrom<Network<W>> for ConsistentNetwork<W> {
             network,
             schedule,
             repair,
+            former: None,
         })
     }
 }
@@ -52,6 +57,7 @@ impl<W: Weight> ConsistentNetwork<W> {
             network: Network::new(),
             schedule: Schedule::new(Vec::new()),
             repair: Repair::default(),
+            former: None,
         }
     }
 
@@ -66,6 +72,7 @@ impl<W: Weight> ConsistentNetwork<W> {
             network,
             schedule,
             repair,
+            former: None,
         })
     }
 
@@ -109,9 +116,9 @@ impl<W: Weight> ConsistentNetwork<W> {
     pub fn add(&mut self, constraint: Constraint<W>) -> Result<ConstraintId, NegativeCycle<W>> {
         let before = self.checkpoint();
         let id = self.network.add(constraint);
-        let repaired = self
-            .repair
-            .after_adding(id, &self.network, &mut self.schedule);
+        let repaired =
+            self.repair
+                .after_adding(id, &self.network, &mut self.schedule, &mut self.former);
         if let Err(cycle) = repaired {
             self.undo_to(before);
             return Err(cycle);
@@ -124,6 +131,7 @@ impl<W: Weight> ConsistentNetwork<W> {
         Checkpoint {
             node_count: self.network.node_count(),
             constraint_count: self.network.constraints().len(),
+            moves: self.former.as_ref().map_or(0, Vec::len),
         }
     }
 
@@ -136,17 +144,45 @@ impl<W: Weight> ConsistentNetwork<W> {
         self.resize();
     }
 
-    /// Like [`undo_to`](Self::undo_to), and goes back to `schedule` as well, which was the present
-    /// one at `checkpoint`.
+    /// Remembers the times that nodes have, from now on, so that it is possible to go [back](Self::go_back_to) to
+    /// them. All earlier checkpoints are void.
+    pub fn remember_times(&mut self) {
+        self.former = Some(Vec::new());
+    }
+
+    /// The nodes that have moved since times are remembered.
+    pub fn moved(&self) -> impl Iterator<Item = NodeId> + '_ {
+        self.former.iter().flatten().map(|(node, _)| *node)
+    }
+
+    /// Like [`undo_to`](Self::undo_to), and goes back to the times that nodes had at `checkpoint` as well, if they
+    /// were [remembered](Self::remember_times). Takes time in proportion to what has moved since.
     ///
     /// Without that, times only ever move back, a little with each constraint that is tried; with
     /// it they stay within what the constraints that are left and those tried since can add up to,
     /// so that machine integers as weights can be chosen not to overflow.
-    pub fn undo_with(&mut self, checkpoint: Checkpoint, schedule: &Schedule<W>) {
-        self.network
-            .truncate(checkpoint.node_count, checkpoint.constraint_count);
-        self.schedule.clone_from(schedule);
-        self.resize();
+    pub fn go_back_to(&mut self, checkpoint: Checkpoint) {
+        for (node, time) in self
+            .former
+            .iter_mut()
+            .flat_map(|it| it.drain(checkpoint.moves..).rev())
+        {
+            if node.index() < self.network.node_count() {
+                self.schedule.set(node, time);
+            }
+        }
+        self.undo_to(checkpoint);
+        debug_assert!(self.schedule.holds_in(&self.network));
+    }
+
+    /// Moves nodes to other times, at which all constraints have to hold.
+    pub fn reschedule(&mut self, times: impl IntoIterator<Item = (NodeId, W)>) {
+        for (node, time) in times {
+            if let Some(former) = &mut self.former {
+                former.push((node, self.schedule[node].clone()));
+            }
+            self.schedule.set(node, time);
+        }
         debug_assert!(self.schedule.holds_in(&self.network));
     }
 
@@ -194,6 +230,7 @@ impl<W: Weight> Repair<W> {
         added: ConstraintId,
         network: &Network<W>,
         schedule: &mut Schedule<W>,
+        former: &mut Option<Vec<(NodeId, W)>>,
     ) -> Result<(), NegativeCycle<W>> {
         let outcome = self.propose(added, network, schedule);
         self.queue.clear();
@@ -201,6 +238,9 @@ impl<W: Weight> Repair<W> {
             self.is_final[node.index()] = false;
             let proposed = self.proposed[node.index()].take();
             if let (Ok(()), Some((time, _))) = (&outcome, proposed) {
+                if let Some(former) = former {
+                    former.push((node, schedule[node].clone()));
+                }
                 schedule.set(node, time);
             }
         }

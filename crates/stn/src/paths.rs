@@ -1,7 +1,7 @@
 //! Shortest paths: the tightest bounds that follow, and from which constraints they follow.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
 use elbowroom_num::Rational;
 
@@ -68,9 +68,32 @@ impl<W: Weight> ConsistentNetwork<W> {
     }
 
     /// The least `d` with `to - from <= d` in every schedule; `None` when there is none.
+    ///
+    /// Takes time for the nodes that are nearer, as the network's schedule measures it, and none for the others.
     pub fn distance(&self, from: NodeId, to: NodeId) -> Option<W> {
-        let paths = self.shortest_paths(from, Direction::FromRoot, Some(to));
-        paths.distance(to).cloned()
+        let network = self.network();
+        let key = |distance: &W, node| Direction::FromRoot.key(distance, node, self.schedule());
+        let mut distances = BTreeMap::from([(from, W::zero())]);
+        let mut are_final = BTreeSet::new();
+        let mut queue = BinaryHeap::from([Reverse((key(&W::zero(), from), from))]);
+        while let Some(Reverse((_, node))) = queue.pop() {
+            let near = distances.get(&node)?.clone();
+            if node == to {
+                return Some(near);
+            }
+            if !are_final.insert(node) {
+                continue;
+            }
+            for id in network.leaving(node) {
+                let Constraint { to: far, bound, .. } = network.constraint(id);
+                let distance = near.plus(bound);
+                if distances.get(far).is_none_or(|old| distance < *old) {
+                    queue.push(Reverse((key(&distance, *far), *far)));
+                    distances.insert(*far, distance);
+                }
+            }
+        }
+        None
     }
 
     /// Constraints from `from` to `to` whose bounds sum up to the [`distance`](Self::distance).

@@ -17,7 +17,7 @@ use nature::{Nature, Occurrence};
 
 use super::dnf::{Alternatives, Wanted, compared};
 use super::goal::goal_cases;
-use super::over_all::literal_cases;
+use super::over_all::{Happenings, literal_cases};
 use super::precedence::Precedence;
 use super::separation::separations;
 use super::timeline::{FluentChange, Reading, Timeline};
@@ -60,6 +60,7 @@ impl Obligations {
         let compiler = Compiler {
             task,
             plan,
+            nominal,
             order,
             open: open.collect(),
             substitution,
@@ -107,6 +108,7 @@ enum Progress {
 struct Compiler<'a> {
     task: &'a Task,
     plan: &'a ParametrizedPlan,
+    nominal: &'a Schedule,
     /// All nodes in nominal order.
     order: Vec<NodeId>,
     /// The actions whose durations are open.
@@ -272,9 +274,13 @@ impl Compiler<'_> {
 
     /// The obligations that need the whole timeline: over-all conditions and goal.
     fn finish(&self, run: Run, obligations: &mut Obligations) -> Result<(), Refusal> {
-        let timeline = Arc::new(run.timeline);
         let plan = &self.plan.plan;
-        let precedence = Precedence::of(self.plan);
+        let all = Arc::new(Happenings {
+            timeline: run.timeline,
+            precedence: Precedence::of(self.plan, &self.order, self.nominal),
+            substitution: Arc::clone(&self.substitution),
+        });
+        let timeline = &all.timeline;
         for (index, instance) in plan.instances.iter().enumerate() {
             let id = InstanceId::from(index);
             let Some(body) = instance.action.durative() else {
@@ -305,23 +311,17 @@ impl Compiler<'_> {
                                 instance: id,
                                 condition: condition.clone(),
                             },
-                            bad_cases: literal_cases(&timeline, fact, wanted, start, end),
+                            bad_cases: literal_cases(timeline, fact, wanted, start, end),
                         });
                     }
-                    _ => obligations.over_all.push(OverAll::new(
-                        self.task,
-                        plan,
-                        id,
-                        condition,
-                        (&self.order, &precedence),
-                        &timeline,
-                        &self.substitution,
-                    )),
+                    _ => obligations
+                        .over_all
+                        .push(OverAll::new(self.task, plan, id, condition, &all)),
                 }
             }
         }
         for condition in self.plan.goal.conjuncts() {
-            let bad_cases = goal_cases(self.task, &timeline, &self.substitution, condition)?;
+            let bad_cases = goal_cases(self.task, timeline, &self.substitution, condition)?;
             let requirement = Requirement::Goal {
                 condition: condition.clone(),
             };
@@ -347,7 +347,7 @@ impl Compiler<'_> {
         Reading {
             task: self.task,
             timeline,
-            cut: &|_| true,
+            cut: None,
             moment: node,
             action,
             substitution: &self.substitution,

@@ -24,7 +24,7 @@ pub(super) fn goal_cases(
     let reading = Reading {
         task,
         timeline,
-        cut: &|_| true,
+        cut: None,
         // Nothing drifts any more, so the moment of reading does not matter.
         moment: NodeId::ZERO,
         action: None,

@@ -1,11 +1,12 @@
 //! Over-all conditions: what must hold at every moment of an action's open interval.
 
+use std::borrow::Cow;
 use std::cell::OnceCell;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Condition, FactId};
+use elbowroom_model::ground::{Condition, FactId, FluentId};
 
 use super::dnf::{Alternatives, Wanted};
 use super::precedence::Precedence;
@@ -15,9 +16,9 @@ use elbowroom_plan::{InstanceId, NodeId, StnPlan};
 
 /// A numeric or compound over-all condition of one action.
 ///
-/// It is violated if there is a moment strictly between `start` and `end`, with some of `events`
-/// up to it and the others after it, at which the condition is false. Which events come before
-/// the moment depends on the schedule; [`OverAll::cases`] gives the inequalities for one choice.
+/// It is violated if there is a moment strictly between `start` and `end`, with some of
+/// [its events](Self::events) up to it and the others after it, at which the condition is false. Which events
+/// come before the moment depends on the schedule; [`OverAll::cases`] gives the inequalities for one choice.
 #[derive(Clone, Debug)]
 pub struct OverAll {
     /// The action.
@@ -28,17 +29,33 @@ pub struct OverAll {
     pub end: NodeId,
     /// The condition, one conjunct.
     pub condition: Condition,
-    /// The nodes that change what the condition reads, in nominal order.
-    pub events: Vec<NodeId>,
-    /// The events of which it is known whether they come before the moment, as long as the
-    /// parameters' values are in their ranges; and whether they do.
-    pub(crate) settled: BTreeMap<NodeId, bool>,
     /// Under which outcomes of conditional effects all this applies.
     pub assumptions: Vec<Inequality>,
     /// Stands for the moment in differences and inequalities.
     pub moment: NodeId,
-    timeline: Arc<Timeline>,
-    substitution: Arc<Substitution>,
+    /// What the condition reads.
+    facts: Vec<FactId>,
+    fluents: Vec<FluentId>,
+    near: Near,
+    all: Arc<Happenings>,
+}
+
+/// What is known of the places of a moment as long as the parameters' values are in their ranges, and all
+/// interfering happenings keep their order.
+#[derive(Clone, Debug)]
+struct Near {
+    /// The events that can be on either side of it, in nominal order.
+    events: Vec<NodeId>,
+    /// These, and those that have happened.
+    timeline: Timeline,
+}
+
+/// All that happens in a plan.
+#[derive(Debug)]
+pub(super) struct Happenings {
+    pub(super) timeline: Timeline,
+    pub(super) precedence: Precedence,
+    pub(super) substitution: Arc<Substitution>,
 }
 
 impl OverAll {
@@ -47,41 +64,58 @@ impl OverAll {
         plan: &StnPlan,
         instance: InstanceId,
         condition: &Condition,
-        (order, precedence): (&[NodeId], &Precedence),
-        timeline: &Arc<Timeline>,
-        substitution: &Arc<Substitution>,
+        all: &Arc<Happenings>,
     ) -> Self {
-        let mut touched = BTreeSet::new();
+        let (mut facts, mut fluents) = (BTreeSet::new(), BTreeSet::new());
         task.visit_facts_of(condition, &mut |fact| {
-            touched.extend(timeline.fact_nodes(fact));
+            facts.insert(fact);
         });
         task.visit_fluents_of(condition, &mut |fluent| {
-            touched.extend(timeline.fluent_nodes(fluent));
+            fluents.insert(fluent);
         });
+        let (facts, fluents) = (Vec::from_iter(facts), Vec::from_iter(fluents));
         let (start, end) = (plan.start(instance), plan.end(instance));
-        let events = order.iter().copied();
-        let events: Vec<NodeId> = events.filter(|node| touched.contains(node)).collect();
-        let (happened, to_come) = (precedence.not_after(start), precedence.not_before(end));
-        let settled = events.iter().filter_map(|event| {
-            let has_happened = happened.contains(event);
-            (has_happened || to_come.contains(event)).then_some((*event, has_happened))
-        });
+        let mut around = all.precedence.around(start, end);
+        let (timeline, open) = all.timeline.near((&facts, &fluents), &mut around);
         Self {
             instance,
             start,
             end,
             condition: condition.clone(),
-            settled: settled.collect(),
-            events,
-            assumptions: timeline.assumptions.clone(),
+            assumptions: all.timeline.assumptions.clone(),
             moment: NodeId::from(plan.nodes.len()),
-            timeline: Arc::clone(timeline),
-            substitution: Arc::clone(substitution),
+            facts,
+            fluents,
+            near: Near {
+                events: all.precedence.in_order(open),
+                timeline,
+            },
+            all: Arc::clone(all),
         }
     }
 
+    /// The nodes that change what the condition reads, and may come before the moment or after it, in nominal
+    /// order. Where interfering happenings keep their order, and the parameters' values are in their ranges, these
+    /// are few.
+    pub fn events(&self, is_in_ranges: bool) -> Cow<'_, [NodeId]> {
+        if is_in_ranges {
+            return Cow::Borrowed(&self.near.events);
+        }
+        let timeline = &self.all.timeline;
+        let of_facts = self.facts.iter().flat_map(|it| timeline.fact_nodes(*it));
+        let of_fluents = self
+            .fluents
+            .iter()
+            .flat_map(|it| timeline.fluent_nodes(*it));
+        Cow::Owned(
+            self.all
+                .precedence
+                .in_order(of_facts.chain(of_fluents).collect()),
+        )
+    }
+
     /// The alternatives in which the condition is false at the moment, when exactly the events
-    /// for which `cut` is true have happened.
+    /// for which `cut` is true have happened, of those that [may have](Self::events).
     ///
     /// # Errors
     /// When a value is not linear.
@@ -89,15 +123,22 @@ impl OverAll {
         &self,
         task: &Task,
         plan: &StnPlan,
+        is_in_ranges: bool,
         cut: &dyn Fn(NodeId) -> bool,
     ) -> Result<Alternatives, Refusal> {
+        let has_happened = |node: NodeId| !self.near.events.contains(&node) || cut(node);
+        let (timeline, cut): (_, &dyn Fn(NodeId) -> bool) = if is_in_ranges {
+            (&self.near.timeline, &has_happened)
+        } else {
+            (&self.all.timeline, cut)
+        };
         let reading = Reading {
             task,
-            timeline: &self.timeline,
-            cut,
+            timeline,
+            cut: Some(cut),
             moment: self.moment,
             action: Some((self.start, self.end)),
-            substitution: &self.substitution,
+            substitution: &self.all.substitution,
             place: &plan.instance(self.instance).action.name,
             derived: OnceCell::new(),
         };

@@ -3,21 +3,36 @@
 use std::collections::BTreeSet;
 
 use elbowroom_num::End;
-use elbowroom_plan::{Bound, NodeId, ParametrizedPlan};
+use elbowroom_plan::{Bound, NodeId, ParametrizedPlan, Schedule};
 
 /// The nodes that come no later than others in all schedules, for all values in the parameters'
 /// ranges: those from which bounds of at least zero lead there. There may be more of them.
+#[derive(Debug)]
 pub(super) struct Precedence {
     before: Vec<Vec<NodeId>>,
     after: Vec<Vec<NodeId>>,
+    /// The place of each node's time among all times of a schedule for values in the ranges, which keeps all
+    /// these bounds.
+    ranks: Vec<usize>,
 }
 
 impl Precedence {
-    pub(super) fn of(plan: &ParametrizedPlan) -> Self {
+    /// That of a plan with this schedule, in which nodes come in this order.
+    pub(super) fn of(plan: &ParametrizedPlan, order: &[NodeId], schedule: &Schedule) -> Self {
         let count = plan.plan.nodes.len();
+        let mut ranks = vec![0; count];
+        let (mut rank, mut earlier) = (0, None);
+        for &node in order {
+            if earlier.is_some_and(|earlier| schedule[earlier] != schedule[node]) {
+                rank += 1;
+            }
+            ranks[node.index()] = rank;
+            earlier = Some(node);
+        }
         let mut precedence = Self {
             before: vec![Vec::new(); count],
             after: vec![Vec::new(); count],
+            ranks,
         };
         for constraint in &plan.plan.constraints {
             let is_forward = match &constraint.lower {
@@ -40,26 +55,92 @@ impl Precedence {
         precedence
     }
 
-    /// The nodes that come no later than this one, which is among them.
-    pub(super) fn not_after(&self, node: NodeId) -> BTreeSet<NodeId> {
-        reached(&self.before, node)
+    /// Nodes in the order of their times.
+    pub(super) fn in_order(&self, nodes: BTreeSet<NodeId>) -> Vec<NodeId> {
+        let mut nodes = Vec::from_iter(nodes);
+        nodes.sort_by_key(|node| (self.ranks[node.index()], *node));
+        nodes
     }
 
-    /// The nodes that come no earlier than this one, which is among them.
-    pub(super) fn not_before(&self, node: NodeId) -> BTreeSet<NodeId> {
-        reached(&self.after, node)
+    /// What is known of the moments inside an action.
+    pub(super) fn around(&self, start: NodeId, end: NodeId) -> Around<'_> {
+        let cone = |next, from: NodeId| Cone {
+            next,
+            reached: BTreeSet::from([from]),
+            open: BTreeSet::from([(self.ranks[from.index()], from)]),
+        };
+        Around {
+            ranks: &self.ranks,
+            start,
+            happened: cone(&self.before, start),
+            to_come: cone(&self.after, end),
+        }
     }
 }
 
-fn reached(next: &[Vec<NodeId>], from: NodeId) -> BTreeSet<NodeId> {
-    let mut reached = BTreeSet::from([from]);
-    let mut open = vec![from];
-    while let Some(node) = open.pop() {
-        for &other in &next[node.index()] {
-            if reached.insert(other) {
-                open.push(other);
+/// A side of the moments inside an action.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    Before,
+    After,
+}
+
+/// What comes no later than the start of an action, and what no earlier than its end; looked for as far from
+/// these as is asked.
+pub(super) struct Around<'a> {
+    ranks: &'a [usize],
+    start: NodeId,
+    happened: Cone<'a>,
+    to_come: Cone<'a>,
+}
+
+impl Around<'_> {
+    /// The side that the node is on in every schedule, if bounds say so.
+    pub(super) fn side(&mut self, node: NodeId) -> Option<Side> {
+        let ranks = self.ranks;
+        let rank = ranks[node.index()];
+        if self.is_early(node) {
+            let happened = &mut self.happened;
+            while let Some(&(own, next)) = happened.open.last()
+                && own >= rank
+            {
+                happened.open.pop_last();
+                happened.follow(next, ranks);
+            }
+            if happened.reached.contains(&node) {
+                return Some(Side::Before);
+            }
+        }
+        let to_come = &mut self.to_come;
+        while let Some(&(own, next)) = to_come.open.first()
+            && own <= rank
+        {
+            to_come.open.pop_first();
+            to_come.follow(next, ranks);
+        }
+        to_come.reached.contains(&node).then_some(Side::After)
+    }
+
+    /// Whether the node comes no later than the action's start in the schedule that nodes are ordered by.
+    pub(super) fn is_early(&self, node: NodeId) -> bool {
+        self.ranks[node.index()] <= self.ranks[self.start.index()]
+    }
+}
+
+/// The nodes that bounds lead to from one node, all in one direction of time.
+struct Cone<'a> {
+    next: &'a [Vec<NodeId>],
+    reached: BTreeSet<NodeId>,
+    /// Those reached that were not followed yet, by rank.
+    open: BTreeSet<(usize, NodeId)>,
+}
+
+impl Cone<'_> {
+    fn follow(&mut self, node: NodeId, ranks: &[usize]) {
+        for &other in &self.next[node.index()] {
+            if self.reached.insert(other) {
+                self.open.insert((ranks[other.index()], other));
             }
         }
     }
-    reached
 }

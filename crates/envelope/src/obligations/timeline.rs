@@ -1,7 +1,9 @@
 //! What happens to each fact and fluent, in the order of a nominal schedule.
 
+mod fluent;
+
 use std::cell::OnceCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_model::Task;
 use elbowroom_model::derivation::{Derived, Moment};
@@ -9,9 +11,13 @@ use elbowroom_model::ground::{Expression, FactId, FluentId};
 use elbowroom_model::problem::{Comparison, Unknown};
 use elbowroom_num::Rational;
 
+use super::precedence::{Around, Side};
 use super::{Inequality, Refusal, Substitution};
 use crate::linear::Linear;
 use elbowroom_plan::{NodeId, ParameterId, ParametrizedPlan};
+use fluent::FluentHistory;
+
+pub(crate) use fluent::FluentChange;
 
 /// The events of every fact and fluent so far, in nominal order.
 ///
@@ -33,28 +39,8 @@ pub(crate) struct FactHistory {
     pub(crate) events: Vec<(NodeId, bool)>,
 }
 
-/// The changes of a fluent along a plan.
-#[derive(Clone, Debug, Default)]
-struct FluentHistory {
-    initially: Option<Linear>,
-    events: Vec<(NodeId, FluentChange)>,
-}
-
-/// One change of a fluent.
-#[derive(Clone, Debug)]
-pub(crate) enum FluentChange {
-    /// It gets a value, or loses it (an effect whose right-hand side is undefined).
-    Assign(Option<Linear>),
-    /// It moves by an amount.
-    Shift(Linear),
-    /// A continuous change with this rate begins; no times occur in the rate.
-    Drift(Linear),
-    /// A continuous change that began at that node stops.
-    DriftEnd(NodeId),
-}
-
-/// A cut through a plan: whether a node has happened.
-pub(crate) type Cut<'a> = &'a dyn Fn(NodeId) -> bool;
+/// A cut through a plan: whether a node has happened; `None` if all have that are recorded.
+pub(crate) type Cut<'a> = Option<&'a dyn Fn(NodeId) -> bool>;
 
 /// The context in which an expression is evaluated: a cut, a moment, and the action it belongs to.
 pub(crate) struct Reading<'a> {
@@ -85,12 +71,10 @@ impl Timeline {
             timeline.facts.entry(fact).or_default().initially = true;
         }
         for (&fluent, value) in &task.initial().values {
-            timeline.fluents.entry(fluent).or_default().initially =
-                Some(Linear::constant(value.clone()));
+            timeline.put_value(fluent, Some(Linear::constant(value.clone())));
         }
         for (&fluent, &parameter) in &plan.initial {
-            timeline.fluents.entry(fluent).or_default().initially =
-                Some(parameter_value(parameter, substitution));
+            timeline.put_value(fluent, Some(parameter_value(parameter, substitution)));
         }
         timeline
     }
@@ -106,11 +90,7 @@ impl Timeline {
 
     /// Records a change of the fluent at the node.
     pub(crate) fn change(&mut self, node: NodeId, fluent: FluentId, change: FluentChange) {
-        self.fluents
-            .entry(fluent)
-            .or_default()
-            .events
-            .push((node, change));
+        self.fluents.entry(fluent).or_default().push(node, change);
     }
 
     /// What holds and counts at the node, after all that was recorded, as a timeline on which
@@ -121,10 +101,10 @@ impl Timeline {
             ..Self::default()
         };
         for &fact in self.facts.keys() {
-            snapshot.put_fact(fact, self.is_true(fact, &|_| true));
+            snapshot.put_fact(fact, self.is_true(fact, None));
         }
         for &fluent in self.fluents.keys() {
-            snapshot.put_value(fluent, self.value(fluent, &|_| true, moment));
+            snapshot.put_value(fluent, self.value(fluent, None, moment));
         }
         snapshot
     }
@@ -136,28 +116,39 @@ impl Timeline {
 
     /// Gives a fluent its first value.
     pub(crate) fn put_value(&mut self, fluent: FluentId, value: Option<Linear>) {
-        self.fluents.entry(fluent).or_default().initially = value;
+        self.fluents.entry(fluent).or_default().put(value);
     }
 
     /// The continuous changes that have begun and not stopped.
     pub(crate) fn drifts(&self) -> Vec<(FluentId, Linear)> {
-        let mut all = Vec::new();
-        for (&fluent, history) in &self.fluents {
-            let mut drifts: Vec<(NodeId, &Linear)> = Vec::new();
-            for (node, change) in &history.events {
-                match change {
-                    FluentChange::Drift(rate) => drifts.push((*node, rate)),
-                    FluentChange::DriftEnd(since) => {
-                        if let Some(index) = drifts.iter().position(|(began, _)| began == since) {
-                            drifts.remove(index);
-                        }
-                    }
-                    FluentChange::Assign(_) | FluentChange::Shift(_) => {}
-                }
+        let all = self.fluents.iter().flat_map(|(&fluent, history)| {
+            let rates = history.last().rates();
+            rates.map(move |rate| (fluent, rate.clone()))
+        });
+        all.collect()
+    }
+
+    /// What of this matters to a condition on these that is read inside an action; and the events of which it is not
+    /// known on which side of that moment they are.
+    pub(super) fn near(
+        &self,
+        (facts, fluents): (&[FactId], &[FluentId]),
+        around: &mut Around<'_>,
+    ) -> (Self, BTreeSet<NodeId>) {
+        let mut near = Self::default();
+        let mut open = BTreeSet::new();
+        for fact in facts {
+            if let Some(history) = self.facts.get(fact) {
+                near.facts.insert(*fact, history.near(around, &mut open));
             }
-            all.extend(drifts.into_iter().map(|(_, rate)| (fluent, rate.clone())));
         }
-        all
+        for fluent in fluents {
+            if let Some(history) = self.fluents.get(fluent) {
+                near.fluents
+                    .insert(*fluent, history.near(around, &mut open));
+            }
+        }
+        (near, open)
     }
 
     /// The history of a fact.
@@ -189,51 +180,55 @@ impl Timeline {
             .events
             .iter()
             .rev()
-            .find(|&&(node, _)| cut(node))
+            .find(|&&(node, _)| cut.is_none_or(|cut| cut(node)))
             .map_or(history.initially, |&(_, becomes)| becomes)
     }
 
     fn value(&self, fluent: FluentId, cut: Cut<'_>, moment: NodeId) -> Option<Linear> {
         let history = self.fluents.get(&fluent)?;
-        let mut base = history.initially.clone();
-        // Continuous changes under way: when each began, and since when it has been counted.
-        let mut drifts: Vec<(NodeId, NodeId, &Linear)> = Vec::new();
-        for (node, change) in history.events.iter().filter(|(node, _)| cut(*node)) {
-            match change {
-                FluentChange::Assign(value) => {
-                    base.clone_from(value);
-                    for drift in &mut drifts {
-                        drift.1 = *node;
-                    }
-                }
-                FluentChange::Shift(amount) => {
-                    if let Some(base) = &mut base {
-                        base.add_scaled(amount, &Rational::ONE);
-                    }
-                }
-                FluentChange::Drift(rate) => drifts.push((*node, *node, rate)),
-                FluentChange::DriftEnd(since) => {
-                    if let Some(index) = drifts.iter().position(|&(began, _, _)| began == *since) {
-                        let (_, counted, rate) = drifts.remove(index);
-                        base = base.and_then(|base| add_drift(base, rate, counted, *node));
-                    }
-                }
-            }
+        match cut {
+            Some(cut) => history.standing(cut).value(moment),
+            None => history.last().value(moment),
         }
-        for (_, counted, rate) in drifts {
-            base = base.and_then(|base| add_drift(base, rate, counted, moment));
-        }
-        base
     }
 }
 
-/// `base + rate * (until - since)`; rates hold no times, so the product is always representable.
-fn add_drift(mut base: Linear, rate: &Linear, since: NodeId, until: NodeId) -> Option<Linear> {
-    base.add_scaled(
-        &rate.times(&Linear::difference(since, until))?,
-        &Rational::ONE,
-    );
-    Some(base)
+impl FactHistory {
+    /// What of this matters to a moment inside an action. Collects the events of which it is not known on which side
+    /// of the moment they are.
+    ///
+    /// What makes a fact true and what makes it false interfere: if one of either kind is to come, so are all later
+    /// ones.
+    fn near(&self, around: &mut Around<'_>, open: &mut BTreeSet<NodeId>) -> Self {
+        let here = self
+            .events
+            .partition_point(|(node, _)| around.is_early(*node));
+        let (mut initially, mut kept) = (self.initially, Vec::new());
+        for &(node, becomes) in self.events[..here].iter().rev() {
+            if around.side(node) == Some(Side::Before) {
+                initially = becomes;
+                break;
+            }
+            kept.push((node, becomes));
+        }
+        kept.reverse();
+        let mut to_come = [false; 2];
+        for &(node, becomes) in &self.events[here..] {
+            if around.side(node) != Some(Side::After) {
+                kept.push((node, becomes));
+                continue;
+            }
+            to_come[usize::from(becomes)] = true;
+            if to_come == [true; 2] {
+                break;
+            }
+        }
+        open.extend(kept.iter().map(|(node, _)| node));
+        Self {
+            initially,
+            events: kept,
+        }
+    }
 }
 
 /// The parameter, or the difference of times that it is.

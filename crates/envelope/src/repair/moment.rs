@@ -27,7 +27,8 @@ pub(super) fn broken(
     let (start, end) = (over_all.start, over_all.end);
     let is_inside =
         |node: &NodeId| schedule[start] < schedule[*node] && schedule[*node] < schedule[end];
-    let inside = over_all.events.iter().copied().filter(is_inside);
+    let events = over_all.events(false);
+    let inside = events.iter().copied().filter(is_inside);
     let mut turns: Vec<NodeId> = inside.collect();
     turns.extend([start, end]);
     turns.sort_by(|a, b| schedule[*a].cmp(&schedule[*b]));
@@ -42,7 +43,7 @@ pub(super) fn broken(
     for pair in turns.windows(2) {
         let (since, until) = (pair[0], pair[1]);
         let has_happened = |node: NodeId| schedule[node] <= schedule[since];
-        for case in over_all.cases(task, plan, &has_happened)? {
+        for case in over_all.cases(task, plan, false, &has_happened)? {
             if !holds_between(&case, over_all.moment, [since, until], values, schedule) {
                 continue;
             }
@@ -91,7 +92,8 @@ fn others(
     at: NodeId,
     is_first: bool,
 ) -> Vec<(Linear, bool)> {
-    let nodes = over_all.events.iter().copied();
+    let events = over_all.events(false);
+    let nodes = events.iter().copied();
     let nodes = nodes.chain([over_all.start, over_all.end]);
     let others = nodes.filter(|&node| node != at).map(|node| {
         // What falls together with `at` changes nothing.

@@ -1,5 +1,7 @@
 //! Deciding whether a bad case is possible in a box.
 
+use std::collections::BTreeMap;
+
 use elbowroom_num::{Delta, Rational};
 use elbowroom_stn::{
     Checkpoint, ConsistentNetwork, Constraint, NegativeCycle, Network, NodeId as ClassId, Schedule,
@@ -9,7 +11,7 @@ use elbowroom_stn::{
 use super::Counterexample;
 use super::certificate::{Certificate, Term};
 use super::corner::corners;
-use super::flow;
+use super::flow::{self, Demand};
 use super::linear_program;
 use super::scale::{Exactly, Scale};
 use crate::linear::Linear;
@@ -23,9 +25,13 @@ pub(crate) struct Schedules<'a, S: Scale> {
     pub(crate) envelope: &'a DecoupledEnvelope,
     network: ConsistentNetwork<S::Weight>,
     scale: S,
-    /// A schedule without assumptions: where questions begin. Those of a plan resemble each other, so
-    /// it is one at which the last one that was answered by a flow came out greatest.
-    base: Schedule<S::Weight>,
+    /// Where the next question begins, as far as that is not where this one did: those of a plan resemble each
+    /// other, so it is a schedule at which the last one that was answered by a flow came out greatest.
+    next: Vec<(ClassId, S::Weight)>,
+    /// A schedule in which all that can take long does, if there is one, until the first question is answered by a
+    /// flow.
+    longest: Option<Schedule<S::Weight>>,
+    workspace: flow::Workspace<S::Weight>,
     /// For the first constraints of the network, a position in [`Reduction::edges`].
     edges: Vec<usize>,
     /// The constraints after these: what is assumed.
@@ -35,9 +41,8 @@ pub(crate) struct Schedules<'a, S: Scale> {
 }
 
 /// A moment to come back to.
-pub(crate) struct Before<W> {
+pub(crate) struct Before {
     checkpoint: Checkpoint,
-    schedule: Schedule<W>,
     assumed: usize,
 }
 
@@ -69,16 +74,24 @@ impl<'a, S: Scale> Schedules<'a, S> {
             })
             .collect();
         let mut network = Network::with_nodes(reduction.class_count());
+        let mut longest = network.clone();
         let mut edges = Vec::with_capacity(reduction.edges().len());
         for (index, edge) in reduction.edges().iter().enumerate() {
             let constant = scale.weight(&Delta::from(edge.constant.clone()));
             let bound = match edge.end {
-                None => constant,
+                None => constant.clone(),
                 Some(end) => match &reaches[end.parameter.index()][end.side.index()] {
                     Some(reach) => constant.plus(reach),
                     None => continue,
                 },
             };
+            let most = edge.end.filter(|end| end.side == Side::Lower);
+            let most = most.and_then(|end| reaches[end.parameter.index()][1].as_ref());
+            longest.add(Constraint {
+                from: edge.from,
+                to: edge.to,
+                bound: most.map_or(bound.clone(), |most| constant.minus(most)),
+            });
             network.add(Constraint {
                 from: edge.from,
                 to: edge.to,
@@ -86,14 +99,18 @@ impl<'a, S: Scale> Schedules<'a, S> {
             });
             edges.push(index);
         }
-        let network = ConsistentNetwork::try_from(network).ok()?;
-        let base = network.schedule().clone();
+        let mut network = ConsistentNetwork::try_from(network).ok()?;
+        network.remember_times();
+        let longest = longest.consistency().ok();
+        let longest = longest.filter(|schedule| schedule.holds_in(network.network()));
         Some(Self {
             reduction,
             envelope,
             network,
             scale,
-            base,
+            next: Vec::new(),
+            longest,
+            workspace: flow::Workspace::default(),
             edges,
             assumed: Vec::new(),
             tells: false,
@@ -126,22 +143,21 @@ impl<'a, S: Scale> Schedules<'a, S> {
     }
 
     /// The present moment, to come back to.
-    pub(crate) fn before(&self) -> Before<S::Weight> {
+    pub(crate) fn before(&self) -> Before {
         Before {
             checkpoint: self.network.checkpoint(),
-            schedule: self.network.schedule().clone(),
             assumed: self.assumed.len(),
         }
     }
 
     /// Forgets what has been assumed since.
-    pub(crate) fn undo_to(&mut self, before: &Before<S::Weight>) {
+    pub(crate) fn undo_to(&mut self, before: &Before) {
         self.assumed.truncate(before.assumed);
-        let schedule = match before.assumed {
-            0 => &self.base,
-            _ => &before.schedule,
-        };
-        self.network.undo_with(before.checkpoint, schedule);
+        self.network.go_back_to(before.checkpoint);
+        if before.assumed == 0 && !self.next.is_empty() {
+            self.network.reschedule(self.next.drain(..));
+            self.network.remember_times();
+        }
     }
 
     /// Adds a time point: the moment of an over-all condition, which ends with this node.
@@ -178,7 +194,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
 
     /// Whether all of the case can be at once.
     pub(crate) fn possible(&mut self, case: &BadCase) -> Outcome {
-        let checkpoint = self.network.checkpoint();
+        let before = self.before();
         let mut refuted = None;
         for difference in &case.differences {
             if let Err(certificate) = self.assume(difference) {
@@ -187,22 +203,33 @@ impl<'a, S: Scale> Schedules<'a, S> {
             }
         }
         let outcome = refuted.unwrap_or_else(|| self.inequalities_possible(case));
-        self.network.undo_with(checkpoint, &self.base);
-        self.assumed.clear();
+        self.undo_to(&before);
         outcome
     }
 
-    /// Begins at a schedule from now on. Its times count from the beginning of the plan; one in which
-    /// they are so large that sums might not fit is not taken.
-    fn begin_at(&mut self, mut times: Vec<S::Weight>) {
+    /// Begins at a schedule from the next question on: the present one, but for some nodes. Its times count from the
+    /// beginning of the plan; one in which they are so large that sums might not fit is not taken.
+    fn begin_at(&mut self, moved: Vec<(ClassId, S::Weight)>) {
+        let present = self.network.schedule();
+        let mut times: BTreeMap<ClassId, S::Weight> = self
+            .network
+            .moved()
+            .map(|class| (class, present[class].clone()))
+            .collect();
+        times.extend(moved);
         // The nodes of assumptions come last.
-        times.truncate(self.base.times().len());
-        let zero = times[0].clone();
-        for time in &mut times {
-            *time = time.minus(&zero);
+        times.retain(|class, _| class.index() < self.reduction.class_count());
+        let zero = times.get(&ClassId(0)).unwrap_or(&present[ClassId(0)]);
+        if *zero != S::Weight::zero() {
+            let zero = zero.clone();
+            let classes = self.network.network().nodes();
+            for class in classes.take(self.reduction.class_count()) {
+                let time = times.entry(class).or_insert_with(|| present[class].clone());
+                *time = time.minus(&zero);
+            }
         }
-        if times.iter().all(|time| self.scale.is_moderate(time)) {
-            self.base = Schedule::new(times);
+        if times.values().all(|time| self.scale.is_moderate(time)) {
+            self.next = Vec::from_iter(times);
         }
     }
 
@@ -313,13 +340,19 @@ impl<'a, S: Scale> Schedules<'a, S> {
             };
             certificate.add_end(BoxEnd { parameter, side }, &coefficient.abs());
         }
-        let (flow, greatest_at) = flow::cheapest(&self.network, &demand)?;
-        self.begin_at(greatest_at);
-        for (index, amount) in flow
-            .iter()
-            .enumerate()
-            .filter(|(_, amount)| amount.is_positive())
-        {
+        let longest = self.longest.take();
+        let longest = longest.filter(|longest| self.is_greater_at(longest, &demand));
+        let (flow, moved) = flow::cheapest(&self.network, demand, &mut self.workspace)?;
+        match longest {
+            Some(longest) => {
+                let times = longest.into_times().into_iter();
+                let classes = self.network.network().nodes();
+                self.begin_at(classes.zip(times).collect());
+            }
+            None => self.begin_at(moved),
+        }
+        for (id, amount) in flow.iter().filter(|(_, amount)| amount.is_positive()) {
+            let index = id.index();
             if self.tells {
                 let edge = self.edges.get(index).copied().map(Term::Edge);
                 let term = edge.unwrap_or_else(|| Term::Assumed(index - self.edges.len()));
@@ -338,14 +371,34 @@ impl<'a, S: Scale> Schedules<'a, S> {
             .then_some(certificate)
     }
 
-    /// The expression's constant and its coefficient for each class; times count from class 0.
-    fn by_class(&self, expression: &Linear) -> (Rational, Vec<Rational>) {
-        let mut demand = vec![Rational::ZERO; self.network.network().node_count()];
+    /// Whether an expression is likely to be greater in this schedule than in the present one: whether it would be
+    /// with 1 and -1 for coefficients. Of one that reads a moment inside an action nothing is known.
+    fn is_greater_at(&self, other: &Schedule<S::Weight>, demand: &Demand) -> bool {
+        let present = self.network.schedule();
+        let mut gain = S::Weight::zero();
+        for (&class, amount) in demand {
+            if class.index() >= self.reduction.class_count() {
+                return true;
+            }
+            let later = other[class].minus(&present[class]);
+            if amount.is_positive() {
+                gain = gain.plus(&later);
+            } else if amount.is_negative() {
+                gain = gain.minus(&later);
+            }
+        }
+        gain > S::Weight::zero()
+    }
+
+    /// The expression's constant and its coefficients for classes; times count from class 0.
+    fn by_class(&self, expression: &Linear) -> (Rational, Demand) {
+        let mut demand = Demand::new();
         let constant = spread(self.reduction, expression, |class: ClassId, coefficient| {
-            demand[class.index()] += coefficient;
+            *demand.entry(class).or_default() += coefficient;
         });
-        demand[0] = Rational::ZERO;
-        demand[0] = -demand.iter().sum::<Rational>();
+        demand.remove(&ClassId(0));
+        let rest = -demand.values().sum::<Rational>();
+        demand.insert(ClassId(0), rest);
         (constant, demand)
     }
 }

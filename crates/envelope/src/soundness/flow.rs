@@ -6,61 +6,43 @@
 //! the proof of the maximum: the constraints, weighted by their flow, add up to it.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 
 use elbowroom_num::Rational;
-use elbowroom_stn::{ConsistentNetwork, ConstraintId, NodeId, Weight};
+use elbowroom_stn::{ConsistentNetwork, ConstraintId, NodeId, Schedule, Weight};
 
-/// The flow along each constraint, by its number.
-pub(crate) type Flow = Vec<Rational>;
+/// The flow along each constraint that has any.
+pub(crate) type Flow = BTreeMap<ConstraintId, Rational>;
+
+/// How many units have to come into a node net, where that is not none.
+pub(crate) type Demand = BTreeMap<NodeId, Rational>;
 
 /// The cheapest flow that brings `demand[k]` units net into each node `k` (the demands add up to
-/// zero), and a schedule at which the expression is greatest; `None` if there is none: then it has
-/// no greatest value.
+/// zero), and which nodes happen when in a schedule at which the expression is greatest, if not when they do in the
+/// network's present one; `None` if there is none: then it has no greatest value.
 ///
 /// The search begins at the network's present schedule. The nearer that is to such a one, the
 /// shorter are the paths.
 pub(crate) fn cheapest<W: Weight>(
     network: &ConsistentNetwork<W>,
-    demand: &[Rational],
-) -> Option<(Flow, Vec<W>)> {
+    mut demand: Demand,
+    workspace: &mut Workspace<W>,
+) -> Option<(Flow, Vec<(NodeId, W)>)> {
+    workspace.resize(network.network().node_count());
     let mut search = Search {
         network,
-        flow: vec![Rational::ZERO; network.network().constraints().len()],
-        // A schedule `t` satisfies `t_to - t_from <= w`: reduced costs are non-negative from the
-        // beginning.
-        potential: network.schedule().times().to_vec(),
-        reached: vec![None; network.network().node_count()],
-        touched: Vec::new(),
+        flow: Flow::new(),
+        workspace,
     };
-    let mut demand = demand.to_vec();
-    // Where no more has to leave, nothing will have to later.
-    let mut first = 0;
-    while let Some(offset) = demand[first..].iter().position(Rational::is_negative) {
-        let source = first + offset;
-        first = source;
-        let (sink, steps) = search.nearest(NodeId(u32::try_from(source).ok()?), &demand)?;
-        let mut amount = (-&demand[source]).min(demand[sink.index()].clone());
-        for step in &steps {
-            if let Step::Back(id) = step {
-                amount = amount.min(search.flow[id.index()].clone());
-            }
-        }
-        for step in &steps {
-            match step {
-                Step::Along(id) => search.flow[id.index()] += &amount,
-                Step::Back(id) => search.flow[id.index()] -= &amount,
-            }
-        }
-        demand[source] += &amount;
-        demand[sink.index()] -= &amount;
-    }
+    let is_met = search.meet(&mut demand);
+    let flow = search.flow;
+    let moved = workspace.take_moved();
     // No constraint is cheaper than the difference of its nodes' potentials.
-    Some((search.flow, search.potential))
+    is_met.then_some((flow, moved))
 }
 
 /// One step of a path in the residual network.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 enum Step {
     /// More flow along the constraint.
     Along(ConstraintId),
@@ -68,19 +50,29 @@ enum Step {
     Back(ConstraintId),
 }
 
-struct Search<'a, W> {
-    network: &'a ConsistentNetwork<W>,
-    flow: Flow,
-    /// Invariant: no residual step is cheaper than the difference of its nodes' potentials.
-    potential: Vec<W>,
-    /// What is known of the nodes during a search for a path; nothing between two of them.
+/// What is known of nodes during a search, kept to spare allocations; between two of them that is nothing.
+#[derive(Debug)]
+pub(crate) struct Workspace<W> {
+    /// The potentials of nodes that are not their times in the network's present schedule.
+    potential: Vec<Option<W>>,
+    /// The nodes that have one.
+    moved: Vec<NodeId>,
+    /// What is known of the nodes during a search for a path.
     reached: Vec<Option<Reached<W>>>,
     /// The nodes of which something is known.
     touched: Vec<NodeId>,
 }
 
+struct Search<'a, 'b, W> {
+    network: &'a ConsistentNetwork<W>,
+    flow: Flow,
+    /// Invariant: no residual step is cheaper than the difference of its nodes' potentials. A schedule `t` satisfies
+    /// `t_to - t_from <= w`, so with its times for potentials that is so from the beginning.
+    workspace: &'b mut Workspace<W>,
+}
+
 /// A node that a path leads to.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 struct Reached<W> {
     distance: W,
     /// The last step, and the node before it; `None` at the source.
@@ -88,55 +80,129 @@ struct Reached<W> {
     is_final: bool,
 }
 
-impl<W: Weight> Search<'_, W> {
+impl<W> Default for Workspace<W> {
+    fn default() -> Self {
+        Self {
+            potential: Vec::new(),
+            moved: Vec::new(),
+            reached: Vec::new(),
+            touched: Vec::new(),
+        }
+    }
+}
+
+impl<W> Workspace<W> {
+    fn resize(&mut self, node_count: usize) {
+        self.potential.resize_with(node_count, || None);
+        self.reached.resize_with(node_count, || None);
+    }
+
+    /// A node's potential, which is its time in the present schedule where nothing else is known.
+    fn potential<'a>(&'a self, node: NodeId, present: &'a Schedule<W>) -> &'a W {
+        let own = self.potential[node.index()].as_ref();
+        own.unwrap_or(&present[node])
+    }
+
+    /// The potentials that are not the times of the present schedule; they are forgotten.
+    fn take_moved(&mut self) -> Vec<(NodeId, W)> {
+        let moved = self.moved.drain(..);
+        moved
+            .filter_map(|node| Some((node, self.potential[node.index()].take()?)))
+            .collect()
+    }
+}
+
+impl<W: Weight> Search<'_, '_, W> {
+    /// Sends what is demanded, by one cheapest path after the other; whether there are such.
+    fn meet(&mut self, demand: &mut Demand) -> bool {
+        let sources = demand.iter().filter(|(_, amount)| amount.is_negative());
+        let sources: Vec<NodeId> = sources.map(|(node, _)| *node).collect();
+        // Where no more has to leave, nothing will have to later.
+        for source in sources {
+            while let Some(left) = demand.get(&source).filter(|left| left.is_negative()) {
+                let left = -left;
+                let Some((sink, steps)) = self.nearest(source, demand) else {
+                    return false;
+                };
+                let mut amount = left.min(demand[&sink].clone());
+                for step in &steps {
+                    if let Step::Back(id) = step {
+                        amount = amount.min(self.flow[id].clone());
+                    }
+                }
+                for step in &steps {
+                    match step {
+                        Step::Along(id) => *self.flow.entry(*id).or_default() += &amount,
+                        Step::Back(id) => *self.flow.entry(*id).or_default() -= &amount,
+                    }
+                }
+                *demand.entry(source).or_default() += &amount;
+                *demand.entry(sink).or_default() -= &amount;
+            }
+        }
+        true
+    }
+
     /// The node with open demand nearest to `source`, and the way there. Dijkstra's algorithm with
     /// reduced costs; the potentials are brought up to date.
     ///
     /// Takes time for the nodes that are nearer, and none for the others: potentials matter only by
     /// their differences, so those of the nearer ones are lowered instead of raising all.
-    fn nearest(&mut self, source: NodeId, demand: &[Rational]) -> Option<(NodeId, Vec<Step>)> {
+    fn nearest(&mut self, source: NodeId, demand: &Demand) -> Option<(NodeId, Vec<Step>)> {
         let found = self.explore(source, demand);
+        let workspace = &mut *self.workspace;
         let path = found.map(|(sink, reach)| {
-            for node in &self.touched {
-                if let Some(own) = &self.reached[node.index()]
+            for node in &workspace.touched {
+                if let Some(own) = &workspace.reached[node.index()]
                     && own.distance < reach
                 {
-                    let potential = &mut self.potential[node.index()];
-                    *potential = potential.plus(&own.distance.minus(&reach));
+                    let potential = &mut workspace.potential[node.index()];
+                    let present = match &*potential {
+                        Some(present) => present,
+                        None => {
+                            workspace.moved.push(*node);
+                            &self.network.schedule()[*node]
+                        }
+                    };
+                    *potential = Some(present.plus(&own.distance.minus(&reach)));
                 }
             }
             let mut path = Vec::new();
             let mut node = sink;
-            while let Some((step, before)) =
-                self.reached[node.index()].as_ref().and_then(|it| it.step)
+            while let Some((step, before)) = workspace.reached[node.index()]
+                .as_ref()
+                .and_then(|it| it.step)
             {
                 path.push(step);
                 node = before;
             }
             (sink, path)
         });
-        for node in self.touched.drain(..) {
-            self.reached[node.index()] = None;
+        for node in workspace.touched.drain(..) {
+            workspace.reached[node.index()] = None;
         }
         path
     }
 
     /// Looks for that node, and says how far it is.
-    fn explore(&mut self, source: NodeId, demand: &[Rational]) -> Option<(NodeId, W)> {
-        let network = self.network.network();
-        let mut queue = BinaryHeap::from([Reverse((W::zero(), source))]);
-        self.touched.push(source);
-        self.reached[source.index()] = Some(Reached {
+    fn explore(&mut self, source: NodeId, demand: &Demand) -> Option<(NodeId, W)> {
+        let (network, present) = (self.network.network(), self.network.schedule());
+        let workspace = &mut *self.workspace;
+        let is_wanted = |node: NodeId| demand.get(&node).is_some_and(Rational::is_positive);
+        // Of nodes at the same distance, those fewer steps away come first: many may be as near as the source.
+        let mut queue = BinaryHeap::from([Reverse((W::zero(), 0_u32, source))]);
+        workspace.touched.push(source);
+        workspace.reached[source.index()] = Some(Reached {
             distance: W::zero(),
             step: None,
             is_final: false,
         });
-        while let Some(Reverse((distance, node))) = queue.pop() {
-            let own = self.reached[node.index()].as_mut()?;
+        while let Some(Reverse((distance, steps, node))) = queue.pop() {
+            let own = workspace.reached[node.index()].as_mut()?;
             if std::mem::replace(&mut own.is_final, true) {
                 continue;
             }
-            if demand[node.index()].is_positive() {
+            if is_wanted(node) {
                 return Some((node, distance));
             }
             let along = network
@@ -144,10 +210,10 @@ impl<W: Weight> Search<'_, W> {
                 .map(|id| (Step::Along(id), network.constraint(id).to));
             let back = network
                 .entering(node)
-                .filter(|id| self.flow[id.index()].is_positive())
+                .filter(|id| self.flow.get(id).is_some_and(Rational::is_positive))
                 .map(|id| (Step::Back(id), network.constraint(id).from));
             for (step, far) in along.chain(back) {
-                let known = &mut self.reached[far.index()];
+                let known = &workspace.reached[far.index()];
                 if known.as_ref().is_some_and(|known| known.is_final) {
                     continue;
                 }
@@ -156,18 +222,19 @@ impl<W: Weight> Search<'_, W> {
                     Step::Back(id) => network.constraint(id).bound.negated(),
                 };
                 let reduced = cost
-                    .plus(&self.potential[node.index()])
-                    .minus(&self.potential[far.index()]);
+                    .plus(workspace.potential(node, present))
+                    .minus(workspace.potential(far, present));
                 let candidate = distance.plus(&reduced);
+                let known = &mut workspace.reached[far.index()];
                 if known.is_none() {
-                    self.touched.push(far);
+                    workspace.touched.push(far);
                 }
                 if known.as_ref().is_none_or(|old| candidate < old.distance) {
                     // Nothing is nearer than what is no farther than the nearest of the queue: from
                     // a good schedule, many nodes are as near, and need not be looked at.
-                    let is_nearest = candidate == distance && demand[far.index()].is_positive();
+                    let is_nearest = candidate == distance && is_wanted(far);
                     if !is_nearest {
-                        queue.push(Reverse((candidate.clone(), far)));
+                        queue.push(Reverse((candidate.clone(), steps + 1, far)));
                     }
                     *known = Some(Reached {
                         distance: candidate,

@@ -113,7 +113,14 @@ impl Soundness {
 
     /// The network of all schedules for values in a box, if there are any.
     fn schedules_in(&self, envelope: &DecoupledEnvelope) -> Option<ConsistentNetwork<Delta>> {
-        ConsistentNetwork::try_from(self.reduction.network(envelope).network).ok()
+        let network = self.reduction.network(envelope).network;
+        // From a schedule in which things take their time, what is far away in time is far away.
+        let times = self.reduction.class_times(&self.schedule).into_iter();
+        let known = elbowroom_stn::Schedule::new(times.map(Delta::from).collect());
+        if known.holds_in(&network) {
+            return ConsistentNetwork::by(network, known);
+        }
+        ConsistentNetwork::try_from(network).ok()
     }
 
     /// Whether the moment can be as close to the event as one likes in all schedules of a network, and so

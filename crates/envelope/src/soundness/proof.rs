@@ -1,5 +1,7 @@
 //! The proof that an over-all condition holds: a tree over the places of its moment.
 
+use std::borrow::Cow;
+
 use elbowroom_model::Task;
 
 use super::bad_case::{Outcome, Schedules};
@@ -43,7 +45,8 @@ pub(crate) struct Prover<'a, 'b, S: Scale> {
     pub(crate) over_all: &'a OverAll,
     pub(crate) schedules: &'b mut Schedules<'a, S>,
     /// The events that may come before the moment or after it.
-    events: Vec<NodeId>,
+    events: Cow<'a, [NodeId]>,
+    is_in_ranges: bool,
     /// The differences assumed so far, for the counterexample.
     assumed: Vec<Difference>,
     places: usize,
@@ -60,10 +63,9 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
         schedules: &'b mut Schedules<'a, S>,
         is_in_ranges: bool,
     ) -> Self {
-        let events = over_all.events.iter().copied();
-        let is_open = |event: &NodeId| !is_in_ranges || !over_all.settled.contains_key(event);
         Self {
-            events: events.filter(is_open).collect(),
+            events: over_all.events(is_in_ranges),
+            is_in_ranges,
             task,
             plan,
             over_all,
@@ -183,13 +185,10 @@ impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
 
     /// All events are placed: the condition's value is now an expression.
     fn settle(&mut self, happened: &[NodeId]) -> Result<Attempt, Refusal> {
-        let is_open = |node: &NodeId| self.events.contains(node);
-        let cut = |node: NodeId| match self.over_all.settled.get(&node) {
-            Some(has_happened) if !is_open(&node) => *has_happened,
-            _ => happened.contains(&node),
-        };
+        let cut = |node: NodeId| happened.contains(&node);
         let mut proofs = Vec::new();
-        for mut inequalities in self.over_all.cases(self.task, &self.plan.plan, &cut)? {
+        let cases = (self.over_all).cases(self.task, &self.plan.plan, self.is_in_ranges, &cut)?;
+        for mut inequalities in cases {
             inequalities.extend(self.over_all.assumptions.iter().cloned());
             let case = BadCase {
                 differences: self.assumed.clone(),

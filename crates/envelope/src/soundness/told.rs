@@ -189,9 +189,7 @@ impl Teller<'_> {
 
     /// Why an over-all condition cannot fail.
     fn over_all(&self, over_all: &OverAll, proof: &Proof) -> Option<Unfailing> {
-        let is_open =
-            |event: &&NodeId| !self.is_in_ranges || !over_all.settled.contains_key(*event);
-        let events: Vec<NodeId> = over_all.events.iter().filter(is_open).copied().collect();
+        let events = over_all.events(self.is_in_ranges);
         let mut place = Place {
             known: vec![
                 Difference::before(over_all.start, over_all.moment),
@@ -230,11 +228,9 @@ impl Teller<'_> {
                 Some(Unfailing::Either(event, Box::new(after), Box::new(before)))
             }
             Proof::True(cases) => {
-                let cut = |node: NodeId| match over_all.settled.get(&node) {
-                    Some(has_happened) if !events.contains(&node) => *has_happened,
-                    _ => place.happened.contains(&node),
-                };
-                let all = over_all.cases(self.task, &self.plan.plan, &cut).ok()?;
+                let cut = |node: NodeId| place.happened.contains(&node);
+                let all = over_all.cases(self.task, &self.plan.plan, self.is_in_ranges, &cut);
+                let all = all.ok()?;
                 if all.len() != cases.len() {
                     return None;
                 }

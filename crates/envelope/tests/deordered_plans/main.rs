@@ -6,7 +6,7 @@
 
 mod scenario;
 
-use elbowroom_envelope::obligations::Refusal;
+use elbowroom_envelope::obligations::{Obligations, Refusal, Substitution};
 use elbowroom_envelope::soundness::{Broken, broken_in};
 use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
@@ -163,4 +163,50 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
     }
     assert!(pinned > 0, "the scenarios are too easy");
     println!("{pinned} of 250 plans needed pins; of {untold} nothing could be told");
+}
+
+/// Of what a condition throughout an action reads, only what can happen on either side of a moment inside the action
+/// is placed; the slow way, which decides about each event, comes to the same wherever the moment is.
+#[test]
+fn what_is_far_from_an_action_makes_no_difference_to_what_holds_throughout() {
+    let (mut conditions, mut fewer) = (0, 0);
+    for seed in 0..400 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let scenario = scenario(&mut rng, false);
+        let task = scenario.task();
+        let plan = scenario.plan(&task);
+        let deordered = deorder(&task, &plan);
+        let Deordered { plan, nominal, .. } =
+            deordered.unwrap_or_else(|error| panic!("{seed}: {error}"));
+        let closed = ParametrizedPlan::closed(&task, plan.clone());
+        let around = (&nominal, &Valuation::default());
+        let compiled = Obligations::compile(&task, &closed, around, &Substitution::default());
+        let Ok(compiled) = compiled else { continue };
+        for over_all in &compiled.over_all {
+            conditions += 1;
+            fewer += usize::from(over_all.events(true).len() < over_all.events(false).len());
+        }
+        for schedule in (0..6).map(|_| draw(&plan, &mut rng)) {
+            for over_all in &compiled.over_all {
+                let (start, end) = (&schedule[over_all.start], &schedule[over_all.end]);
+                if start >= end {
+                    continue;
+                }
+                let events = over_all.events(false);
+                let times = events.iter().map(|event| &schedule[*event]);
+                let inside = times.filter(|&time| start < time && time < end);
+                for moment in inside.chain([start]) {
+                    let cut = |node: NodeId| schedule[node] <= *moment;
+                    assert_eq!(
+                        over_all.cases(&task, &plan, true, &cut),
+                        over_all.cases(&task, &plan, false, &cut),
+                        "seed {seed}: {:?}",
+                        over_all.condition
+                    );
+                }
+            }
+        }
+    }
+    println!("{conditions} conditions, {fewer} of which need not place all events");
+    assert!(conditions > 100 && fewer > 50, "{conditions}, {fewer}");
 }

@@ -50,7 +50,7 @@ fn read(
     let reading = Reading {
         task,
         timeline,
-        cut: &|_| has_happened,
+        cut: Some(&|_| has_happened),
         moment: NodeId::ZERO,
         action: None,
         substitution: &Substitution::default(),

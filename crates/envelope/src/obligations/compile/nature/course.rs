@@ -215,7 +215,7 @@ impl<'a> Course<'a> {
         Reading {
             task: self.compiler.task,
             timeline,
-            cut: &|_| true,
+            cut: None,
             // Nothing drifts on a snapshot, so the moment of reading does not matter.
             moment: NodeId::ZERO,
             action: action.map(|id| (plan.start(id), plan.end(id))),

@@ -1,0 +1,180 @@
+//! What becomes of one fluent.
+
+use std::collections::BTreeSet;
+
+use elbowroom_num::Rational;
+
+use super::super::precedence::{Around, Side};
+use crate::linear::Linear;
+use elbowroom_plan::NodeId;
+
+/// One change of a fluent.
+#[derive(Clone, Debug)]
+pub(crate) enum FluentChange {
+    /// It gets a value, or loses it (an effect whose right-hand side is undefined).
+    Assign(Option<Linear>),
+    /// It moves by an amount.
+    Shift(Linear),
+    /// A continuous change with this rate begins; no times occur in the rate.
+    Drift(Linear),
+    /// A continuous change that began at that node stops.
+    DriftEnd(NodeId),
+}
+
+/// What some changes have made of a fluent.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Standing {
+    pub(super) base: Option<Linear>,
+    drifts: Vec<Drift>,
+}
+
+/// A continuous change under way.
+#[derive(Clone, Debug)]
+struct Drift {
+    began: NodeId,
+    /// From here on it is not in the base yet.
+    counted: NodeId,
+    rate: Linear,
+}
+
+impl Standing {
+    /// One more change, the next one.
+    pub(super) fn apply(&mut self, node: NodeId, change: &FluentChange) {
+        match change {
+            FluentChange::Assign(value) => {
+                self.base.clone_from(value);
+                for drift in &mut self.drifts {
+                    drift.counted = node;
+                }
+            }
+            FluentChange::Shift(amount) => {
+                if let Some(base) = &mut self.base {
+                    base.add_scaled(amount, &Rational::ONE);
+                }
+            }
+            FluentChange::Drift(rate) => self.drifts.push(Drift {
+                began: node,
+                counted: node,
+                rate: rate.clone(),
+            }),
+            FluentChange::DriftEnd(since) => {
+                let mut drifts = self.drifts.iter();
+                if let Some(index) = drifts.position(|drift| drift.began == *since) {
+                    let drift = self.drifts.remove(index);
+                    self.base = drift.added_to(self.base.take(), node);
+                }
+            }
+        }
+    }
+
+    /// The value at a moment after these changes and before all others.
+    pub(super) fn value(&self, moment: NodeId) -> Option<Linear> {
+        let drifts = self.drifts.iter();
+        drifts.fold(self.base.clone(), |base, drift| {
+            drift.added_to(base, moment)
+        })
+    }
+
+    /// The rates of the continuous changes under way.
+    pub(super) fn rates(&self) -> impl Iterator<Item = &Linear> {
+        self.drifts.iter().map(|drift| &drift.rate)
+    }
+}
+
+impl Drift {
+    /// `base + rate * (until - counted)`; rates hold no times, so the product is always representable.
+    fn added_to(&self, base: Option<Linear>, until: NodeId) -> Option<Linear> {
+        let mut base = base?;
+        let difference = Linear::difference(self.counted, until);
+        base.add_scaled(&self.rate.times(&difference)?, &Rational::ONE);
+        Some(base)
+    }
+}
+
+/// The changes of a fluent along a plan.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FluentHistory {
+    first: Standing,
+    pub(super) events: Vec<(NodeId, FluentChange)>,
+    /// After all events.
+    last: Standing,
+    /// For each event that gives a value: its position, and how things stand after it.
+    assigned: Vec<(usize, Standing)>,
+}
+
+impl FluentHistory {
+    /// Its first value.
+    pub(super) fn put(&mut self, value: Option<Linear>) {
+        self.first.base.clone_from(&value);
+        self.last.base = value;
+    }
+
+    /// One more change.
+    pub(super) fn push(&mut self, node: NodeId, change: FluentChange) {
+        self.last.apply(node, &change);
+        if matches!(change, FluentChange::Assign(Some(_))) {
+            self.assigned.push((self.events.len(), self.last.clone()));
+        }
+        self.events.push((node, change));
+    }
+
+    /// After all events.
+    pub(super) fn last(&self) -> &Standing {
+        &self.last
+    }
+
+    /// After those events for which `cut` is true.
+    pub(super) fn standing(&self, cut: &dyn Fn(NodeId) -> bool) -> Standing {
+        let mut standing = self.first.clone();
+        for (node, change) in self.events.iter().filter(|(node, _)| cut(*node)) {
+            standing.apply(*node, change);
+        }
+        standing
+    }
+
+    /// What of this matters to a moment inside an action. Collects the events of which it is not known on which side
+    /// of the moment they are.
+    ///
+    /// Whatever else changes a fluent interferes with what gives it a value, so that before one that has happened
+    /// all earlier ones have, and after one that is to come so are all later ones.
+    pub(super) fn near(&self, around: &mut Around<'_>, open: &mut BTreeSet<NodeId>) -> Self {
+        let here = self
+            .events
+            .partition_point(|(node, _)| around.is_early(*node));
+        let (mut first, mut kept) = (self.first.clone(), Vec::new());
+        for index in (0..here).rev() {
+            let node = self.events[index].0;
+            if around.side(node) != Some(Side::Before) {
+                open.insert(node);
+            } else if let Ok(found) = self.assigned.binary_search_by_key(&index, |own| own.0) {
+                first = self.assigned[found].1.clone();
+                break;
+            }
+            kept.push(index);
+        }
+        kept.reverse();
+        for (index, (node, change)) in self.events.iter().enumerate().skip(here) {
+            if around.side(*node) != Some(Side::After) {
+                open.insert(*node);
+                kept.push(index);
+            } else if matches!(change, FluentChange::Assign(Some(_))) {
+                break;
+            }
+        }
+        let mut near = Self {
+            last: first.clone(),
+            first,
+            ..Self::default()
+        };
+        for index in kept {
+            let (node, change) = &self.events[index];
+            if near.events.is_empty() && !open.contains(node) {
+                near.first.apply(*node, change);
+                near.last.apply(*node, change);
+            } else {
+                near.push(*node, change.clone());
+            }
+        }
+        near
+    }
+}
