@@ -394,14 +394,23 @@ fn rates_of_changes_are_found_again_and_actions_and_deadlines_are_no_changes() {
 #[test]
 fn what_a_failure_undoes_has_not_changed_by_itself() {
     let world = WORLD.replace("when = \"midway\"", "when = \"midway\"\nundone = true");
-    let logs = (0..20).map(|seed| {
+    let undone = (0..20).map(|seed| {
         let (trace, _) = run(&world, seed);
         Log::read(&Source::new(format!("run {seed}"), trace)).expect("a trace")
     });
-    let answer = learnt(logs.collect(), None);
+    let answer = learnt(undone.collect(), None);
     let picks = answer.actions.iter().find(|action| action.action == "pick");
-    assert!(picks.is_some_and(|pick| pick.failures.failed > 0));
+    let failures = &picks.expect("it was executed").failures;
+    assert!(failures.failed > 0);
+    assert_eq!(failures.undone, Some((failures.failed, failures.failed)));
+    assert!(answer.world.contains("undone = true"), "{}", answer.world);
     assert_eq!(answer.changes, []);
+    // Without being undone, what the start has changed stays.
+    let answer = learnt(logs(20), None);
+    let picks = answer.actions.iter().find(|action| action.action == "pick");
+    let failures = &picks.expect("it was executed").failures;
+    assert_eq!(failures.undone, Some((0, failures.failed)));
+    assert!(!answer.world.contains("undone = true"), "{}", answer.world);
 }
 
 /// Whoever went by the true rates sees as many changes as they let expect; whoever went by others is

@@ -50,10 +50,20 @@ pub struct Learnt {
     pub failures: Proportion,
     /// When they fail, if they do.
     pub when: Failure,
+    /// How often what a start had changed was as before when an action had failed, of those failures of which a log tells
+    /// that. Logs of attempts alone do not.
+    pub undone: Proportion,
     /// Whether their durations change from log to log.
     pub drift: Drift,
     /// Whether the frequency of their failures does.
     pub failure_drift: Drift,
+}
+
+impl Learnt {
+    /// Whether most failures undo what the start has changed.
+    pub fn is_undone(&self) -> bool {
+        2 * self.undone.successes > self.undone.count
+    }
 }
 
 /// How long the actions of one name take.
@@ -134,6 +144,7 @@ fn of_name(name: &str, records: &[&Record], settings: &Settings) -> Learnt {
         delay: delay(records, settings),
         failures,
         when,
+        undone: Proportion::default(),
         drift: drift(&observed, settings.drift_limit, &mut rng),
         failure_drift: drift(&failed, settings.drift_limit, &mut rng),
         durations,

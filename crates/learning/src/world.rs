@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use elbowroom_report::statistics::Proportion;
 use elbowroom_sim::{Distribution, Failure};
 use toml::{Table, Value};
 
@@ -134,11 +135,19 @@ fn failures(text: &mut String, learnt: &Learnt) {
     let (failed, of) = (learnt.failures.successes, learnt.failures.count);
     let _ = write!(
         text,
-        "\n# {failed} of {of}; 95 % interval {lower:.3} to {upper:.3}\n[[failure]]\n"
+        "\n# {failed} of {of}; 95 % interval {lower:.3} to {upper:.3}"
     );
+    let Proportion { successes, count } = learnt.undone;
+    if count > 0 {
+        let _ = write!(text, "; {successes} of {count} undone");
+    }
+    text.push_str("\n[[failure]]\n");
     push(text, "action", Value::String(learnt.name.clone()));
     push(text, "probability", Value::Float(share));
     push(text, "when", Value::String(when.to_owned()));
+    if learnt.is_undone() {
+        push(text, "undone", Value::Boolean(true));
+    }
 }
 
 fn section(

@@ -214,6 +214,10 @@ pub struct FailuresLearnt {
     pub interval: Option<(f64, f64)>,
     /// `start`, `midway` or `end`; `None` if none failed.
     pub when: Option<String>,
+    /// After how many failures what the start had changed was as before, and of how many failures logs tell that; `None` if
+    /// of none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub undone: Option<(u64, u64)>,
 }
 
 /// Whether values change from log to log.
@@ -240,7 +244,13 @@ pub fn learn(
         .iter()
         .flat_map(|log| log.records.iter().cloned())
         .collect();
-    let learnt = learn::learn(&records, &request.settings);
+    let mut learnt = learn::learn(&records, &request.settings);
+    let courses = request.logs.iter().filter_map(|log| log.course.as_ref());
+    for (name, is_undone) in courses.flat_map(Course::undone) {
+        if let Some(of_name) = learnt.iter_mut().find(|it| it.name == name) {
+            of_name.undone.add(is_undone);
+        }
+    }
     let expected = match &request.expected {
         Some(world) => Some(Expected::new(&request.logs, world)?),
         None => None,
@@ -303,6 +313,8 @@ impl ActionLearnt {
                     };
                     when.to_owned()
                 }),
+                undone: (learnt.undone.count > 0)
+                    .then_some((learnt.undone.successes, learnt.undone.count)),
             },
             drift: match learnt.durations {
                 Durations::Together(_) | Durations::Relative(_) => {

@@ -157,12 +157,11 @@ impl<W: Weight> Search<'_, '_, W> {
                     && own.distance < reach
                 {
                     let potential = &mut workspace.potential[node.index()];
-                    let present = match &*potential {
-                        Some(present) => present,
-                        None => {
-                            workspace.moved.push(*node);
-                            &self.network.schedule()[*node]
-                        }
+                    let present = if let Some(present) = &*potential {
+                        present
+                    } else {
+                        workspace.moved.push(*node);
+                        &self.network.schedule()[*node]
                     };
                     *potential = Some(present.plus(&own.distance.minus(&reach)));
                 }

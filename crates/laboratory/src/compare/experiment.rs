@@ -86,6 +86,8 @@ pub struct Column {
     pub name: String,
     /// The world file.
     pub world: String,
+    /// The world file that executors go by, such as one that was learnt; without it, the world's own.
+    pub believed: Option<String>,
     /// How likely everything is, for executors that go by that: a likelihood file. Without one,
     /// everything is certain.
     pub likelihoods: Option<String>,
@@ -175,11 +177,12 @@ impl Experiment {
             let Column {
                 name,
                 world,
+                believed,
                 likelihoods,
                 vary,
             } = column;
             let vary = texts(&mut vary.iter().map(ToString::to_string));
-            json!([name, world, likelihoods, vary])
+            json!([name, world, believed, likelihoods, vary])
         });
         let together = together.iter().map(|it| json!([it.names, it.rows]));
         let planner = match planner {
@@ -269,6 +272,7 @@ impl Experiment {
             columns.push(Column {
                 name: column.name.clone(),
                 world: named(&column.world)?,
+                believed: column.believed.as_ref().map(&named).transpose()?,
                 likelihoods: column.likelihoods.as_ref().map(&named).transpose()?,
                 vary,
             });

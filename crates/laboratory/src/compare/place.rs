@@ -12,7 +12,7 @@ use elbowroom_probability::{Likelihoods, likelihoods};
 use elbowroom_sim::WorldModel;
 
 use super::beginnings::Beginning;
-use super::trials::{PLANS, PREPARED, Setting, world};
+use super::trials::{PLANS, PREPARED, Setting, believed, world};
 use super::{Column, ExperimentError, Planning};
 use elbowroom::execute::{
     ActionSets, Analyst, Choice, Chooser, Known, Likeliest, Rehearse, RememberingPlanner,
@@ -22,6 +22,7 @@ use elbowroom::timed::{Policy, Settings};
 
 /// A column for one problem.
 pub(super) struct Place {
+    /// The world in which runs are made.
     pub(super) world: WorldModel,
     pub(super) likelihoods: Arc<Likelihoods>,
     pub(super) foresight: Foresight,
@@ -48,7 +49,9 @@ impl Setting<'_> {
         goes_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Place, ExperimentError> {
         let column = &self.experiment.columns[place];
-        let world = world(column, task)?;
+        let happens = world(column, task)?;
+        // What executors go by.
+        let world = believed(column, task)?.unwrap_or_else(|| happens.clone());
         let likelihoods = Arc::new(match &column.likelihoods {
             None => Likelihoods::certain(),
             Some(text) => {
@@ -126,7 +129,7 @@ impl Setting<'_> {
             rehearse,
             firsts,
             beginnings,
-            world,
+            world: happens,
             likelihoods,
             foresight: Foresight::default(),
             preparer,

@@ -165,6 +165,9 @@ impl Setting<'_> {
     /// The trace of one trial of the first executor in the first column.
     pub(super) fn trace(&self, trial: u64) -> Result<String, ExperimentError> {
         let (row, column) = (0, 0);
+        if self.experiment.columns[column].believed.is_some() {
+            return Err(self.wrong("a trace names one world only, and the executors of the first column believe in another"));
+        }
         let mut common = self.common(&|| true)?;
         let seed = self.seed(trial);
         let executor = &self.experiment.executors[row];
@@ -378,6 +381,19 @@ impl Setting<'_> {
 pub(super) fn world(column: &Column, task: &Task) -> Result<WorldModel, ExperimentError> {
     let world = Source::new(format!("world of {}", column.name), column.world.as_str());
     WorldModel::read(&world, task.problem()).map_err(ExperimentError::Text)
+}
+
+/// The world that executors go by, where it is not the column's own.
+pub(super) fn believed(
+    column: &Column,
+    task: &Task,
+) -> Result<Option<WorldModel>, ExperimentError> {
+    let Some(text) = &column.believed else {
+        return Ok(None);
+    };
+    let source = Source::new(format!("believed world of {}", column.name), text.as_str());
+    let world = WorldModel::read(&source, task.problem());
+    world.map(Some).map_err(ExperimentError::Text)
 }
 
 /// Another program.

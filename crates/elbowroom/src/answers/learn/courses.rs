@@ -25,6 +25,18 @@ pub struct Course {
     flips: Vec<Flip>,
     /// How long the run took, in seconds.
     lasted: f64,
+    /// Failures of actions whose start had changed facts.
+    failures: Vec<Failed>,
+}
+
+/// A failure.
+#[derive(Clone, Debug)]
+struct Failed {
+    /// The name of the action, without its objects.
+    name: String,
+    at: Rational,
+    /// What the start had changed, and is not as it was before.
+    left: Vec<(FactId, bool)>,
 }
 
 /// A fact has changed.
@@ -48,6 +60,8 @@ impl Course {
             task,
             flips: Vec::new(),
             commanded: BTreeMap::new(),
+            started: BTreeMap::new(),
+            failures: Vec::new(),
             failed: (Rational::ZERO, BTreeSet::new()),
         };
         for line in &trace.lines {
@@ -57,8 +71,16 @@ impl Course {
         Some(Self {
             task: follower.task,
             flips: follower.flips,
+            failures: follower.failures,
             lasted,
         })
+    }
+
+    /// For each failure of an action whose start had changed facts: the action's name, and whether all of
+    /// this was undone when it failed.
+    pub(super) fn undone(&self) -> impl Iterator<Item = (&str, bool)> {
+        let failures = self.failures.iter();
+        failures.map(|failed| (failed.name.as_str(), failed.left.is_empty()))
     }
 
     /// The predicates of which a fact has changed by itself.
@@ -138,6 +160,9 @@ struct Follower {
     state: Progression,
     flips: Vec<Flip>,
     commanded: BTreeMap<u64, (Arc<Action>, Option<Rational>)>,
+    /// By ticket: the facts that a start has changed, as they were before.
+    started: BTreeMap<u64, Vec<(FactId, bool)>>,
+    failures: Vec<Failed>,
     /// When an action has failed last, and the facts that its start has changed: what is undone has
     /// not changed by itself.
     failed: (Rational, BTreeSet<FactId>),
@@ -182,10 +207,13 @@ impl Follower {
                     return;
                 };
                 let facts = changed(&action, true);
+                let before = facts.iter().map(|fact| (*fact, self.state.fact(*fact)));
+                let before: Vec<_> = before.collect();
                 self.doing(&facts, |state| {
                     let planned = planned.unwrap_or_default();
                     let _ = state.start(Ticket(*ticket), &action, &planned, &[]);
                 });
+                self.started.insert(*ticket, self.not_as(before));
             }
             ObservationLine::Ended {
                 ticket,
@@ -197,6 +225,15 @@ impl Follower {
                 let Some((action, _)) = self.commanded.remove(ticket) else {
                     return;
                 };
+                let before = self.started.remove(ticket).unwrap_or_default();
+                if outcome == "failed" && !before.is_empty() {
+                    let schema = action.schema.index();
+                    self.failures.push(Failed {
+                        name: self.task.problem().schemas[schema].name.clone(),
+                        at: time.0.clone(),
+                        left: self.not_as(before),
+                    });
+                }
                 if outcome == "succeeded" {
                     let facts = changed(&action, false);
                     self.doing(&facts, |state| {
@@ -225,9 +262,22 @@ impl Follower {
                 self.state.change_fact(fact, *becomes);
                 let is_undone = self.failed.0 == time.0 && self.failed.1.contains(&fact);
                 self.flip(fact, &time.0, !is_undone);
+                let state = &self.state;
+                let now = self.failures.iter_mut().rev();
+                for failed in now.take_while(|failed| failed.at == time.0) {
+                    failed
+                        .left
+                        .retain(|(fact, before)| state.fact(*fact) != *before);
+                }
             }
             _ => {}
         }
+    }
+
+    /// Those of these facts that are not as they were.
+    fn not_as(&self, mut before: Vec<(FactId, bool)>) -> Vec<(FactId, bool)> {
+        before.retain(|(fact, before)| self.state.fact(*fact) != *before);
+        before
     }
 
     /// Time passes, and with it timed initials. A report that comes late counts as of now.

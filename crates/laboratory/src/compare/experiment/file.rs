@@ -51,6 +51,7 @@ pub(super) struct File {
 pub(super) struct ColumnFile {
     pub(super) name: String,
     pub(super) world: Spanned<String>,
+    pub(super) believed: Option<Spanned<String>>,
     pub(super) likelihoods: Option<Spanned<String>>,
     #[serde(default)]
     pub(super) vary: Vec<Spanned<String>>,
