@@ -95,19 +95,26 @@ fn assert_sound(seed: u64, task: &Task, plan: &StnPlan, rng: &mut ChaCha8Rng) {
     }
 }
 
+/// A random scenario without an order, with its random numbers.
+fn deordered(seed: u64, is_timeless: bool) -> (ChaCha8Rng, Task, Deordered) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let scenario = scenario(&mut rng, is_timeless);
+    let task = scenario.task();
+    let deordered = deorder(&task, &scenario.plan(&task));
+    (
+        rng,
+        task,
+        deordered.unwrap_or_else(|error| panic!("{seed}: {error}")),
+    )
+}
+
 /// Deordering alone is claimed to be enough where [`keeps_all_that_is_read`] says so: the judge and the
 /// soundness check look at what it says so of.
 #[test]
 fn all_schedules_are_valid_where_deordering_is_said_to_keep_all_that_is_read() {
     let (mut kept, mut with_numbers, mut in_doubt, mut unsound) = (0, 0, 0, 0);
     for seed in 0..1500 {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let scenario = scenario(&mut rng, seed % 4 > 0);
-        let task = scenario.task();
-        let plan = scenario.plan(&task);
-        let deordered = deorder(&task, &plan);
-        let Deordered { plan, nominal, .. } =
-            deordered.unwrap_or_else(|error| panic!("{seed}: {error}"));
+        let (mut rng, task, Deordered { plan, nominal, .. }) = deordered(seed, seed % 4 > 0);
         let closed = ParametrizedPlan::closed(&task, plan.clone());
         if !keeps_all_that_is_read(&task, &closed, &nominal) {
             in_doubt += 1;
@@ -134,13 +141,7 @@ fn all_schedules_are_valid_where_deordering_is_said_to_keep_all_that_is_read() {
 fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
     let (mut pinned, mut untold) = (0, 0);
     for seed in 0..250 {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let scenario = scenario(&mut rng, false);
-        let task = scenario.task();
-        let plan = scenario.plan(&task);
-        let deordered = deorder(&task, &plan);
-        let Deordered { plan, nominal, .. } =
-            deordered.unwrap_or_else(|error| panic!("{seed}: {error}"));
+        let (mut rng, task, Deordered { plan, nominal, .. }) = deordered(seed, false);
         let mut is_told = true;
         let sound = pin_until_sound(plan.clone(), &nominal, &mut |plan| {
             let broken = broken(&task, plan);
@@ -171,13 +172,7 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
 fn what_is_far_from_an_action_makes_no_difference_to_what_holds_throughout() {
     let (mut conditions, mut fewer) = (0, 0);
     for seed in 0..400 {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let scenario = scenario(&mut rng, false);
-        let task = scenario.task();
-        let plan = scenario.plan(&task);
-        let deordered = deorder(&task, &plan);
-        let Deordered { plan, nominal, .. } =
-            deordered.unwrap_or_else(|error| panic!("{seed}: {error}"));
+        let (mut rng, task, Deordered { plan, nominal, .. }) = deordered(seed, false);
         let closed = ParametrizedPlan::closed(&task, plan.clone());
         let around = (&nominal, &Valuation::default());
         let compiled = Obligations::compile(&task, &closed, around, &Substitution::default());
