@@ -105,6 +105,18 @@ impl AnyExperiment {
         }
     }
 
+    /// Whether a trial can be [made once more](Self::traces): not where executors believe in another world, as a
+    /// trace names one only.
+    pub fn can_be_made_again(&self, failed: &FailedTrial) -> bool {
+        match self {
+            Self::Timed(experiment) => {
+                let column = experiment.columns.get(failed.place.1);
+                column.is_some_and(|column| column.believed.is_none())
+            }
+            Self::Untimed(_) => true,
+        }
+    }
+
     /// Makes trials once more, for their traces (`docs/formats/trace.md`) or, in worlds without time,
     /// their courses (`docs/formats/course.md`).
     ///

@@ -174,11 +174,12 @@ fn write_failures(
         }
     }
     // Who has ended the experiment does not wait for more trials.
-    let failed = if answer.is_interrupted() {
+    let mut failed = if answer.is_interrupted() {
         Vec::new()
     } else {
         answer.failed_trials(MOST_OF_A_CELL, MOST_FAILURES)
     };
+    failed.retain(|failed| experiment.can_be_made_again(failed));
     if !failed.is_empty() {
         make_folder(&folder)?;
     }
