@@ -239,3 +239,63 @@ fn so_has_each_trial_without_time() {
         lines[1]
     );
 }
+
+/// The experiment "detour" with `guarded` alone, and a second column that goes by the world of this file.
+fn with_believed(world: &str) -> PathBuf {
+    let text = fs::read_to_string(root().join("experiments/detour.toml")).expect("the experiment");
+    let (head, column) = text.split_once("[[column]]").expect("a column");
+    let head: Vec<&str> = head
+        .lines()
+        .filter(|line| !line.starts_with("optimum") && !line.starts_with("executors"))
+        .collect();
+    let column = format!("[[column]]{column}");
+    let second = column.replace("\"52\"", "\"believed\"");
+    let text = format!(
+        "{}\nexecutors = [\"guarded\"]\n{column}\n{second}\nbelieved = \"{world}\"\n",
+        head.join("\n")
+    );
+    let files = format!("\"{}/experiments/detour/", root().display());
+    let experiment = temporary("believed.toml");
+    fs::write(&experiment, text.replace("\"detour/", &files)).expect("written");
+    experiment
+}
+
+#[test]
+fn what_is_believed_leaves_results_and_no_traces_of_a_world_that_was_not() {
+    let folder = temporary("believed");
+    let (output, path) = (
+        folder.display().to_string(),
+        with_believed("detour/world.toml"),
+    );
+    let arguments = ["--trials", "40", "--output", &output];
+    let results = compare(&[&path.display().to_string()], &arguments);
+    fs::remove_file(path).expect("it is there");
+    let results: serde_json::Value = serde_json::from_str(&results).expect("a document");
+    for cell in results["cells"][0].as_array().expect("columns") {
+        assert_eq!(cell["runs"], 40);
+        assert!(cell["successes"].as_u64().expect("a count") < 40, "{cell}");
+    }
+    let traces = fs::read_dir(folder.join("failures")).expect("the folder");
+    let names: Vec<String> = traces
+        .map(|entry| entry.expect("a file").file_name().display().to_string())
+        .collect();
+    assert!(!names.is_empty());
+    assert!(
+        names.iter().all(|name| name.starts_with("0-0-")),
+        "{names:?}"
+    );
+    fs::remove_dir_all(folder).expect("it is there");
+
+    let missing = with_believed("nowhere.toml");
+    let output = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .arg("compare")
+        .arg(&missing)
+        .output()
+        .expect("the command can be started");
+    fs::remove_file(missing).expect("it is there");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        !output.status.success() && message.contains("nowhere.toml"),
+        "{message}"
+    );
+}

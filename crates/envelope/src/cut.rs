@@ -110,6 +110,16 @@ impl Ends {
         }
     }
 
+    /// The sum in a box; `None` if an infinite end counts.
+    pub(crate) fn value(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
+        let mut sum = self.constant.clone();
+        for (end, factor) in &self.factors {
+            let interval = envelope.interval(end.parameter);
+            sum += factor * end.side.of(interval).value()?;
+        }
+        Some(sum)
+    }
+
     /// Whether a parameter occurs at both of its ends.
     pub(crate) fn tears(&self) -> bool {
         let ends: Vec<&BoxEnd> = self.factors.keys().collect();

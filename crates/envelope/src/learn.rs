@@ -7,6 +7,10 @@
 //! at least. So it is a disjunction: the cycle is not negative, or what follows one of these is
 //! not.
 
+mod shorter;
+
+use std::collections::BTreeSet;
+
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::PlanNetwork;
 use elbowroom_plan::{
@@ -19,6 +23,7 @@ use elbowroom_stn::uncertain::{
 };
 
 use crate::cut::{Cut, Ends, Ground, ProofPart, ProofWay};
+use shorter::Shortcuts;
 
 /// The limit on the rows of a cut.
 const MOST_ROWS: usize = 64;
@@ -103,10 +108,21 @@ pub(crate) fn without_strategy(
         plan,
         network: &network,
     };
-    let cuts = refutations.iter();
-    let cuts: Vec<Cut> = cuts
-        .filter_map(|refutation| reader.cut(refutation, envelope))
-        .collect();
+    let shortcuts = Shortcuts::new(&reader);
+    let mut known = BTreeSet::new();
+    let mut cuts = Vec::new();
+    for refutation in &refutations {
+        let mut found = shortcuts.of(&reader, refutation, envelope);
+        if found.is_empty() {
+            found.extend(reader.cut(refutation, envelope));
+        }
+        found.retain(|cut| {
+            let ends = cut.rows.iter().map(|row| row.factors.keys().copied());
+            known.insert(ends.map(Vec::from_iter).collect::<Vec<_>>())
+        });
+        cuts.append(&mut found);
+    }
+    cuts.truncate(most);
     if cuts.is_empty() {
         Learnt::Unknown
     } else {
@@ -216,6 +232,23 @@ impl Reader<'_> {
         }
         rows.extend(total);
         cut(rows, ground, envelope)
+    }
+
+    /// What a step is as long as, and the bound that it is; `None` for a way.
+    fn plain(&self, part: &Part) -> Option<(Ends, Origin)> {
+        let constraint = |link: &LinkId| self.network.links[link.index()];
+        Some(match part {
+            Part::Requirement(id) => self.requirement(*id)?,
+            Part::Early(link) => {
+                let ends = self.link(*link, Side::Lower);
+                (ends, Origin::AtMost(constraint(link)))
+            }
+            Part::Late(link) => {
+                let ends = self.link(*link, Side::Upper);
+                (ends, Origin::AtLeast(constraint(link)))
+            }
+            Part::Way(_) => return None,
+        })
     }
 
     /// The constraint that leaves a link's duration open.

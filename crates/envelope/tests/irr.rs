@@ -74,6 +74,36 @@ fn plan_text(dice: &mut Dice) -> String {
     text
 }
 
+/// Actions one after the other, many of which have to be in a window: conflicts are along several windows.
+fn plan_in_windows(dice: &mut Dice) -> String {
+    let mut text = String::new();
+    for action in 0..4 + dice.below(8) {
+        let range = ["lb 0 ub inf", "lb 0 ub 6", "lb 1 ub 9"][dice.below(3)];
+        let _ = write!(
+            text,
+            "parameter p{action} default 2 {range}; durative-action instance a{action} : (run); \
+             c: a{action}.end - a{action}.start in [p{action}, p{action}]; "
+        );
+        if action > 0 {
+            let _ = write!(
+                text,
+                "c: a{action}.start - a{}.end in [1/4, inf]; ",
+                action - 1
+            );
+        }
+        let start = 3 * action + 2;
+        if dice.below(3) > 0 {
+            let open = start - dice.below(3);
+            let _ = write!(text, "c: a{action}.start - .zero in [{open}, inf]; ");
+        }
+        if dice.below(3) > 0 {
+            let close = start + 2 + dice.below(5);
+            let _ = write!(text, "c: a{action}.end - .zero in [-inf, {close}]; ");
+        }
+    }
+    text
+}
+
 /// What a search came to: the steps with the box after each and the number of checks by then, and
 /// how it ended.
 #[derive(Debug, PartialEq)]
@@ -252,8 +282,11 @@ fn objections(
 fn the_search_takes_the_steps_of_one_check_after_the_other() {
     let mut dice = Dice(3);
     let (mut long, mut limited, mut cancelled, mut without, mut objected) = (0, 0, 0, 0, 0);
-    for _ in 0..600 {
-        let text = plan_text(&mut dice);
+    for round in 0..800 {
+        let text = match round {
+            ..600 => plan_text(&mut dice),
+            _ => plan_in_windows(&mut dice),
+        };
         let given = Given {
             domain: DOMAIN,
             init: "",

@@ -28,7 +28,7 @@
 //! ways end after a few edges, in proportion to their size.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use std::ops::ControlFlow;
 
 use super::conflict::Conflict;
@@ -108,8 +108,8 @@ pub(super) struct Search<'a, W> {
     keeps_edges: bool,
 }
 
-/// Hears of a cycle, its ways in order, and says whether to look for more.
-type OnCycle<'a, W> = dyn FnMut(&Graph<W>, &[WayId]) -> ControlFlow<()> + 'a;
+/// Hears of a cycle, where it closes and its ways in order, and says whether to look for more.
+type OnCycle<'a, W> = dyn FnMut(&Graph<W>, Closed, &[WayId]) -> ControlFlow<()> + 'a;
 
 /// A negative node being dealt with.
 struct Frame<W> {
@@ -123,8 +123,20 @@ struct Frame<W> {
     /// Whether the plain edges have been begun with.
     is_last: bool,
     reached: BTreeMap<NodeId, Reached<W>>,
+    /// Edges that close a cycle at the node in this pass, other than that of the shortest one. Those found last, of
+    /// which the others may be parts, come first.
+    others: BTreeSet<EdgeId>,
     region: Vec<NodeId>,
     queue: BinaryHeap<Reverse<(Extended<W>, NodeId)>>,
+}
+
+/// Where ways under way close a cycle.
+#[derive(Clone, Copy)]
+pub(super) enum Closed {
+    /// At a node that is being dealt with, by the shortest way to it.
+    At(NodeId),
+    /// At the node of the last frame, by a longer way that has this edge first.
+    By(EdgeId),
 }
 
 /// A way from a node to the frame's.
@@ -159,7 +171,7 @@ impl<'a, W: Weight> Search<'a, W> {
         self.begin(node);
         match self.go_on() {
             None => Ok(()),
-            Some(node) => Err(self.conflict(node)),
+            Some(closed) => Err(self.conflict(closed)),
         }
     }
 
@@ -172,18 +184,21 @@ impl<'a, W: Weight> Search<'a, W> {
         on_cycle: &mut OnCycle<'_, W>,
     ) -> ControlFlow<()> {
         self.begin(node);
-        while let Some(node) = self.go_on() {
-            let cycle = self.cycle(node);
-            on_cycle(self.graph, &cycle)?;
+        while let Some(closed) = self.go_on() {
+            let cycle = self.cycle(closed);
+            on_cycle(self.graph, closed, &cycle)?;
         }
         ControlFlow::Continue(())
     }
 
-    /// Deals with all that is under way, or until a cycle closes: at which node. Whoever goes on then
-    /// goes on without it.
-    fn go_on(&mut self) -> Option<NodeId> {
+    /// Deals with all that is under way, or until a cycle closes: where. Whoever goes on then goes on
+    /// without it.
+    fn go_on(&mut self) -> Option<Closed> {
         while let Some(frame) = self.frames.last_mut() {
             let Some(Reverse((distance, node))) = frame.queue.pop() else {
+                if let Some(edge) = frame.others.pop_last() {
+                    return Some(Closed::By(edge));
+                }
                 if !self.next_pass() {
                     let done = self.frames.pop().expect("the last frame is there");
                     self.stage[done.node.index()] = Stage::Done;
@@ -200,7 +215,7 @@ impl<'a, W: Weight> Search<'a, W> {
                 continue;
             }
             match self.stage[node.index()] {
-                Stage::Underway => return Some(node),
+                Stage::Underway => return Some(Closed::At(node)),
                 Stage::New => {
                     // It comes back to this one when that node has been dealt with.
                     frame.queue.push(Reverse((distance, node)));
@@ -235,6 +250,7 @@ impl<'a, W: Weight> Search<'a, W> {
             plain: Vec::new(),
             is_last: false,
             reached: BTreeMap::new(),
+            others: BTreeSet::new(),
             region: Vec::new(),
             queue: BinaryHeap::new(),
         });
@@ -276,10 +292,18 @@ impl<'a, W: Weight> Search<'a, W> {
         let Some(frame) = self.frames.last_mut() else {
             return;
         };
-        if let Some(known) = frame.reached.get(&from)
-            && known.distance <= distance
-        {
-            return;
+        if let Some(known) = frame.reached.get(&from) {
+            let (longer, by) = if known.distance <= distance {
+                (&distance, edge)
+            } else {
+                (&known.distance, known.edge)
+            };
+            if from == frame.node && longer.is_negative() {
+                frame.others.insert(by);
+            }
+            if known.distance <= distance {
+                return;
+            }
         }
         frame.queue.push(Reverse((distance.clone(), from)));
         let reached = Reached {
@@ -365,8 +389,13 @@ impl<'a, W: Weight> Search<'a, W> {
 
     /// The shortest way from a node to that frame's, as far as it is known.
     fn way_to(&mut self, frame: usize, node: NodeId) -> WayId {
+        let edge = self.frames[frame].reached[&node].edge;
+        self.way_by(frame, edge)
+    }
+
+    /// The shortest way to that frame's node that has this edge first, as far as it is known.
+    fn way_by(&mut self, frame: usize, edge: EdgeId) -> WayId {
         let frame = &self.frames[frame];
-        let edge = frame.reached[&node].edge;
         let next = self.graph.edges[edge].to;
         let rest = match frame.reached.get(&next) {
             Some(reached) if next != frame.node => reached.way,
@@ -394,9 +423,15 @@ impl<'a, W: Weight> Search<'a, W> {
         }
     }
 
-    /// The ways from `node` to the last frame's, and from each frame's node to the one before, down to
-    /// `node` again, are a cycle.
-    fn cycle(&mut self, node: NodeId) -> Vec<WayId> {
+    /// The ways from where it closes to the last frame's node, and from each frame's node to the one before, down to
+    /// there again, are a cycle.
+    fn cycle(&mut self, closed: Closed) -> Vec<WayId> {
+        let node = match closed {
+            Closed::At(node) => node,
+            Closed::By(edge) => {
+                return vec![self.way_by(self.frames.len() - 1, edge)];
+            }
+        };
         let first = self.first_of(node);
         let mut from = node;
         let ways = (first..self.frames.len()).rev().map(|index| {
@@ -412,21 +447,17 @@ impl<'a, W: Weight> Search<'a, W> {
         first.expect("a node under way has a frame")
     }
 
-    /// The cycle that closes at a node, step by step.
-    fn conflict(&mut self, node: NodeId) -> Conflict<W> {
+    /// The cycle that closes there, step by step.
+    fn conflict(&mut self, closed: Closed) -> Conflict<W> {
         let mut total = Extended::zero();
-        let mut from = node;
-        for frame in self.frames[self.first_of(node)..].iter().rev() {
-            total = total.plus(&frame.reached[&from].distance);
-            from = frame.node;
-        }
         let mut steps = Vec::new();
         let mut is_whole = true;
-        for way in self.cycle(node) {
+        for way in self.cycle(closed) {
             let mut edges = Vec::new();
             let mut next = Some(way);
             while let Some(way) = next {
                 let edge = self.graph.ways[way].edge;
+                total = total.plus(&self.graph.edges[edge].bound);
                 is_whole &= self.graph.spelt_out(edge, MOST_STEPS, &mut edges);
                 next = self.graph.ways[way].rest;
             }

@@ -1,14 +1,16 @@
 //! The rules by which a conflict follows from a network, so that it can be checked again with other
 //! bounds.
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
-use super::dynamic::Search;
+use super::dynamic::{Closed, Search};
 use super::graph::{EdgeId, Graph, Kind, Origin, WayId};
 use super::{LinkId, UncertainNetwork};
 use crate::{ConstraintId, Weight};
 
-/// The limit on the parts of a refutation: what is shared is spelt out each time.
+/// The limit on the parts of a refutation, or, of a larger network, one for each of its nodes: what is shared is
+/// spelt out each time.
 const MOST_PARTS: usize = 10_000;
 
 /// The limit on the parts of all refutations of a network, for each of its nodes.
@@ -65,18 +67,29 @@ pub enum Refuted {
 impl<W: Weight> UncertainNetwork<W> {
     /// Why the network is not dynamically controllable, rule by rule: as many reasons, at most, as
     /// come up when it is gone through once, and no more than `most`. The first one does not depend
-    /// on how many are wanted.
+    /// on how many are wanted. Of several that close at one node, those are left out of which all links are found in
+    /// those before.
     pub fn refutations(&self, most: usize) -> Refuted {
         let mut graph = Graph::new(self);
         let mut search = Search::new(self, &mut graph, false);
         let mut found = Vec::new();
         let mut is_refuted = false;
-        let most_parts = MOST_PARTS.max(MOST_PARTS_A_NODE * self.requirements.node_count());
+        let node_count = self.requirements.node_count();
+        let most_parts = MOST_PARTS.max(MOST_PARTS_A_NODE * node_count);
         let mut all_parts = 0;
-        let mut on_cycle = |graph: &Graph<W>, cycle: &[WayId]| {
+        let mut told = Told {
+            edges: BTreeSet::new(),
+            most: MOST_PARTS.max(node_count),
+        };
+        let mut on_cycle = |graph: &Graph<W>, closed: Closed, cycle: &[WayId]| {
             is_refuted = true;
+            if matches!(closed, Closed::By(_)) && cycle.iter().all(|&way| told.has(graph, way)) {
+                return ControlFlow::Continue(());
+            }
             let mut parts = 0;
-            let ways = cycle.iter().map(|&way| spelt_out(graph, way, &mut parts));
+            let ways = cycle
+                .iter()
+                .map(|&way| told.spelt_out(graph, way, &mut parts));
             found.extend(
                 ways.collect::<Option<_>>()
                     .map(|cycle| Refutation { cycle }),
@@ -101,53 +114,75 @@ impl<W: Weight> UncertainNetwork<W> {
     }
 }
 
-/// The parts of a way; `None` if there are too many.
-fn spelt_out<W: Weight>(graph: &Graph<W>, way: WayId, count: &mut usize) -> Option<Way> {
-    let mut parts = Vec::new();
-    let mut next = Some(way);
-    while let Some(id) = next {
-        let way = graph.ways[id];
-        parts.push(part(graph, way.edge, count)?);
-        next = way.rest;
-    }
-    Some(Way {
-        parts,
-        unlabelled: None,
-    })
+/// What has been spelt out of a graph.
+struct Told {
+    /// The edges that have, but for requirements.
+    edges: BTreeSet<EdgeId>,
+    /// The limit on the parts of one refutation.
+    most: usize,
 }
 
-fn part<W: Weight>(graph: &Graph<W>, id: EdgeId, count: &mut usize) -> Option<Part> {
-    *count += 1;
-    if *count > MOST_PARTS {
-        return None;
+impl Told {
+    /// Whether all edges of a way have been spelt out, but for requirements.
+    fn has<W: Weight>(&self, graph: &Graph<W>, way: WayId) -> bool {
+        let mut edges = ways_from(graph, way).map(|way| graph.ways[way].edge);
+        edges.all(|id| {
+            matches!(graph.edges[id].origin, Origin::Requirement(_)) || self.edges.contains(&id)
+        })
     }
-    let edge = &graph.edges[id];
-    Some(match (edge.origin, edge.kind) {
-        (Origin::Requirement(id), _) => Part::Requirement(id),
-        (Origin::Link(link), Kind::Lower(_)) => Part::Early(link),
-        (Origin::Link(link), Kind::Upper(_)) => Part::Late(link),
-        // A link that takes no time: its end comes at least so much after its activation.
-        (Origin::Link(link), Kind::Plain) => Part::Way(Way {
-            parts: vec![Part::Late(link)],
-            unlabelled: Some(link),
-        }),
-        (Origin::Way(way), kind) => {
-            let mut spelt = spelt_out(graph, way, count)?;
-            if kind == Kind::Plain {
-                spelt.unlabelled = label(graph, way);
-            }
-            Part::Way(spelt)
+
+    /// The parts of a way; `None` if there are too many.
+    fn spelt_out<W: Weight>(
+        &mut self,
+        graph: &Graph<W>,
+        way: WayId,
+        count: &mut usize,
+    ) -> Option<Way> {
+        let parts = ways_from(graph, way).map(|way| self.part(graph, graph.ways[way].edge, count));
+        Some(Way {
+            parts: parts.collect::<Option<_>>()?,
+            unlabelled: None,
+        })
+    }
+
+    fn part<W: Weight>(&mut self, graph: &Graph<W>, id: EdgeId, count: &mut usize) -> Option<Part> {
+        *count += 1;
+        if *count > self.most {
+            return None;
         }
-    })
+        let edge = &graph.edges[id];
+        if !matches!(edge.origin, Origin::Requirement(_)) {
+            self.edges.insert(id);
+        }
+        Some(match (edge.origin, edge.kind) {
+            (Origin::Requirement(id), _) => Part::Requirement(id),
+            (Origin::Link(link), Kind::Lower(_)) => Part::Early(link),
+            (Origin::Link(link), Kind::Upper(_)) => Part::Late(link),
+            // A link that takes no time: its end comes at least so much after its activation.
+            (Origin::Link(link), Kind::Plain) => Part::Way(Way {
+                parts: vec![Part::Late(link)],
+                unlabelled: Some(link),
+            }),
+            (Origin::Way(way), kind) => {
+                let mut spelt = self.spelt_out(graph, way, count)?;
+                if kind == Kind::Plain {
+                    spelt.unlabelled = label(graph, way);
+                }
+                Part::Way(spelt)
+            }
+        })
+    }
+}
+
+/// A way, what is left of it after its first edge, and so on.
+fn ways_from<W>(graph: &Graph<W>, way: WayId) -> impl Iterator<Item = WayId> + '_ {
+    std::iter::successors(Some(way), |&way| graph.ways[way].rest)
 }
 
 /// The link for whose end a way waits.
 fn label<W: Weight>(graph: &Graph<W>, way: WayId) -> Option<LinkId> {
-    let mut last = graph.ways[way];
-    while let Some(rest) = last.rest {
-        last = graph.ways[rest];
-    }
-    match graph.edges[last.edge].kind {
+    let last = ways_from(graph, way).last()?;
+    match graph.edges[graph.ways[last].edge].kind {
         Kind::Upper(link) => Some(link),
         Kind::Plain | Kind::Lower(_) => None,
     }

@@ -1,0 +1,203 @@
+//! From a long conflict to shorter ones: [`Shortcuts`].
+//!
+//! Windows and deadlines bind time points to the beginning. A cycle along many of them is one conflict, the most
+//! violated one, and says little about narrower boxes: when these are looked at, a slightly shorter cycle is in
+//! the way, and so on. Cut at the points that are bound to the beginning, it falls into short ones, which have fewer ends
+//! and often imply it.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+use elbowroom_plan::DecoupledEnvelope;
+use elbowroom_stn::uncertain::{LinkId, Part, Refutation, Way};
+use elbowroom_stn::{ConstraintId, NodeId};
+
+use super::{Reader, cut};
+use crate::cut::{Cut, Ends, Ground};
+
+/// How many steps a cycle may go back from the point at which it is cut.
+const FARTHEST: usize = 64;
+
+/// A bound on the difference of a node and the beginning, and what it comes from.
+#[derive(Clone)]
+struct Chord {
+    length: Rational,
+    parts: Vec<Part>,
+}
+
+/// The bounds between nodes and the beginning, by way of no other node that the network leaves open.
+pub(super) struct Shortcuts {
+    /// At most so long after the beginning.
+    after: BTreeMap<NodeId, Chord>,
+    /// At most minus so long before it.
+    before: BTreeMap<NodeId, Chord>,
+}
+
+/// A step of a cycle: how long it is, and what it says.
+struct Step {
+    to: NodeId,
+    part: Part,
+    length: Rational,
+}
+
+impl Shortcuts {
+    pub(super) fn new(reader: &Reader<'_>) -> Self {
+        let origin = NodeId(0);
+        let network = reader.network.network.requirements();
+        let here = Chord {
+            length: Rational::ZERO,
+            parts: Vec::new(),
+        };
+        let mut fixed = Self {
+            after: BTreeMap::from([(origin, here.clone())]),
+            before: BTreeMap::from([(origin, here)]),
+        };
+        for (after, before) in fixed_pairs(reader, origin) {
+            let node = after.0;
+            keep_least(&mut fixed.after, node, after.1);
+            keep_least(&mut fixed.before, node, before);
+        }
+        let mut all = Self {
+            after: fixed.after.clone(),
+            before: fixed.before.clone(),
+        };
+        for id in network.constraint_ids() {
+            let constraint = network.constraint(id);
+            if let Some(chord) = fixed.after.get(&constraint.from) {
+                let mut parts = chord.parts.clone();
+                parts.push(Part::Requirement(id));
+                let length = &chord.length + &constraint.bound;
+                keep_least(&mut all.after, constraint.to, Chord { length, parts });
+            }
+            if let Some(chord) = fixed.before.get(&constraint.to) {
+                let mut parts = vec![Part::Requirement(id)];
+                parts.extend(chord.parts.iter().cloned());
+                let length = &chord.length + &constraint.bound;
+                keep_least(&mut all.before, constraint.from, Chord { length, parts });
+            }
+        }
+        all
+    }
+
+    /// The shortest cycles that are left when a conflict is cut at nodes that are bound to the beginning, as far as they
+    /// leave no schedule at all; none if it is one of these itself.
+    pub(super) fn of(
+        &self,
+        reader: &Reader<'_>,
+        refutation: &Refutation,
+        envelope: &DecoupledEnvelope,
+    ) -> Vec<Cut> {
+        let Some(steps) = steps(reader, &refutation.cycle, envelope) else {
+            return Vec::new();
+        };
+        let mut found = Vec::new();
+        // Where the last one that was found begins: what begins there or before includes it.
+        let mut beginning = 0;
+        for end in 0..steps.len() {
+            let Some(back) = self.before.get(&steps[end].to) else {
+                continue;
+            };
+            let mut length = back.length.clone();
+            for begin in (beginning..=end).rev().take(FARTHEST) {
+                length += &steps[begin].length;
+                let from = steps[begin.checked_sub(1).unwrap_or(steps.len() - 1)].to;
+                let Some(first) = self.after.get(&from) else {
+                    continue;
+                };
+                if (&length + &first.length).is_negative() && end + 1 - begin < steps.len() {
+                    let own = steps[begin..=end].iter().map(|step| &step.part);
+                    let parts = first.parts.iter().chain(own).chain(&back.parts);
+                    found.extend(whole(reader, parts, envelope));
+
+                    beginning = begin + 1;
+                    break;
+                }
+            }
+        }
+        found
+    }
+}
+
+fn keep_least(chords: &mut BTreeMap<NodeId, Chord>, node: NodeId, chord: Chord) {
+    let known = chords.get(&node);
+    if known.is_none_or(|known| chord.length < known.length) {
+        chords.insert(node, chord);
+    }
+}
+
+/// The nodes whose distance from the beginning is fixed: the bounds that fix it from both sides.
+fn fixed_pairs(reader: &Reader<'_>, origin: NodeId) -> Vec<((NodeId, Chord), Chord)> {
+    let network = &reader.network.network;
+    let requirements = network.requirements();
+    let chord = |length: Rational, part| Chord {
+        length,
+        parts: vec![part],
+    };
+    let mut after: BTreeMap<NodeId, ConstraintId> = BTreeMap::new();
+    for id in requirements.leaving(origin) {
+        after.insert(requirements.constraint(id).to, id);
+    }
+    let fixed = requirements.entering(origin).filter_map(|back| {
+        let node = requirements.constraint(back).from;
+        let there = *after.get(&node)?;
+        let bounds = [there, back].map(|id| &requirements.constraint(id).bound);
+        (bounds[0] + bounds[1]).is_zero().then(|| {
+            let after = chord(bounds[0].clone(), Part::Requirement(there));
+            let before = chord(bounds[1].clone(), Part::Requirement(back));
+            ((node, after), before)
+        })
+    });
+    let links = network.link_ids().filter_map(|id: LinkId| {
+        let link = network.link(id);
+        let is_fixed = link.activation == origin && link.upper.as_ref() == Some(&link.lower);
+        is_fixed.then(|| {
+            let after = chord(link.lower.clone(), Part::Early(id));
+            ((link.end, after), chord(-&link.lower, Part::Late(id)))
+        })
+    });
+    fixed.chain(links).collect()
+}
+
+/// The steps of a cycle one after the other, whatever ways they are parts of; `None` if one of them is endless.
+fn steps(reader: &Reader<'_>, cycle: &[Way], envelope: &DecoupledEnvelope) -> Option<Vec<Step>> {
+    let mut steps = Vec::new();
+    let mut open: Vec<&Part> = cycle.iter().flat_map(|way| &way.parts).rev().collect();
+    while let Some(part) = open.pop() {
+        if let Part::Way(way) = part {
+            open.extend(way.parts.iter().rev());
+            continue;
+        }
+        let network = &reader.network.network;
+        let to = match part {
+            Part::Requirement(id) => network.requirements().constraint(*id).to,
+            Part::Early(id) => network.link(*id).end,
+            Part::Late(id) => network.link(*id).activation,
+            Part::Way(_) => continue,
+        };
+        steps.push(Step {
+            to,
+            part: part.clone(),
+            length: reader.plain(part)?.0.value(envelope)?,
+        });
+    }
+    Some(steps)
+}
+
+/// What a cycle of such steps says, if at its ends, one for each parameter, there is no schedule.
+fn whole<'a>(
+    reader: &Reader<'_>,
+    parts: impl Iterator<Item = &'a Part>,
+    envelope: &DecoupledEnvelope,
+) -> Option<Cut> {
+    let mut total = Ends::default();
+    let mut origins = Vec::new();
+    for part in parts {
+        let (ends, origin) = reader.plain(part)?;
+        total.add(&ends);
+        origins.push(origin);
+    }
+    if total.tears() {
+        return None;
+    }
+    cut(vec![total], Ground::Cycle(origins), envelope)
+}
