@@ -417,6 +417,9 @@ impl<'a> Planner<'a> {
             if tuning.uses(Technique::Width) {
                 add(Member::Width);
             }
+            if tuning.uses(Technique::Landmarks) {
+                add(Member::Landmarks);
+            }
             if tuning.uses(Technique::Novelty) {
                 add(Member::Novelty);
             }

@@ -22,6 +22,10 @@ pub enum Technique {
     Novelty,
     /// A search for new successors (BFWS(f₅)).
     Width,
+    /// Searches that count landmarks.
+    Landmarks,
+    /// Reasonable orders of landmarks, by mutex groups.
+    ReasonableOrders,
     /// Searches in the order of time.
     Chronological,
     /// In the relaxed problem a fact that holds only while an envelope runs does not serve who
@@ -55,6 +59,8 @@ impl Technique {
         (Self::DeadEnds, "dead-ends"),
         (Self::Novelty, "novelty"),
         (Self::Width, "width"),
+        (Self::Landmarks, "landmarks"),
+        (Self::ReasonableOrders, "reasonable-orders"),
         (Self::Chronological, "chronological"),
         (Self::Envelopes, "envelopes"),
         (Self::Exclusions, "exclusions"),
@@ -85,6 +91,10 @@ pub enum Member {
     Novelty,
     /// Successors are new or not, and hardly any state is estimated (BFWS(f₅)).
     Width,
+    /// The landmarks that are left come first, and then the estimate.
+    Landmarks,
+    /// Successors are new or not, among those with as many landmarks left (BFWS(f₅)).
+    LandmarkWidth,
     /// Loses nothing.
     Complete,
 }
@@ -99,6 +109,8 @@ impl Member {
         (Self::Saving, "saving"),
         (Self::Novelty, "novelty"),
         (Self::Width, "width"),
+        (Self::Landmarks, "landmarks"),
+        (Self::LandmarkWidth, "landmark-width"),
         (Self::Complete, "complete"),
     ];
 }
@@ -317,6 +329,11 @@ constants! {
     /// How many worths of states the search for new states tells apart. Not measured; chosen for
     /// memory.
     most_worths: usize = 4_096;
+
+    /// How much work goes into finding mutex groups: so many parts of operators.
+    most_mutex_work: u64 = 20_000_000;
+    /// How much work goes into finding landmarks: so many entries of sets of them, a second or two.
+    most_landmark_work: u64 = 200_000_000;
 
     /// What a step of mean cost counts for, besides the one that every step counts for ("plus one";
     /// Richter & Westphal, JAIR 2010). Not measured; small, as each cost is a bucket of the queue.

@@ -1,0 +1,87 @@
+//! The landmarks of a search that counts them, and what a state lacks.
+
+use super::super::landmarks::Landmarks;
+use super::super::mutex::Mutexes;
+use super::super::relaxed::Labels;
+use super::super::state::State;
+use super::super::tuning::Technique;
+use super::novelty::goals_left;
+use super::{ROOT, Search, Turn};
+
+/// The work of one turn of finding landmarks, for each unit of what an estimate may take.
+const WORK_OF_TURN: u64 = 4;
+
+/// What a search knows of the landmarks.
+#[derive(Debug)]
+pub(super) enum SearchLandmarks {
+    Unknown,
+    /// They are being found. So much has been done.
+    InTheMaking(Box<Labels>, u64),
+    Known(Landmarks),
+}
+
+impl Search<'_> {
+    /// Finds the landmarks from the first state on, if they count, a part of them in each turn. `None` if
+    /// nothing of that is left to do.
+    pub(super) fn find_landmarks(&mut self, initial: &State) -> Option<Turn> {
+        if !self.strategy.counts_landmarks {
+            return None;
+        }
+        let found = match std::mem::replace(&mut self.landmarks, SearchLandmarks::Unknown) {
+            SearchLandmarks::Unknown => {
+                let labels = self.relaxed.labels(initial);
+                labels.map(|labels| SearchLandmarks::InTheMaking(Box::new(labels), 0))
+            }
+            SearchLandmarks::InTheMaking(mut labels, before) => {
+                let most = WORK_OF_TURN * (1 + self.weight());
+                let (work, is_all) = self.relaxed.propagate(&mut labels, most);
+                let work = before + work;
+                if is_all {
+                    let graph = self.relaxed.graph();
+                    let found = Landmarks::of(graph, &labels, &initial.open);
+                    found.map(|mut landmarks| {
+                        if self.compiled.tuning.uses(Technique::ReasonableOrders) {
+                            let most = self.compiled.tuning.most_mutex_work;
+                            let mutexes = Mutexes::of(self.compiled, initial, most);
+                            landmarks.order_reasonably(graph, &labels, &mutexes);
+                        }
+                        SearchLandmarks::Known(landmarks)
+                    })
+                } else if work > self.compiled.tuning.most_landmark_work {
+                    None
+                } else {
+                    Some(SearchLandmarks::InTheMaking(labels, work))
+                }
+            }
+            SearchLandmarks::Known(landmarks) => {
+                self.landmarks = SearchLandmarks::Known(landmarks);
+                return None;
+            }
+        };
+        self.labour += WORK_OF_TURN;
+        match found {
+            Some(found) => {
+                self.landmarks = found;
+                Some(Turn::Nothing)
+            }
+            None => {
+                // Without landmarks, this search is none.
+                self.has_lost = true;
+                Some(Turn::Over)
+            }
+        }
+    }
+
+    /// The landmarks accepted after a choice that led to the state, and how many are left; where novelty
+    /// counts without landmarks, how much of the goal is left.
+    pub(super) fn left(&self, parent: u32, state: &State) -> (Vec<u64>, u32) {
+        if let SearchLandmarks::Known(landmarks) = &self.landmarks {
+            let before = (parent != ROOT).then(|| &self.nodes[parent as usize].accepted[..]);
+            return landmarks.progress(self.compiled, before, state);
+        }
+        match self.strategy.novelty {
+            Some(_) => (Vec::new(), goals_left(self.compiled, state)),
+            None => (Vec::new(), 0),
+        }
+    }
+}
