@@ -90,6 +90,8 @@ struct Finder {
     operators: Vec<Operator>,
     /// The operators that make each atom true.
     adding: Vec<Vec<u32>>,
+    /// The operators that use each atom up.
+    using: Vec<Vec<u32>>,
     /// How many times each atom is true in the beginning.
     weight: Vec<u32>,
     is_member: Vec<bool>,
@@ -139,15 +141,19 @@ impl Finder {
             adds: vec![fact],
             ..Operator::default()
         }));
-        let mut adding = vec![Vec::new(); atoms];
+        let (mut adding, mut using) = (vec![Vec::new(); atoms], vec![Vec::new(); atoms]);
         for (number, operator) in (0..).zip(&operators) {
             for &atom in &operator.adds {
                 adding[atom as usize].push(number);
+            }
+            for &atom in &operator.uses_up {
+                using[atom as usize].push(number);
             }
         }
         Self {
             operators,
             adding,
+            using,
             weight,
             is_member: vec![false; atoms],
             work: 0,
@@ -158,9 +164,11 @@ impl Finder {
     fn group_with(&mut self, seed: u32) -> Option<Vec<u32>> {
         let mut choices = Choices::new();
         for _ in 0..MOST_TRIES {
-            let mut members = vec![seed];
-            self.is_member[seed as usize] = true;
-            let is_balanced = self.grow(&mut members, &mut choices);
+            let mut members = Vec::new();
+            let is_balanced = self.grow(&mut members, seed, &mut choices);
+            if is_balanced {
+                self.extend(&mut members, &mut choices);
+            }
             for &member in &members {
                 self.is_member[member as usize] = false;
             }
@@ -180,11 +188,47 @@ impl Finder {
         None
     }
 
-    /// Adds members until every operator is balanced. Whether that succeeds.
-    fn grow(&mut self, members: &mut Vec<u32>, choices: &mut Choices) -> bool {
-        let mut weight = self.weight[members[0] as usize];
-        let mut chosen: Map<u32, usize> = choices.iter().map(|&(k, place, _)| (k, place)).collect();
+    /// Adds what operators make true that use up a member and give none back, where that can be balanced.
+    fn extend(&mut self, members: &mut Vec<u32>, choices: &mut Choices) {
         let mut next = 0;
+        while let Some(&atom) = members.get(next) {
+            next += 1;
+            for position in 0..self.using[atom as usize].len() {
+                let operator = self.using[atom as usize][position] as usize;
+                let is_member = |atom: &u32| self.is_member[*atom as usize];
+                if self.operators[operator].adds.iter().any(is_member) {
+                    continue;
+                }
+                for candidate in self.operators[operator].adds.clone() {
+                    let before = (members.len(), choices.len());
+                    if self.grow(members, candidate, choices) {
+                        break;
+                    }
+                    self.cut(members, before.0);
+                    choices.truncate(before.1);
+                }
+            }
+        }
+    }
+
+    /// Leaves only so many members.
+    fn cut(&mut self, members: &mut Vec<u32>, count: usize) {
+        for member in members.drain(count..) {
+            self.is_member[member as usize] = false;
+        }
+    }
+
+    /// Adds a member, and others until every operator is balanced. Whether that succeeds.
+    fn grow(&mut self, members: &mut Vec<u32>, seed: u32, choices: &mut Choices) -> bool {
+        let mut next = members.len();
+        members.push(seed);
+        self.is_member[seed as usize] = true;
+        let weights = members.iter().map(|&member| self.weight[member as usize]);
+        let mut weight: u32 = weights.sum();
+        if weight > 1 {
+            return false;
+        }
+        let mut chosen: Map<u32, usize> = choices.iter().map(|&(k, place, _)| (k, place)).collect();
         while let Some(&atom) = members.get(next) {
             next += 1;
             for position in 0..self.adding[atom as usize].len() {
