@@ -330,10 +330,11 @@ constants! {
     /// memory.
     most_worths: usize = 4_096;
 
-    /// How much work goes into finding mutex groups: so many parts of operators.
+    /// How much work goes into finding mutex groups: so many parts of operators, about 50 ms. Not measured.
     most_mutex_work: u64 = 20_000_000;
-    /// How much work goes into finding landmarks: so many entries of sets of them, a second or two.
-    most_landmark_work: u64 = 200_000_000;
+    /// How much work goes into finding landmarks: so many entries of sets of them, about half a second. Not
+    /// measured; a search that finds none until then does without its turns.
+    most_landmark_work: u64 = 100_000_000;
 
     /// What a step of mean cost counts for, besides the one that every step counts for ("plus one";
     /// Richter & Westphal, JAIR 2010). Not measured; small, as each cost is a bucket of the queue.

@@ -59,17 +59,13 @@ impl Search<'_> {
             }
         };
         self.labour += WORK_OF_TURN;
-        match found {
-            Some(found) => {
-                self.landmarks = found;
-                Some(Turn::Nothing)
-            }
-            None => {
-                // Without landmarks, this search is none.
-                self.has_lost = true;
-                Some(Turn::Over)
-            }
-        }
+        let Some(found) = found else {
+            // Without landmarks, this search is none.
+            self.has_lost = true;
+            return Some(Turn::Over);
+        };
+        self.landmarks = found;
+        Some(Turn::Nothing)
     }
 
     /// The landmarks accepted after a choice that led to the state, and how many are left; where novelty

@@ -14,9 +14,10 @@ impl Search<'_> {
             self.expand_by_width(number, estimate);
             return;
         }
-        let left = match self.strategy.counts_landmarks {
-            true => self.nodes[number as usize].left,
-            false => 0,
+        let left = if self.strategy.counts_landmarks {
+            self.nodes[number as usize].left
+        } else {
+            0
         };
         if (left, estimate.steps) < self.best {
             self.best = (left, estimate.steps);
