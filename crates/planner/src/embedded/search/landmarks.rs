@@ -4,7 +4,6 @@ use super::super::landmarks::Landmarks;
 use super::super::mutex::Mutexes;
 use super::super::relaxed::Labels;
 use super::super::state::State;
-use super::super::tuning::Technique;
 use super::novelty::goals_left;
 use super::{ROOT, Search, Turn};
 
@@ -40,7 +39,7 @@ impl Search<'_> {
                     let graph = self.relaxed.graph();
                     let found = Landmarks::of(graph, &labels, &initial.open);
                     found.map(|mut landmarks| {
-                        if self.compiled.tuning.uses(Technique::ReasonableOrders) {
+                        if self.compiled.tuning.reasonable_orders > 0 {
                             let most = self.compiled.tuning.most_mutex_work;
                             let mutexes = Mutexes::of(self.compiled, initial, most);
                             landmarks.order_reasonably(graph, &labels, &mutexes);
