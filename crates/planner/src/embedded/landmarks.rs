@@ -40,6 +40,8 @@ pub(crate) struct Landmark {
 pub(crate) struct Landmarks {
     pub(crate) list: Vec<Landmark>,
     first_test: u32,
+    /// How many of them are no goals, and did not hold in the beginning.
+    pub(crate) on_the_way: usize,
 }
 
 impl Landmarks {
@@ -92,7 +94,13 @@ impl Landmarks {
             }
         }
         let first_test = graph.test(0);
-        Some(Self { list, first_test })
+        let is_goal = |proposition: &&u32| graph.goal.contains(proposition);
+        let on_the_way = to_reach.len() - to_reach.iter().filter(is_goal).count();
+        Some(Self {
+            list,
+            first_test,
+            on_the_way,
+        })
     }
 
     /// What is accepted after a choice that led to the state, where before that those were; nothing before

@@ -38,6 +38,9 @@ impl Search<'_> {
                 if is_all {
                     let graph = self.relaxed.graph();
                     let found = Landmarks::of(graph, &labels, &initial.open);
+                    // Without any on the way to the goal, they count no more than parts of the goal.
+                    let is_only = self.compiled.tuning.only.is_some();
+                    let found = found.filter(|found| found.on_the_way > 0 || is_only);
                     found.map(|mut landmarks| {
                         if self.compiled.tuning.reasonable_orders > 0 {
                             let most = self.compiled.tuning.most_mutex_work;
