@@ -27,6 +27,8 @@ mod expressions;
 mod extract;
 mod formula;
 mod hash;
+mod landmarks;
+mod mutex;
 mod needless;
 mod network;
 mod pairs;

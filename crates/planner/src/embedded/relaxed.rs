@@ -11,6 +11,7 @@
 mod consumables;
 mod deadlines;
 mod graph;
+mod labels;
 mod numbers;
 mod plan;
 mod resources;
@@ -31,6 +32,8 @@ pub(crate) use consumables::{Consumable, consumables};
 use deadlines::Deadlines;
 pub(crate) use deadlines::in_windows;
 pub(crate) use graph::Graph;
+pub(crate) use labels::Labels;
+pub(crate) use plan::OVERDRAWN;
 use resources::Resources;
 pub(crate) use resources::floors;
 

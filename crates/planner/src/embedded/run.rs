@@ -404,8 +404,15 @@ impl<'a> Planner<'a> {
             }
             strategies.push(strategy);
         }
+        let counts_landmarks =
+            tuning.uses(Technique::Landmarks) && !self.frame.compiled.is_symbolic;
+        let needs_concurrency = self.needs_concurrency();
         let mut add = |member| strategies.push(Strategy::of(member, tuning));
-        if self.needs_concurrency() {
+        if needs_concurrency {
+            // States take longest in the order of time.
+            if counts_landmarks {
+                add(Member::Landmarks);
+            }
             add(Member::Chronological);
             if tuning.uses(Technique::Consumables)
                 && !relaxed::consumables(self.frame.compiled).is_empty()
@@ -416,6 +423,9 @@ impl<'a> Planner<'a> {
         if !self.frame.compiled.is_symbolic {
             if tuning.uses(Technique::Width) {
                 add(Member::Width);
+            }
+            if counts_landmarks && !needs_concurrency {
+                add(Member::Landmarks);
             }
             if tuning.uses(Technique::Novelty) {
                 add(Member::Novelty);

@@ -10,6 +10,7 @@
 mod dead_ends;
 mod goals;
 mod known;
+mod landmarks;
 mod novelty;
 mod queue;
 mod strategy;
@@ -31,6 +32,7 @@ use super::time::{NEVER, Ticks};
 use super::tuning::Technique;
 use dead_ends::DeadEnds;
 pub(crate) use goals::is_goal;
+use landmarks::SearchLandmarks;
 use novelty::{Novelty, Progress};
 use queue::Queue;
 use strategy::NoveltyOf;
@@ -54,11 +56,14 @@ pub(crate) struct Search<'a> {
     /// All successors, first come first served, in a search that has to come by everywhere.
     oldest: VecDeque<(u32, Step)>,
     turns: [i64; 2],
-    best_steps: u32,
+    /// The best estimate, and the number of landmarks left where they count.
+    best: (u32, u32),
     /// The estimate of the first state.
     first_estimate: u32,
     /// The propositions seen before, if novelty decides.
     novelty: Option<Novelty>,
+    /// What is known of the landmarks, if they count.
+    landmarks: SearchLandmarks,
     /// The consumable fluents, if they are to be spared.
     consumables: Vec<Consumable>,
     /// Whether times are irrelevant but for their distances.
@@ -95,6 +100,10 @@ struct Node {
     dead_end: DeadEnd,
     /// How far the way to it has come, in a search for new states.
     progress: Option<Box<Progress>>,
+    /// The landmarks accepted on the way to it, where they count.
+    accepted: Vec<u64>,
+    /// How much of the goal is left, or how many landmarks, where that matters.
+    left: u32,
 }
 
 /// The stronger bound's verdict on a state.
@@ -160,9 +169,10 @@ impl<'a> Search<'a> {
             preferred: Queue::default(),
             oldest: VecDeque::new(),
             turns: [0, 0],
-            best_steps: u32::MAX,
+            best: (u32::MAX, u32::MAX),
             first_estimate: 0,
             novelty: strategy.novelty.map(|_| Novelty::new(compiled)),
+            landmarks: SearchLandmarks::Unknown,
             consumables: if strategy.saves_consumables {
                 consumables(compiled)
             } else {
@@ -266,8 +276,12 @@ impl<'a> Search<'a> {
     pub(crate) fn turn(&mut self) -> Turn {
         self.price = 1;
         self.labour += 1;
-        if !std::mem::replace(&mut self.has_begun, true) {
+        if !self.has_begun {
             let initial = root(self.compiled);
+            if let Some(turn) = self.find_landmarks(&initial) {
+                return turn;
+            }
+            self.has_begun = true;
             if initial.earliest_end() > self.horizon {
                 return Turn::Over;
             }
@@ -339,7 +353,8 @@ impl<'a> Search<'a> {
             return Turn::Nothing;
         }
         self.evaluated += 1;
-        let estimate = if self.needs_estimate(parent, &state) {
+        let (accepted, left) = self.left(parent, &state);
+        let estimate = if self.needs_estimate(parent, left) {
             self.relaxed.evaluate(&state)
         } else {
             self.relaxed.list(&state)
@@ -362,6 +377,7 @@ impl<'a> Search<'a> {
             .as_ref()
             .map_or(0, |projection| projection.size());
         self.memory += state.size() + projection_size + size_of::<Node>() + 64;
+        self.memory += 8 * accepted.len();
         let is_goal = is_goal(self.compiled, &state);
         self.nodes.push(Node {
             parent,
@@ -370,6 +386,8 @@ impl<'a> Search<'a> {
             projection,
             dead_end: DeadEnd::Unchecked,
             progress: None,
+            accepted,
+            left,
         });
         // A state in which the goal holds may still have successors worth looking at: the judge can
         // refuse the plan, and another one can be better.

@@ -159,6 +159,11 @@ impl Graph {
         self.first_test + test
     }
 
+    /// Whether it is a literal or a test.
+    pub(crate) fn is_listed(&self, proposition: u32) -> bool {
+        proposition < self.first_running
+    }
+
     /// The test that the proposition is passed for, if it is one.
     pub(crate) fn test_of(&self, proposition: u32) -> Option<u32> {
         let is_test = (self.first_test..self.first_running).contains(&proposition);

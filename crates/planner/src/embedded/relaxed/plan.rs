@@ -8,7 +8,7 @@ use super::graph::Kind;
 use super::{Estimate, Relaxed};
 
 /// The additional cost of a relaxed plan that uses more than there is.
-const OVERDRAWN: u32 = 1 << 20;
+pub(crate) const OVERDRAWN: u32 = 1 << 20;
 
 impl Relaxed<'_> {
     /// Counts the steps of a relaxed plan, and notes its first steps.

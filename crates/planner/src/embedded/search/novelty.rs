@@ -36,9 +36,9 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Whether a successor has one more goal.
-    pub(super) fn has_new_goal(&self, compiled: &Compiled, next: &State) -> bool {
-        goals_left(compiled, next) < self.goals_left
+    /// Whether a successor that lacks so many goals has one more.
+    pub(super) fn has_new_goal(&self, left: u32) -> bool {
+        left < self.goals_left
     }
 
     /// An estimate of the memory it takes, in bytes.
@@ -60,12 +60,11 @@ impl Novelty {
     /// How far the way to a state has come, whose relaxed plan brings these literals about.
     pub(super) fn progress(
         &mut self,
-        compiled: &Compiled,
         state: &State,
+        goals_left: u32,
         before: Option<&Progress>,
         subgoals: &[Literal],
     ) -> Progress {
-        let goals_left = goals_left(compiled, state);
         if let Some(before) = before.filter(|before| goals_left >= before.goals_left) {
             let mut progress = before.clone();
             progress.goals_left = goals_left;
@@ -90,13 +89,7 @@ impl Novelty {
 
     /// The worth of a successor: how many goals it lacks, and how much of the relaxed plan has been
     /// reached.
-    pub(super) fn worth(
-        &self,
-        compiled: &Compiled,
-        state: &State,
-        before: &Progress,
-    ) -> (u32, u32) {
-        let left = goals_left(compiled, state);
+    pub(super) fn worth(&self, state: &State, left: u32, before: &Progress) -> (u32, u32) {
         if left < before.goals_left {
             return (left, 0);
         }

@@ -21,6 +21,8 @@ pub(crate) struct Strategy {
     /// Whether what is new comes first, and then what has more of the goal; and whether successors
     /// are looked at one by one for that, or the states that are expanded.
     pub(crate) novelty: Option<NoveltyOf>,
+    /// Whether the landmarks left come before the estimate, or count as what is left of the goal.
+    pub(crate) counts_landmarks: bool,
     /// Whether relaxed plans draw on what is never filled up.
     pub(crate) draws_on_consumables: bool,
     /// Whether what is used up and never filled up is spared.
@@ -65,6 +67,7 @@ impl Strategy {
         draws_on_consumables: false,
         saves_consumables: false,
         novelty: None,
+        counts_landmarks: false,
         replenishes: false,
         aim: Aim::Goal,
     };
@@ -96,6 +99,14 @@ impl Strategy {
                 novelty: Some(NoveltyOf::Successors),
                 draws_on_consumables: false,
                 ..Self::of(Member::Compressing, tuning)
+            },
+            Member::Landmarks => Self {
+                counts_landmarks: true,
+                ..Self::of(Member::Compressing, tuning)
+            },
+            Member::LandmarkWidth => Self {
+                counts_landmarks: true,
+                ..Self::of(Member::Width, tuning)
             },
             Member::Complete => Self::COMPLETE,
         }

@@ -2,10 +2,9 @@
 
 use super::super::apply::Step;
 use super::super::compile::NONE;
-use super::super::relaxed::Estimate;
+use super::super::relaxed::{Estimate, OVERDRAWN};
 use super::super::state::State;
-use super::novelty::goals_left;
-use super::{Aim, NoveltyOf, Search};
+use super::{Aim, Node, NoveltyOf, Search};
 
 impl Search<'_> {
     /// Lets the successors wait for their turn.
@@ -15,8 +14,13 @@ impl Search<'_> {
             self.expand_by_width(number, estimate);
             return;
         }
-        if estimate.steps < self.best_steps {
-            self.best_steps = estimate.steps;
+        let left = if self.strategy.counts_landmarks {
+            self.nodes[number as usize].left
+        } else {
+            0
+        };
+        if (left, estimate.steps) < self.best {
+            self.best = (left, estimate.steps);
             self.idle = 0;
             self.turns[0] -= self.compiled.tuning.boost;
         }
@@ -48,13 +52,14 @@ impl Search<'_> {
         let node = &self.nodes[number as usize];
         let before = self.nodes.get(node.parent as usize);
         let before = before.and_then(|parent| parent.progress.as_deref());
-        let progress = novelty.progress(self.compiled, &node.state, before, &estimate.subgoals);
+        let progress = novelty.progress(&node.state, node.left, before, &estimate.subgoals);
         self.memory += progress.size();
         for &step in &estimate.applicable {
             let Some((_, next)) = self.make(number, step) else {
                 continue;
             };
-            let worth = novelty.worth(self.compiled, &next, &progress);
+            let (_, left) = self.left(number, &next);
+            let worth = novelty.worth(&next, left, &progress);
             let (new, memory) = novelty.of(self.compiled, &next, worth);
             self.memory += memory;
             let rank = new << 48 | i64::from(worth.0) << 24;
@@ -70,13 +75,13 @@ impl Search<'_> {
 
     /// Whether a state needs an estimate: where the novelty of successors counts, only if one more
     /// goal has been reached, or in the beginning.
-    pub(super) fn needs_estimate(&self, parent: u32, state: &State) -> bool {
+    pub(super) fn needs_estimate(&self, parent: u32, left: u32) -> bool {
         if self.strategy.novelty != Some(NoveltyOf::Successors) {
             return true;
         }
         let parent = self.nodes.get(parent as usize);
         let progress = parent.and_then(|parent| parent.progress.as_deref());
-        progress.is_none_or(|before| before.has_new_goal(self.compiled, state))
+        progress.is_none_or(|before| before.has_new_goal(left))
     }
 
     /// What a state has used up of what is not filled up, all of it counting as much as the way to
@@ -99,11 +104,16 @@ impl Search<'_> {
     /// The rank of a state in the queue of its search; lower ranks come first.
     fn rank(&mut self, number: u32, estimate: u32) -> i64 {
         if let Some(novelty) = &mut self.novelty {
-            let state = &self.nodes[number as usize].state;
-            let left = goals_left(self.compiled, state);
+            let Node { state, left, .. } = &self.nodes[number as usize];
+            let left = *left;
             let (new, memory) = novelty.of(self.compiled, state, (left, estimate));
             self.memory += memory;
             return new << 48 | i64::from(left) << 24 | i64::from(estimate.min(1 << 23));
+        }
+        if self.strategy.counts_landmarks {
+            let left = self.nodes[number as usize].left;
+            let (overdrawn, estimate) = (estimate / OVERDRAWN, estimate % OVERDRAWN);
+            return i64::from(overdrawn) << 48 | i64::from(left) << 24 | i64::from(estimate);
         }
         let estimate = i64::from(estimate) + self.penalty(number);
         let (Aim::WeightedAStar(factor), Some(step_costs)) = (self.strategy.aim, &self.step_costs)

@@ -1,0 +1,279 @@
+//! Landmarks beside their definition: without what makes them true, even the delete relaxation does not
+//! reach the goal.
+
+use elbowroom_model::reachability::{self, Answer};
+use elbowroom_model::{Situation, Task};
+use elbowroom_pddl::{Source, read_problem};
+use proptest::prelude::*;
+
+use super::Landmarks;
+use crate::embedded::apply::{Step, Stepper};
+use crate::embedded::compile::{Compiled, Compressibility, Wanted, compile};
+use crate::embedded::formula::{Literal, is_set};
+use crate::embedded::mutex::Mutexes;
+use crate::embedded::pairs::tests::{Draft, drafts, numeric_drafts};
+use crate::embedded::relaxed::{Graph, Labels, Relaxed};
+use crate::embedded::root::root;
+use crate::embedded::search::is_goal;
+use crate::embedded::state::State;
+
+fn compiled(task: &Task, look: impl FnOnce(&Compiled)) {
+    let situation = Situation::initial(task);
+    let limits = reachability::Settings::default();
+    let Answer::Complete(grounding) = reachability::ground(task, &limits) else {
+        panic!("a small task");
+    };
+    let tuning = crate::embedded::Tuning::default();
+    let wanted = Wanted {
+        situation: &situation,
+        metric: false,
+        tuning: &tuning,
+    };
+    look(&compile(task, &grounding, wanted, &mut || true).expect("plain"));
+}
+
+fn labels(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Labels> {
+    let mut labels = relaxed.labels(state)?;
+    // In small steps, as a search does it.
+    while !relaxed.propagate(&mut labels, 1).1 {}
+    Some(labels)
+}
+
+/// What is reached if one proposition never is, by going over all operators until nothing changes; and
+/// which operators can come then.
+fn reached_without(graph: &Graph, labels: &Labels, without: Option<u32>) -> (Vec<bool>, Vec<bool>) {
+    let achievements = achievements(graph, labels);
+    let mut reached: Vec<bool> = (0..)
+        .take(graph.proposition_count)
+        .map(|proposition| labels.held(proposition) && Some(proposition) != without)
+        .collect();
+    let mut comes = vec![false; graph.operators.len()];
+    loop {
+        let mut changed = false;
+        for &(operator, proposition) in &achievements {
+            let needs = graph.operators[operator as usize].preconditions.clone();
+            let mut needs = graph.preconditions[needs].iter();
+            if needs.all(|&need| reached[need as usize]) {
+                comes[operator as usize] = true;
+                if Some(proposition) != without && !reached[proposition as usize] {
+                    reached[proposition as usize] = true;
+                    changed = true;
+                }
+            }
+        }
+        if !changed {
+            return (reached, comes);
+        }
+    }
+}
+
+fn achievements(graph: &Graph, labels: &Labels) -> Vec<(u32, u32)> {
+    let mut achievements = Vec::new();
+    labels.visit_achievers(graph, &mut |operator, proposition| {
+        achievements.push((operator, proposition));
+    });
+    achievements
+}
+
+/// Each label has what its proposition is not reached without, and nothing else.
+fn check_labels(graph: &Graph, labels: &Labels) {
+    let (reached, _) = reached_without(graph, labels, None);
+    for (proposition, &is_reached) in (0..).zip(&reached) {
+        assert_eq!(
+            labels.of(proposition).is_some(),
+            is_reached,
+            "{proposition}"
+        );
+    }
+    let listed = (0..).take_while(|&proposition| graph.is_listed(proposition));
+    for landmark in listed.filter(|&listed| !labels.held(listed)) {
+        let (reached, _) = reached_without(graph, labels, Some(landmark));
+        for (proposition, &is_reached) in (0..).zip(&reached) {
+            let Some(label) = labels.of(proposition) else {
+                continue;
+            };
+            assert_eq!(
+                label.contains(&landmark),
+                !is_reached,
+                "{landmark} for {proposition}"
+            );
+        }
+    }
+}
+
+/// Who needs a landmark just before it becomes true: all that can make it true for the first time.
+fn check_needs(graph: &Graph, labels: &Labels, landmarks: &Landmarks) {
+    let achievements = achievements(graph, labels);
+    for (number, landmark) in (0..).zip(&landmarks.list) {
+        let (_, comes) = reached_without(graph, labels, Some(landmark.proposition));
+        let first = achievements.iter().filter(|&&(operator, proposition)| {
+            proposition == landmark.proposition && comes[operator as usize]
+        });
+        let needs: Vec<&[u32]> = first
+            .map(|&(operator, _)| {
+                let needs = graph.operators[operator as usize].preconditions.clone();
+                &graph.preconditions[needs]
+            })
+            .collect();
+        for other in &landmarks.list {
+            let is_needed = !labels.held(landmark.proposition)
+                && needs.iter().all(|needs| needs.contains(&other.proposition));
+            assert_eq!(
+                other.needed_by.contains(&number),
+                is_needed,
+                "{other:?} {landmark:?}"
+            );
+        }
+    }
+}
+
+/// No order is lost by others that come in, none is a circle, and each is followed to the end.
+fn check_orders(before: &Landmarks, landmarks: &Landmarks) {
+    let orders = |landmarks: &Landmarks| {
+        let name = |number: u32| landmarks.list[number as usize].proposition;
+        let count = u32::try_from(landmarks.list.len()).expect("few");
+        let mut orders = Vec::new();
+        for later in 0..count {
+            let after = &landmarks.list[later as usize].after;
+            for earlier in (0..count).filter(|&earlier| is_set(after, earlier)) {
+                assert!(earlier < later, "{landmarks:?}");
+                orders.push((name(earlier), name(later)));
+            }
+        }
+        orders
+    };
+    let own = orders(landmarks);
+    assert!(orders(before).iter().all(|order| own.contains(order)));
+    for &(first, middle) in &own {
+        let mut others = own.iter().filter(|order| order.0 == middle);
+        assert!(others.all(|&(_, last)| own.contains(&(first, last))));
+    }
+}
+
+/// Follows all choices, so many at most: where a plan ends, nothing is left.
+fn check_progress(
+    compiled: &Compiled,
+    landmarks: &Landmarks,
+    (state, before): (&State, Option<&[u64]>),
+    left: usize,
+    budget: &mut u32,
+) {
+    let (accepted, lacking) = landmarks.progress(compiled, before, state);
+    if state.timed >= compiled.timed_until_goal && is_goal(compiled, state) {
+        assert_eq!(lacking, 0, "{landmarks:?} {state:?}");
+    }
+    *budget = budget.saturating_sub(1);
+    if left == 0 || *budget == 0 {
+        return;
+    }
+    let starts = (0..u32::try_from(compiled.actions.len()).expect("few")).map(Step::Start);
+    let ends = (0..u32::try_from(state.open.len()).expect("few")).map(Step::End);
+    for step in starts.chain(ends).chain([Step::Timed]) {
+        if let Some(next) = Stepper::new(compiled).apply(state, step) {
+            check_progress(
+                compiled,
+                landmarks,
+                (&next, Some(&accepted)),
+                left - 1,
+                budget,
+            );
+        }
+    }
+}
+
+fn check(draft: &Draft) {
+    compiled(&draft.task(), |compiled| {
+        let root = root(compiled);
+        for compresses in [Some(Compressibility::HoldsResource), None] {
+            let mut relaxed = Relaxed::new(compiled, compresses);
+            let Some(labels) = labels(&mut relaxed, &root) else {
+                continue;
+            };
+            let graph = relaxed.graph();
+            check_labels(graph, &labels);
+            let Some(landmarks) = Landmarks::of(graph, &labels, &root.open) else {
+                continue;
+            };
+            check_needs(graph, &labels, &landmarks);
+            if compresses.is_none() {
+                check_progress(compiled, &landmarks, (&root, None), 6, &mut 2_000);
+            }
+            let mut ordered = landmarks.clone();
+            let mutexes = Mutexes::of(compiled, &root, u64::MAX);
+            ordered.order_reasonably(graph, &labels, &mutexes);
+            check_orders(&landmarks, &ordered);
+        }
+    });
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 128, ..ProptestConfig::default() })]
+
+    #[test]
+    fn landmarks_are_what_nothing_reaches_the_goal_without(draft in drafts()) {
+        check(&draft);
+    }
+
+    #[test]
+    fn so_are_tests_of_numbers(draft in numeric_drafts()) {
+        check(&draft);
+    }
+}
+
+const BLOCKS: &str = "(define (domain blocks) (:requirements :typing :durative-actions)
+    (:types block)
+    (:predicates (on ?x ?y - block) (clear ?x - block) (table ?x - block) (held ?x - block) (free))
+    (:durative-action take :parameters (?x - block) :duration (= ?duration 1)
+      :condition (and (at start (clear ?x)) (at start (table ?x)) (at start (free)))
+      :effect (and (at start (not (clear ?x))) (at start (not (table ?x))) (at start (not (free)))
+                   (at end (held ?x))))
+    (:durative-action stack :parameters (?x ?y - block) :duration (= ?duration 1)
+      :condition (and (at start (held ?x)) (at start (clear ?y)))
+      :effect (and (at start (not (held ?x))) (at start (not (clear ?y)))
+                   (at end (clear ?x)) (at end (free)) (at end (on ?x ?y)))))";
+
+/// A block is taken only when it is clear, so what stands on it would have to be taken off again.
+#[test]
+fn a_tower_is_built_from_below() {
+    let problem = "(define (problem p) (:domain blocks) (:objects a b c - block)
+        (:init (clear a) (clear b) (clear c) (table a) (table b) (table c) (free))
+        (:goal (and (on a b) (on b c))))";
+    let sources = [("domain", BLOCKS), ("problem", problem)]
+        .map(|(name, text)| Source::new(name, text.to_owned()));
+    let Ok((problem, _)) = read_problem(&sources[0], &sources[1]) else {
+        panic!("a problem that can be read");
+    };
+    let task = Task::new(problem);
+    compiled(&task, |compiled| {
+        let name = |literal: Literal| task.fact_name(compiled.facts[literal.fact() as usize]);
+        let root = root(compiled);
+        let mutexes = Mutexes::of(compiled, &root, u64::MAX);
+        let facts = |group: &Vec<u32>| {
+            let facts = group
+                .iter()
+                .filter_map(|&atom| compiled.facts.get(atom as usize));
+            let mut facts: Vec<String> = facts.map(|&fact| task.fact_name(fact)).collect();
+            facts.sort();
+            facts
+        };
+        let groups: Vec<Vec<String>> = mutexes.groups.iter().map(facts).collect();
+        let around_b = ["(clear b)", "(held b)", "(on a b)"];
+        assert!(groups.iter().any(|group| *group == around_b), "{groups:?}");
+        let mut relaxed = Relaxed::new(compiled, Some(Compressibility::HoldsResource));
+        let labels = labels(&mut relaxed, &root).expect("in time");
+        let graph = relaxed.graph();
+        let mut landmarks = Landmarks::of(graph, &labels, &root.open).expect("reachable");
+        let position = |landmarks: &Landmarks, wanted: &str| {
+            let mut all = landmarks.list.iter();
+            all.position(|landmark| name(Literal(landmark.proposition)) == wanted)
+        };
+        landmarks.order_reasonably(graph, &labels, &mutexes);
+        let low = position(&landmarks, "(on b c)").expect("a goal");
+        let high = position(&landmarks, "(on a b)").expect("a goal");
+        let after = &landmarks.list[high].after;
+        assert!(
+            is_set(after, u32::try_from(low).expect("few")),
+            "{landmarks:?}"
+        );
+    });
+}
