@@ -272,14 +272,15 @@ constants! {
     /// of a thousand new orders of the same actions, about one makes a plan better.
     repair_share: u64 = 16;
     /// How much work goes into repairs and other orders for each unit of work on better orders by
-    /// constraints.
+    /// constraints. Not measured by itself.
     scheduling_share: u64 = 8;
-    /// How much work that does in one turn.
+    /// How much work that does in one turn. Not measured; some 25 milliseconds.
     scheduling_work: u64 = 1_000_000;
     /// How much work it does for a new plan, and after it found something, whatever its share; twice as long as
-    /// it took to find that, if that is more.
+    /// it took to find that, if that is more. On the first job shop, 964 after 8 s with this, and 1036 after
+    /// 15 s with nothing beyond its share (which was twice as large, of a quarter of the work).
     scheduling_burst: u64 = 4_000_000;
-    /// For a new plan, that is so after so many turns without a better one.
+    /// For a new plan, that is so after so many turns without a better one. Not measured.
     scheduling_after: u64 = 16;
     /// A plan that is worse than the best one by up to one part in so many may be gone on from, now
     /// and then. With 24, makespans are a little better than with 64.

@@ -5,6 +5,9 @@ use super::super::Ticker;
 use super::clauses::{FALSE, TRUE, negated};
 use super::model::{MOST, Model, Need, snap_of};
 
+/// So many makers and breakers of one condition are too many, in pairs.
+const MOST_OF_ONE: usize = 20_000;
+
 impl Model<'_> {
     /// Finds who changes which fact.
     pub(super) fn note_changers(&mut self) {
@@ -64,8 +67,9 @@ impl Model<'_> {
         if breakers.is_empty() && holds_at_first {
             return Some(());
         }
-        self.size += 1 + makers.len() * (1 + breakers.len());
-        if self.size > MOST {
+        let size = 1 + makers.len() * (1 + breakers.len());
+        self.size += size;
+        if size > MOST_OF_ONE || self.size > MOST {
             return None;
         }
         // In the plan itself, the last one before is the supporter.

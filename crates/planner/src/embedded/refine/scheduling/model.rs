@@ -20,7 +20,7 @@ use super::times::{Edge, UNBOUNDED};
 use elbowroom_num::Rational;
 
 /// So many pairs that interfere, and literals of clauses, are too many.
-pub(super) const MOST: usize = 1_500_000;
+pub(super) const MOST: usize = 500_000;
 
 /// An instance of an action, or one time of timed initials.
 #[derive(Clone, Debug, Default)]
@@ -231,6 +231,7 @@ impl<'a> Model<'a> {
                 continue;
             };
             let snap = compiled.snap(snap);
+            let before = self.size;
             for &(annotation, distance) in &snap.after {
                 for &other in marking.get(&annotation).into_iter().flatten() {
                     self.size += 1;
@@ -242,11 +243,11 @@ impl<'a> Model<'a> {
                     note(node, other, distance);
                 }
             }
-            if self.size > MOST {
+            ticker.work += 20 + (self.size - before) as u64;
+            if self.size > MOST || !ticker.ask() {
                 return None;
             }
         }
-        ticker.work += self.size as u64;
         for ((first, second), distances) in distances {
             if self.block_of[first as usize] != self.block_of[second as usize] {
                 self.pair(first, second, distances);
