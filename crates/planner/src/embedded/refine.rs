@@ -3,6 +3,7 @@
 //!
 //! Two things are tried in turn, at random but alike in each run:
 //!
+//! - `scheduling`: the same actions in another order, by a search that ends when there is no better one.
 //! - `schedule`: the same actions in another order. The order of choices decides what waits for
 //!   what, and so when the plan ends.
 //! - `removal` and `repair`: actions are taken out, and a search among what is left of the plan puts
@@ -17,6 +18,7 @@ mod random;
 mod removal;
 mod repair;
 mod schedule;
+mod scheduling;
 mod sequence;
 
 use super::apply::{Step, Stepper};
@@ -32,6 +34,7 @@ use incumbent::{Incumbent, Worth};
 use random::Random;
 use repair::Repair;
 use schedule::Schedule;
+use scheduling::Scheduling;
 use sequence::{Item, Kind, Scene, items_of};
 
 /// Counts work, and asks now and then whether to go on.
@@ -86,6 +89,12 @@ pub(crate) struct Refiner<'a> {
     incumbent: Option<Incumbent>,
     /// The best plan's worth and items.
     best: Option<(Worth, Vec<Item>)>,
+    /// What looks for better orders of its actions, and whether that has been tried.
+    scheduling: Option<Scheduling<'a>>,
+    is_scheduled: bool,
+    /// The work on that since it began, or last found something, and how much it may come to.
+    scheduled_for: u64,
+    scheduling_patience: u64,
     /// How many turns have passed since it was found, or gone back to.
     idle: u64,
     /// How many turns have passed since it was found.
@@ -103,6 +112,7 @@ pub(crate) struct Refiner<'a> {
 /// Work, by what it was spent on.
 #[derive(Clone, Copy, Debug, Default)]
 struct Spent {
+    scheduling: u64,
     rescheduling: u64,
     repair: u64,
 }
@@ -142,6 +152,10 @@ impl<'a> Refiner<'a> {
             compresses,
             incumbent: None,
             best: None,
+            scheduling: None,
+            is_scheduled: false,
+            scheduled_for: 0,
+            scheduling_patience: 0,
             idle: 0,
             fruitless: 0,
             base_costs,
@@ -190,6 +204,7 @@ impl<'a> Refiner<'a> {
         let own = self.incumbent.as_ref();
         self.best = own.map(|own| (own.worth.clone(), own.items.clone()));
         (self.idle, self.fruitless) = (0, 0);
+        self.schedule_from_best();
     }
 
     /// How long it should take for each unit of time of another search.
@@ -222,18 +237,17 @@ impl<'a> Refiner<'a> {
         }
         let before = (best.metric.clone(), best.end);
         let done_before = ticker.work;
-        let reschedules = self.is_turn_to_reschedule();
-        let items = if reschedules {
-            self.reschedule(&bound, ticker)
+        let schedules = self.is_turn_to_schedule();
+        let (items, spent) = if schedules {
+            (self.schedule(ticker), &mut self.work.scheduling)
+        } else if self.is_turn_to_reschedule() {
+            (self.reschedule(&bound, ticker), &mut self.work.rescheduling)
         } else {
-            self.repair(&bound, ticker)
+            (self.repair(&bound, ticker), &mut self.work.repair)
         };
-        let spent = if reschedules {
-            &mut self.work.rescheduling
-        } else {
-            &mut self.work.repair
-        };
-        *spent += ticker.work - done_before;
+        let done = ticker.work - done_before;
+        *spent += done;
+        self.scheduled_for += if schedules { done } else { 0 };
         if !ticker.ask() {
             return None;
         }
@@ -345,6 +359,11 @@ impl<'a> Refiner<'a> {
             return;
         };
         let compiled = self.compiled;
+        let of_these = |scheduling: &Scheduling<'_>| scheduling.is_of(&incumbent.items);
+        if self.scheduling.as_ref().is_some_and(of_these) {
+            self.incumbent = Some(incumbent);
+            return;
+        }
         self.stepper.horizon = NEVER;
         let mut items = incumbent.items.clone();
         let mut scene = Scene::beginning(compiled);

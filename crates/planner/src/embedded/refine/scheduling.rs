@@ -1,0 +1,294 @@
+//! The same actions in another order, by a search that proves when there is no better one
+//! (constraint-based scheduling; Baptiste, Le Pape & Nuijten, 2001).
+//!
+//! - `model`: what the happenings of the plan need of each other, as clauses over orders of pairs.
+//! - `numbers`: the same for conditions on numbers, as far as it is told before the search.
+//! - `clauses` and `times`: the search, by learning clauses from conflicts with the bound on the
+//!   makespan. It begins with the order of the plan (solution-guided search; Beck, JAIR 29, 2007).
+//!
+//! An order that it finds becomes a plan through the states of the search and the judge, as others do.
+
+mod clauses;
+mod links;
+mod model;
+mod numbers;
+#[cfg(test)]
+mod tests;
+mod times;
+mod turns;
+
+use std::collections::BTreeSet;
+
+use super::super::compile::Compiled;
+use super::super::time::Ticks;
+use super::Ticker;
+use super::sequence::{Item, Kind};
+use clauses::Outcome;
+use model::Model;
+use times::Edge;
+
+/// How much work is done between two questions whether to go on.
+const SLICE: u64 = 20_000;
+/// What a unit of it counts for: a look at a clause or a pair takes longer than at an operator.
+const UNIT_WORK: u64 = 4;
+/// After so many restarts for an order so much better than the best one, less is asked for.
+const RESTARTS: u64 = 12;
+/// The least part, one of two to this power, by which an order is to be better at first.
+const MOST_EASE: u32 = 8;
+
+/// See the module.
+pub(super) struct Scheduling<'a> {
+    model: Model<'a>,
+    /// The pairs of happenings that interfere, by the literal that they keep their order, and both edges.
+    pairs: Vec<(u32, [Edge; 2])>,
+    /// Where to look first for a pair that is not decided.
+    cursor: usize,
+    /// No order is over before `least`; the best one known is over at `end`.
+    least: Ticks,
+    end: Ticks,
+    /// An order is looked for that is better by a part of what is between them: one of two to this power.
+    ease: u32,
+    /// Whether there is nothing left to find.
+    pub(super) is_over: bool,
+}
+
+impl<'a> Scheduling<'a> {
+    /// Orders of these items that are over earlier than `end`; `None` if the plan is beyond it.
+    pub(super) fn of(
+        compiled: &'a Compiled,
+        items: &[Item],
+        end: Ticks,
+        ticker: &mut Ticker<'_>,
+    ) -> Option<Self> {
+        let is_free = vec![true; items.len()];
+        let model = Model::of(compiled, items, is_free, ticker)?;
+        let mut scheduling = Self {
+            model,
+            pairs: Vec::new(),
+            cursor: 0,
+            least: 0,
+            end,
+            ease: 1,
+            is_over: false,
+        };
+        scheduling.least = scheduling.model.solver.times.earliest_end();
+        scheduling.demand(items, end);
+        Some(scheduling)
+    }
+
+    /// Whether these are the same actions.
+    pub(super) fn is_of(&self, items: &[Item]) -> bool {
+        let what = |items: &[Item]| {
+            let sorted = sorted(items).into_iter();
+            sorted.map(|item| (item.0, item.1)).collect::<Vec<_>>()
+        };
+        what(&self.model.items) == what(items)
+    }
+
+    /// From now on only orders count that are over earlier than this one, which is over at `end`.
+    pub(super) fn demand(&mut self, items: &[Item], end: Ticks) {
+        self.end = self.end.min(end);
+        let model = &mut self.model;
+        model.solver.hurry(self.end - 1);
+        let mut rank = vec![0; items.len()];
+        for (own, place) in sorted(&model.items).into_iter().zip(sorted(items)) {
+            rank[own.2] = place.2;
+        }
+        for (&(first, second), &literal) in &model.pairs {
+            let is_kept = rank[first as usize] < rank[second as usize];
+            model.solver.prefer(literal ^ u32::from(!is_kept));
+        }
+        self.aim();
+    }
+
+    /// Asks for an order that is a good deal better, or a little.
+    fn aim(&mut self) {
+        let gap = self.end - self.least;
+        if gap <= 0 {
+            self.is_over = true;
+            return;
+        }
+        let step = if self.ease > MOST_EASE {
+            1
+        } else {
+            gap >> self.ease
+        };
+        self.model.solver.aim(self.end - step.max(1));
+    }
+
+    /// Goes on for so much work, or until there is a better order.
+    pub(super) fn next(&mut self, most: u64, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
+        let last = ticker.work.saturating_add(most);
+        while ticker.work < last && ticker.ask() {
+            let before = self.model.solver.spent();
+            let restarts = if self.ease > MOST_EASE {
+                u64::MAX
+            } else {
+                RESTARTS
+            };
+            let outcome = self.model.solver.run(SLICE, restarts);
+            let mut order = None;
+            match outcome {
+                Outcome::WorkDone => {}
+                Outcome::TooHard => {
+                    self.ease += 1;
+                    self.aim();
+                }
+                Outcome::TooEarly => {
+                    self.least = self
+                        .model
+                        .solver
+                        .target()
+                        .map_or(self.end, |latest| latest + 1);
+                    self.aim();
+                }
+                Outcome::Contradiction => self.is_over = true,
+                Outcome::Consistent => order = self.conclude(),
+            }
+            ticker.work += UNIT_WORK * (1 + self.model.solver.spent() - before);
+            if self.is_over || order.is_some() {
+                let items = &self.model.items;
+                return order.map(|order| order.iter().map(|&node| items[node]).collect());
+            }
+        }
+        None
+    }
+
+    /// Decides on a pair that is not kept apart by other things, or learns what is wrong with the
+    /// order; or that is the order.
+    fn conclude(&mut self) -> Option<Vec<usize>> {
+        if let Some(literal) = self.too_close() {
+            self.model.solver.decide(literal);
+            return None;
+        }
+        let order = match self.sequence() {
+            Ok(order) => order,
+            Err(circle) => {
+                self.model.solver.add(&circle);
+                return None;
+            }
+        };
+        let mut rank = vec![0; order.len()];
+        for (place, &node) in order.iter().enumerate() {
+            rank[node] = place;
+        }
+        let broken = self.model.broken(&rank);
+        if broken.is_empty() {
+            return Some(order);
+        }
+        for clause in broken {
+            self.model.solver.add(&clause);
+        }
+        None
+    }
+
+    /// Two happenings that are too close to each other and not ordered: the order they have in time.
+    fn too_close(&mut self) -> Option<u32> {
+        let Self { model, pairs, .. } = self;
+        let solver = &mut model.solver;
+        if pairs.len() < model.pairs.len() {
+            let (edges, known) = (&solver.edges, pairs.len());
+            pairs.extend(model.pairs.values().skip(known).filter_map(|&literal| {
+                let edge = |literal: u32| edges[literal as usize];
+                Some((literal, [edge(literal)?, edge(literal ^ 1)?]))
+            }));
+        }
+        solver.work += 1 + pairs.len() as u64 / 8;
+        for step in 0..pairs.len() {
+            let place = (self.cursor + step) % pairs.len();
+            let (literal, edges) = pairs[place];
+            let keeps = |edge: Edge| {
+                let times = &solver.times;
+                times.earliest(edge.from) + edge.distance <= times.earliest(edge.to)
+            };
+            if !solver.is_open(literal) || keeps(edges[0]) || keeps(edges[1]) {
+                continue;
+            }
+            self.cursor = place;
+            let first = solver.times.earliest(edges[0].from);
+            let second = solver.times.earliest(edges[0].to);
+            return Some(literal + u32::from(second < first));
+        }
+        None
+    }
+
+    /// The happenings in the order of time and of what was decided; or a clause that breaks a circle
+    /// of happenings of one time.
+    fn sequence(&self) -> Result<Vec<usize>, Vec<u32>> {
+        let model = &self.model;
+        let solver = &model.solver;
+        let count = model.items.len();
+        let mut before: Vec<Vec<(usize, Option<u32>)>> = vec![Vec::new(); count];
+        for (literal, edge) in solver.all_edges() {
+            if solver.is_true(literal) {
+                before[edge.to as usize].push((edge.from as usize, Some(literal)));
+            }
+        }
+        for block in &model.blocks {
+            for pair in block.nodes.windows(2) {
+                before[pair[1] as usize].push((pair[0] as usize, None));
+            }
+        }
+        for &(from, to) in &model.kept {
+            before[to as usize].push((from as usize, None));
+        }
+        let mut after = vec![Vec::new(); count];
+        let mut missing: Vec<usize> = before.iter().map(Vec::len).collect();
+        for (node, before) in before.iter().enumerate() {
+            for &(earlier, _) in before {
+                after[earlier].push(node);
+            }
+        }
+        let key = |node: usize| {
+            let number = u32::try_from(node).unwrap_or(u32::MAX);
+            (solver.times.earliest(number), node)
+        };
+        let is_ready = |node: &usize| missing[*node] == 0;
+        let mut ready: BTreeSet<_> = (0..count).filter(is_ready).map(key).collect();
+        let mut order = Vec::with_capacity(count);
+        while let Some((_, node)) = ready.pop_first() {
+            order.push(node);
+            for &later in &after[node] {
+                missing[later] -= 1;
+                if missing[later] == 0 {
+                    ready.insert(key(later));
+                }
+            }
+        }
+        if order.len() == count {
+            return Ok(order);
+        }
+        Err(circle(&before, &missing))
+    }
+}
+
+/// What happens, and where, so that instances of the same action stand together.
+fn sorted(items: &[Item]) -> Vec<(u32, bool, usize)> {
+    let items = items.iter().enumerate();
+    let mut sorted: Vec<_> = items
+        .map(|(place, item)| (item.action, item.kind == Kind::End, place))
+        .collect();
+    sorted.sort_unstable();
+    sorted
+}
+
+/// A clause that breaks a circle among those that something is missing for.
+fn circle(before: &[Vec<(usize, Option<u32>)>], missing: &[usize]) -> Vec<u32> {
+    let is_left = |node: usize| missing[node] > 0;
+    let Some(mut node) = (0..missing.len()).find(|&node| is_left(node)) else {
+        return Vec::new();
+    };
+    let mut path: Vec<(usize, Option<u32>)> = Vec::new();
+    let mut place = vec![usize::MAX; missing.len()];
+    while place[node] == usize::MAX {
+        place[node] = path.len();
+        let Some(&(earlier, literal)) = before[node].iter().find(|(other, _)| is_left(*other))
+        else {
+            return Vec::new();
+        };
+        path.push((earlier, literal));
+        node = earlier;
+    }
+    let literals = path[place[node]..].iter().filter_map(|step| step.1);
+    literals.map(|literal| literal ^ 1).collect()
+}

@@ -1,0 +1,65 @@
+//! When a better order is looked for.
+
+use super::super::super::compile::Metric;
+use super::super::super::tuning::Technique;
+use super::super::incumbent::Incumbent;
+use super::super::sequence::Item;
+use super::super::{Refiner, Ticker};
+use super::Scheduling;
+
+impl Refiner<'_> {
+    /// There is another best plan: goes on from that if it has the same actions.
+    pub(in super::super) fn schedule_from_best(&mut self) {
+        let Some((worth, items)) = &self.best else {
+            return;
+        };
+        // Another order of the same actions is gone on from.
+        let of_these = |scheduling: &Scheduling<'_>| scheduling.is_of(items);
+        self.scheduling = self.scheduling.take().filter(of_these);
+        if let Some(scheduling) = &mut self.scheduling {
+            scheduling.demand(items, worth.end);
+            let burst = self.compiled.tuning.scheduling_burst;
+            self.scheduling_patience = burst.max(2 * self.scheduled_for);
+        } else {
+            (self.is_scheduled, self.scheduling_patience) = (false, 0);
+        }
+        self.scheduled_for = 0;
+    }
+
+    /// Whether better orders of the best plan's actions are looked for next: there may be some, and the
+    /// metric knows of time.
+    pub(in super::super) fn is_turn_to_schedule(&self) -> bool {
+        let tuning = &self.compiled.tuning;
+        let is_timed = |metric: &Metric| !metric.time.is_zero();
+        let may_find = match &self.scheduling {
+            Some(scheduling) => !scheduling.is_over,
+            None => !self.is_scheduled,
+        };
+        let others = self.work.repair.saturating_add(self.work.rescheduling);
+        let patience = match self.scheduling_patience {
+            // Others still find better plans.
+            0 if self.fruitless < tuning.scheduling_after => 0,
+            patience => patience.max(tuning.scheduling_burst),
+        };
+        let spent = self.work.scheduling.saturating_mul(tuning.scheduling_share);
+        tuning.uses(Technique::Scheduling)
+            && may_find
+            && self.compiled.metric.as_ref().is_none_or(is_timed)
+            && (spent <= others || self.scheduled_for < patience)
+    }
+
+    /// Looks for a better order.
+    pub(in super::super) fn schedule(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Item>> {
+        let (worth, items) = self.best.as_ref()?;
+        if self.scheduling.is_none() {
+            self.is_scheduled = true;
+            self.scheduling = Scheduling::of(self.compiled, items, worth.end, ticker);
+        }
+        let scheduling = self.scheduling.as_mut()?;
+        let found = scheduling.next(self.compiled.tuning.scheduling_work, ticker)?;
+        // Unless it turns out to be better, something about the plan is not understood.
+        let better = Incumbent::of(self.compiled, &found);
+        scheduling.is_over = better.is_none_or(|better| better.worth.end >= worth.end);
+        Some(found)
+    }
+}
