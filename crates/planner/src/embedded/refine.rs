@@ -1,7 +1,7 @@
 //! Better plans from the plan that was found: parts of it are done otherwise (large neighbourhood
 //! search; Shaw, CP 1998).
 //!
-//! Two things are tried in turn, at random but alike in each run:
+//! Three things are tried in turn, at random but alike in each run:
 //!
 //! - `scheduling`: the same actions in another order, by a search that ends when there is no better one.
 //! - `schedule`: the same actions in another order. The order of choices decides what waits for
@@ -29,7 +29,7 @@ use super::search::is_goal;
 use super::state::State;
 use super::step_costs::StepCosts;
 use super::time::{NEVER, Ticks};
-use super::tuning::Technique;
+use super::tuning::{IS_WHOLE, Technique};
 use incumbent::{Incumbent, Worth};
 use random::Random;
 use repair::Repair;
@@ -237,7 +237,7 @@ impl<'a> Refiner<'a> {
         }
         let before = (best.metric.clone(), best.end);
         let done_before = ticker.work;
-        let schedules = self.is_turn_to_schedule();
+        let schedules = IS_WHOLE && self.is_turn_to_schedule();
         let (items, spent) = if schedules {
             (self.schedule(ticker), &mut self.work.scheduling)
         } else if self.is_turn_to_reschedule() {
@@ -360,7 +360,7 @@ impl<'a> Refiner<'a> {
         };
         let compiled = self.compiled;
         let of_these = |scheduling: &Scheduling<'_>| scheduling.is_of(&incumbent.items);
-        if self.scheduling.as_ref().is_some_and(of_these) {
+        if IS_WHOLE && self.scheduling.as_ref().is_some_and(of_these) {
             self.incumbent = Some(incumbent);
             return;
         }

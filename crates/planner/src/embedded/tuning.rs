@@ -362,6 +362,10 @@ constants! {
     most_symmetry_comparisons: usize = 300_000;
 }
 
+/// Whether all techniques are there. A module for browsers counts by its size, and does without scheduling and
+/// reasonable orders.
+pub(crate) const IS_WHOLE: bool = !cfg!(target_family = "wasm");
+
 impl Tuning {
     /// Whether the technique is in use.
     pub fn uses(&self, technique: Technique) -> bool {

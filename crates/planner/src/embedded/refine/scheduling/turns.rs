@@ -1,7 +1,7 @@
 //! When a better order is looked for.
 
 use super::super::super::compile::Metric;
-use super::super::super::tuning::Technique;
+use super::super::super::tuning::{IS_WHOLE, Technique};
 use super::super::incumbent::Incumbent;
 use super::super::sequence::Item;
 use super::super::{Refiner, Ticker};
@@ -10,7 +10,7 @@ use super::Scheduling;
 impl Refiner<'_> {
     /// There is another best plan: goes on from that if it has the same actions.
     pub(in super::super) fn schedule_from_best(&mut self) {
-        let Some((worth, items)) = &self.best else {
+        let Some((worth, items)) = self.best.as_ref().filter(|_| IS_WHOLE) else {
             return;
         };
         // Another order of the same actions is gone on from.
