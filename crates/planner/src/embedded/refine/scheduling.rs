@@ -33,6 +33,9 @@ const SLICE: u64 = 20_000;
 const UNIT_WORK: u64 = 4;
 /// After so many restarts for an order so much better than the best one, less is asked for.
 const RESTARTS: u64 = 12;
+/// With more clauses than this from orders in which a condition on numbers fails, most of what stands in the way of a better
+/// order is learnt one order at a time, which is slow.
+const FEW_FAILURES: usize = 100;
 /// The least part, one of two to this power, by which an order is to be better at first.
 const MOST_EASE: u32 = 8;
 
@@ -48,6 +51,8 @@ pub(super) struct Scheduling<'a> {
     end: Ticks,
     /// An order is looked for that is better by a part of what is between them: one of two to this power.
     ease: u32,
+    /// How many clauses were learnt from orders in which a condition on numbers fails.
+    failures: usize,
     /// Whether there is nothing left to find.
     pub(super) is_over: bool,
 }
@@ -69,6 +74,7 @@ impl<'a> Scheduling<'a> {
             least: 0,
             end,
             ease: 1,
+            failures: 0,
             is_over: false,
         };
         scheduling.least = scheduling.model.solver.times.earliest_end();
@@ -176,10 +182,16 @@ impl<'a> Scheduling<'a> {
         if broken.is_empty() {
             return Some(order);
         }
+        self.failures += broken.len();
         for clause in broken {
             self.model.solver.add(&clause);
         }
         None
+    }
+
+    /// Whether it is likely to take long, because it learns from one order after the other.
+    fn is_slow(&self) -> bool {
+        self.failures > FEW_FAILURES
     }
 
     /// Two happenings that are too close to each other and not ordered: the order they have in time.

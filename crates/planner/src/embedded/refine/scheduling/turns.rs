@@ -36,7 +36,9 @@ impl Refiner<'_> {
             None => !self.is_scheduled,
         };
         let others = self.work.repair.saturating_add(self.work.rescheduling);
+        let is_slow = self.scheduling.as_ref().is_some_and(Scheduling::is_slow);
         let patience = match self.scheduling_patience {
+            _ if is_slow => 0,
             // Others still find better plans.
             0 if self.fruitless < tuning.scheduling_after => 0,
             patience => patience.max(tuning.scheduling_burst),
