@@ -206,7 +206,7 @@ fn children_that_leave_the_group_are_found() {
         return;
     }
     // A session of its own, and its parent gone: only its environment tells whose it is.
-    let script = "setsid sh -c '(setsid sleep 999.$TAG &) ; exit' & sleep 0.2; exit 1";
+    let script = "setsid sh -c '(setsid sleep 999.$TAG &) ; exit' & wait; sleep 0.2; exit 1";
     let run = run(script, 30);
     assert_eq!(run.report.outcome.name(), "not understood");
 }
