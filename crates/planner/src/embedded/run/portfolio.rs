@@ -1,0 +1,94 @@
+//! Which searches there are for a first plan, and in which order they have their turns.
+
+use super::super::compile::{self, Compressibility};
+use super::super::formula::Literal;
+use super::super::relaxed;
+use super::super::search::Strategy;
+use super::super::tuning::{Member, Technique};
+use super::Planner;
+
+impl Planner<'_> {
+    /// The searches that take turns, the complete one last. Where something is used up and filled
+    /// up, estimates that count it find most plans sooner, but not all. Where actions offer
+    /// something while they run, some searches choose happenings in the order of time.
+    pub(super) fn strategies(&self) -> Vec<Strategy> {
+        let tuning = &self.frame.compiled.tuning;
+        if let Some(member) = tuning.only {
+            return vec![Strategy::of(member, tuning)];
+        }
+        let mut compressing = vec![Member::Compressing];
+        let holds =
+            |action: &compile::Action| action.compressibility == Compressibility::HoldsResource;
+        if self.frame.compiled.actions.iter().any(holds) {
+            compressing.push(Member::CompressingSafe);
+        }
+        let mut strategies = Vec::new();
+        for member in compressing {
+            let strategy = Strategy::of(member, tuning);
+            if self.has_reservoirs {
+                strategies.push(strategy.replenishing());
+            }
+            strategies.push(strategy);
+        }
+        let counts_landmarks =
+            tuning.uses(Technique::Landmarks) && !self.frame.compiled.is_symbolic;
+        let needs_concurrency = self.needs_concurrency();
+        let mut add = |member| strategies.push(Strategy::of(member, tuning));
+        if needs_concurrency {
+            // States take longest in the order of time.
+            if counts_landmarks {
+                add(Member::Landmarks);
+            }
+            add(Member::Chronological);
+            if tuning.uses(Technique::Consumables)
+                && !relaxed::consumables(self.frame.compiled).is_empty()
+            {
+                add(Member::Saving);
+            }
+        }
+        if !self.frame.compiled.is_symbolic {
+            if tuning.uses(Technique::Width) {
+                add(Member::Width);
+            }
+            if counts_landmarks && !needs_concurrency {
+                add(Member::Landmarks);
+            }
+            if tuning.uses(Technique::Novelty) {
+                add(Member::Novelty);
+            }
+        }
+        add(Member::Complete);
+        strategies
+    }
+
+    /// Whether things may have to happen at the same time: some action offers to others what they
+    /// need only while it runs, or waits for others before it can end.
+    pub(super) fn needs_concurrency(&self) -> bool {
+        let compiled = self.frame.compiled;
+        let needs = |action: &compile::Action| {
+            if action.start == compile::NONE || action.end == compile::NONE {
+                return false;
+            }
+            let (start, end) = (compiled.snap(action.start), compiled.snap(action.end));
+            let is_kept = |literal: &Literal| {
+                let own = if literal.truth() {
+                    &start.adds
+                } else {
+                    &start.deletes
+                };
+                action.over_all.literals.contains(literal)
+                    || start.condition.literals.contains(literal)
+                    || own.contains(&literal.fact())
+            };
+            let waits = end
+                .condition
+                .literals
+                .iter()
+                .any(|literal| !is_kept(literal));
+            waits || action.compressibility == Compressibility::Envelope && action.flows.is_empty()
+        };
+        compiled.tuning.uses(Technique::Chronological)
+            && !compiled.is_symbolic
+            && compiled.actions.iter().any(needs)
+    }
+}
