@@ -220,8 +220,18 @@ impl<'a> Refiner<'a> {
 
     /// Tries one change; the choices of a plan that is better than all before, if that is one.
     pub(crate) fn turn(&mut self, ticker: &mut Ticker<'_>) -> Option<Vec<Step>> {
-        let tuning = &self.compiled.tuning;
         let (best, items) = self.best.as_ref()?;
+        let done_before = ticker.work;
+        if IS_WHOLE && self.is_turn_to_schedule() {
+            // What the others draw and count is theirs, so that they come to the same plans where it finds nothing.
+            let bound = best.clone();
+            let items = self.schedule(ticker);
+            let done = ticker.work - done_before;
+            self.work.scheduling += done;
+            self.scheduled_for += done;
+            return self.accept(items, &bound, ticker);
+        }
+        let tuning = &self.compiled.tuning;
         let mut bound = self.incumbent.as_ref()?.worth.clone();
         self.idle += 1;
         self.fruitless += 1;
@@ -235,29 +245,33 @@ impl<'a> Refiner<'a> {
         if tuning.uses(Technique::Leniency) && self.random.once_in(LENIENT_ONCE_IN) {
             bound = bound.max(best.worse_by(tuning.leniency, self.compiled.now));
         }
-        let before = (best.metric.clone(), best.end);
-        let done_before = ticker.work;
-        let schedules = IS_WHOLE && self.is_turn_to_schedule();
-        let (items, spent) = if schedules {
-            (self.schedule(ticker), &mut self.work.scheduling)
-        } else if self.is_turn_to_reschedule() {
+        let (items, spent) = if self.is_turn_to_reschedule() {
             (self.reschedule(&bound, ticker), &mut self.work.rescheduling)
         } else {
             (self.repair(&bound, ticker), &mut self.work.repair)
         };
-        let done = ticker.work - done_before;
-        *spent += done;
-        self.scheduled_for += if schedules { done } else { 0 };
+        *spent += ticker.work - done_before;
+        self.accept(items, &bound, ticker)
+    }
+
+    /// Goes on from this plan, if it is one and within the bound; its choices, if it is better than all before.
+    fn accept(
+        &mut self,
+        items: Option<Vec<Item>>,
+        bound: &Worth,
+        ticker: &mut Ticker<'_>,
+    ) -> Option<Vec<Step>> {
         if !ticker.ask() {
             return None;
         }
         let items = items?;
         ticker.work += 4 * STEP_WORK * items.len() as u64;
         let candidate = Incumbent::of(self.compiled, &items)?;
-        if candidate.worth > bound {
+        if candidate.worth > *bound {
             return None;
         }
-        let is_better = (&candidate.worth.metric, candidate.worth.end) < (&before.0, before.1);
+        let (best, _) = self.best.as_ref()?;
+        let is_better = (&candidate.worth.metric, candidate.worth.end) < (&best.metric, best.end);
         self.incumbent = Some(candidate);
         if !is_better {
             return None;

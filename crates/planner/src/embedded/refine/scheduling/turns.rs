@@ -31,9 +31,13 @@ impl Refiner<'_> {
     pub(in super::super) fn is_turn_to_schedule(&self) -> bool {
         let tuning = &self.compiled.tuning;
         let is_timed = |metric: &Metric| !metric.time.is_zero();
-        let may_find = match &self.scheduling {
-            Some(scheduling) => !scheduling.is_over,
-            None => !self.is_scheduled,
+        let may_find = if let Some(scheduling) = &self.scheduling {
+            !scheduling.is_over
+        } else {
+            // Where other actions might do, not as long as others still find better plans: a poor plan in its best
+            // order is hard to better.
+            let is_late = self.fruitless >= tuning.scheduling_late;
+            !self.is_scheduled && (is_late || self.is_all_about_order())
         };
         let others = self.work.repair.saturating_add(self.work.rescheduling);
         let is_slow = self.scheduling.as_ref().is_some_and(Scheduling::is_slow);
@@ -48,6 +52,12 @@ impl Refiner<'_> {
             && may_find
             && self.compiled.metric.as_ref().is_none_or(is_timed)
             && (spent <= others || self.scheduled_for < patience)
+    }
+
+    /// Whether there are not many more actions than those of the best plan, as in a job shop.
+    fn is_all_about_order(&self) -> bool {
+        let items = self.best.as_ref().map_or(0, |(_, items)| items.len());
+        2 * items >= self.compiled.actions.len()
     }
 
     /// Looks for a better order.
