@@ -44,6 +44,8 @@ mod state;
 mod step_costs;
 mod symbolic;
 mod symmetry;
+#[cfg(test)]
+mod testing;
 mod time;
 mod tuning;
 

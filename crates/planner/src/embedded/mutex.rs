@@ -305,14 +305,11 @@ fn narrow(number: usize) -> u32 {
 mod tests {
     use proptest::prelude::*;
 
-    use elbowroom_model::Situation;
-    use elbowroom_model::reachability::{self, Answer};
-
     use super::*;
-    use crate::embedded::apply::{Step, Stepper};
-    use crate::embedded::compile::{Wanted, compile};
+    use crate::embedded::apply::Stepper;
     use crate::embedded::pairs::tests::drafts;
     use crate::embedded::root::root;
+    use crate::embedded::testing::{choices, compiled};
 
     /// How often the atoms of a group are true in a state.
     fn weight(compiled: &Compiled, group: &[u32], state: &State) -> usize {
@@ -328,9 +325,7 @@ mod tests {
         if !see(state) || left == 0 {
             return;
         }
-        let starts = (0..narrow(compiled.actions.len())).map(Step::Start);
-        let ends = (0..narrow(state.open.len())).map(Step::End);
-        for step in starts.chain(ends).chain([Step::Timed]) {
+        for step in choices(compiled, state) {
             if let Some(next) = Stepper::new(compiled).apply(state, step) {
                 visit(compiled, &next, left - 1, see);
             }
@@ -343,14 +338,7 @@ mod tests {
         #[test]
         fn no_state_breaks_a_group(draft in drafts()) {
             let task = draft.task();
-            let situation = Situation::initial(&task);
-            let limits = reachability::Settings::default();
-            let Answer::Complete(grounding) = reachability::ground(&task, &limits) else {
-                panic!("a small task");
-            };
-            let tuning = crate::embedded::Tuning::default();
-            let wanted = Wanted { situation: &situation, metric: false, tuning: &tuning };
-            let compiled = compile(&task, &grounding, wanted, &mut || true).expect("plain");
+            let compiled = compiled(&task);
             let root = root(&compiled);
             let mutexes = Mutexes::of(&compiled, &root, u64::MAX);
             let mut budget = 3_000;

@@ -1,14 +1,13 @@
 //! Landmarks beside their definition: without what makes them true, even the delete relaxation does not
 //! reach the goal.
 
-use elbowroom_model::reachability::{self, Answer};
-use elbowroom_model::{Situation, Task};
+use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_problem};
 use proptest::prelude::*;
 
 use super::Landmarks;
-use crate::embedded::apply::{Step, Stepper};
-use crate::embedded::compile::{Compiled, Compressibility, Wanted, compile};
+use crate::embedded::apply::Stepper;
+use crate::embedded::compile::{Compiled, Compressibility};
 use crate::embedded::formula::{Literal, is_set};
 use crate::embedded::mutex::Mutexes;
 use crate::embedded::pairs::tests::{Draft, drafts, numeric_drafts};
@@ -16,21 +15,7 @@ use crate::embedded::relaxed::{Graph, Labels, Relaxed};
 use crate::embedded::root::root;
 use crate::embedded::search::is_goal;
 use crate::embedded::state::State;
-
-fn compiled(task: &Task, look: impl FnOnce(&Compiled)) {
-    let situation = Situation::initial(task);
-    let limits = reachability::Settings::default();
-    let Answer::Complete(grounding) = reachability::ground(task, &limits) else {
-        panic!("a small task");
-    };
-    let tuning = crate::embedded::Tuning::default();
-    let wanted = Wanted {
-        situation: &situation,
-        metric: false,
-        tuning: &tuning,
-    };
-    look(&compile(task, &grounding, wanted, &mut || true).expect("plain"));
-}
+use crate::embedded::testing::{choices, compiled};
 
 fn labels(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Labels> {
     let mut labels = relaxed.labels(state)?;
@@ -166,9 +151,7 @@ fn check_progress(
     if left == 0 || *budget == 0 {
         return;
     }
-    let starts = (0..u32::try_from(compiled.actions.len()).expect("few")).map(Step::Start);
-    let ends = (0..u32::try_from(state.open.len()).expect("few")).map(Step::End);
-    for step in starts.chain(ends).chain([Step::Timed]) {
+    for step in choices(compiled, state) {
         if let Some(next) = Stepper::new(compiled).apply(state, step) {
             check_progress(
                 compiled,
@@ -182,28 +165,27 @@ fn check_progress(
 }
 
 fn check(draft: &Draft) {
-    compiled(&draft.task(), |compiled| {
-        let root = root(compiled);
-        for compresses in [Some(Compressibility::HoldsResource), None] {
-            let mut relaxed = Relaxed::new(compiled, compresses);
-            let Some(labels) = labels(&mut relaxed, &root) else {
-                continue;
-            };
-            let graph = relaxed.graph();
-            check_labels(graph, &labels);
-            let Some(landmarks) = Landmarks::of(graph, &labels, &root.open) else {
-                continue;
-            };
-            check_needs(graph, &labels, &landmarks);
-            if compresses.is_none() {
-                check_progress(compiled, &landmarks, (&root, None), 6, &mut 2_000);
-            }
-            let mut ordered = landmarks.clone();
-            let mutexes = Mutexes::of(compiled, &root, u64::MAX);
-            ordered.order_reasonably(graph, &labels, &mutexes);
-            check_orders(&landmarks, &ordered);
+    let compiled = &compiled(&draft.task());
+    let root = root(compiled);
+    for compresses in [Some(Compressibility::HoldsResource), None] {
+        let mut relaxed = Relaxed::new(compiled, compresses);
+        let Some(labels) = labels(&mut relaxed, &root) else {
+            continue;
+        };
+        let graph = relaxed.graph();
+        check_labels(graph, &labels);
+        let Some(landmarks) = Landmarks::of(graph, &labels, &root.open) else {
+            continue;
+        };
+        check_needs(graph, &labels, &landmarks);
+        if compresses.is_none() {
+            check_progress(compiled, &landmarks, (&root, None), 6, &mut 2_000);
         }
-    });
+        let mut ordered = landmarks.clone();
+        let mutexes = Mutexes::of(compiled, &root, u64::MAX);
+        ordered.order_reasonably(graph, &labels, &mutexes);
+        check_orders(&landmarks, &ordered);
+    }
 }
 
 proptest! {
@@ -244,36 +226,35 @@ fn a_tower_is_built_from_below() {
         panic!("a problem that can be read");
     };
     let task = Task::new(problem);
-    compiled(&task, |compiled| {
-        let name = |literal: Literal| task.fact_name(compiled.facts[literal.fact() as usize]);
-        let root = root(compiled);
-        let mutexes = Mutexes::of(compiled, &root, u64::MAX);
-        let facts = |group: &Vec<u32>| {
-            let facts = group
-                .iter()
-                .filter_map(|&atom| compiled.facts.get(atom as usize));
-            let mut facts: Vec<String> = facts.map(|&fact| task.fact_name(fact)).collect();
-            facts.sort();
-            facts
-        };
-        let groups: Vec<Vec<String>> = mutexes.groups.iter().map(facts).collect();
-        let around_b = ["(clear b)", "(held b)", "(on a b)"];
-        assert!(groups.iter().any(|group| *group == around_b), "{groups:?}");
-        let mut relaxed = Relaxed::new(compiled, Some(Compressibility::HoldsResource));
-        let labels = labels(&mut relaxed, &root).expect("in time");
-        let graph = relaxed.graph();
-        let mut landmarks = Landmarks::of(graph, &labels, &root.open).expect("reachable");
-        let position = |landmarks: &Landmarks, wanted: &str| {
-            let mut all = landmarks.list.iter();
-            all.position(|landmark| name(Literal(landmark.proposition)) == wanted)
-        };
-        landmarks.order_reasonably(graph, &labels, &mutexes);
-        let low = position(&landmarks, "(on b c)").expect("a goal");
-        let high = position(&landmarks, "(on a b)").expect("a goal");
-        let after = &landmarks.list[high].after;
-        assert!(
-            is_set(after, u32::try_from(low).expect("few")),
-            "{landmarks:?}"
-        );
-    });
+    let compiled = &compiled(&task);
+    let name = |literal: Literal| task.fact_name(compiled.facts[literal.fact() as usize]);
+    let root = root(compiled);
+    let mutexes = Mutexes::of(compiled, &root, u64::MAX);
+    let facts = |group: &Vec<u32>| {
+        let facts = group
+            .iter()
+            .filter_map(|&atom| compiled.facts.get(atom as usize));
+        let mut facts: Vec<String> = facts.map(|&fact| task.fact_name(fact)).collect();
+        facts.sort();
+        facts
+    };
+    let groups: Vec<Vec<String>> = mutexes.groups.iter().map(facts).collect();
+    let around_b = ["(clear b)", "(held b)", "(on a b)"];
+    assert!(groups.iter().any(|group| *group == around_b), "{groups:?}");
+    let mut relaxed = Relaxed::new(compiled, Some(Compressibility::HoldsResource));
+    let labels = labels(&mut relaxed, &root).expect("in time");
+    let graph = relaxed.graph();
+    let mut landmarks = Landmarks::of(graph, &labels, &root.open).expect("reachable");
+    let position = |landmarks: &Landmarks, wanted: &str| {
+        let mut all = landmarks.list.iter();
+        all.position(|landmark| name(Literal(landmark.proposition)) == wanted)
+    };
+    landmarks.order_reasonably(graph, &labels, &mutexes);
+    let low = position(&landmarks, "(on b c)").expect("a goal");
+    let high = position(&landmarks, "(on a b)").expect("a goal");
+    let after = &landmarks.list[high].after;
+    assert!(
+        is_set(after, u32::try_from(low).expect("few")),
+        "{landmarks:?}"
+    );
 }

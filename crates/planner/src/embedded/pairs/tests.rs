@@ -5,16 +5,16 @@ mod numbers;
 
 use std::fmt::Write;
 
-use elbowroom_model::reachability::{self, Answer};
-use elbowroom_model::{Situation, Task};
+use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_problem};
 use proptest::prelude::*;
 
 use super::Pairs;
 use crate::embedded::apply::{Step, Stepper};
-use crate::embedded::compile::{Compiled, Wanted, compile};
+use crate::embedded::compile::Compiled;
 use crate::embedded::root::root;
 use crate::embedded::state::State;
+use crate::embedded::testing::{choices, compiled};
 use crate::embedded::time::{NEVER, Ticks};
 use numbers::{Demand, Numbers};
 
@@ -200,12 +200,9 @@ fn earliest_end(
     }
     *budget = budget.saturating_sub(1);
     if left > 0 && *budget > 0 {
-        let actions = u32::try_from(compiled.actions.len()).expect("few");
-        let starts = (0..actions).map(Step::Start);
-        let starts = starts.filter(|_| state.open.len() < left);
-        let open = u32::try_from(state.open.len()).expect("few");
-        let steps = starts.chain((0..open).map(Step::End)).chain([Step::Timed]);
-        for step in steps {
+        // What is begun has to end.
+        let is_too_late = |step: &Step| matches!(step, Step::Start(_)) && state.open.len() >= left;
+        for step in choices(compiled, state).filter(|step| !is_too_late(step)) {
             let mut stepper = Stepper::new(compiled);
             if let Some(next) = stepper.apply(state, step) {
                 let end = earliest_end(compiled, pairs, &next, left - 1, budget);
@@ -229,14 +226,7 @@ proptest! {
     #[test]
     fn no_state_on_the_way_to_a_plan_is_a_dead_end(draft in drafts()) {
         let task = draft.task();
-        let situation = Situation::initial(&task);
-        let limits = reachability::Settings::default();
-        let Answer::Complete(grounding) = reachability::ground(&task, &limits) else {
-            panic!("a small task");
-        };
-        let tuning = crate::embedded::Tuning::default();
-        let wanted = Wanted { situation: &situation, metric: false, tuning: &tuning };
-        let compiled = compile(&task, &grounding, wanted, &mut || true).expect("plain");
+        let compiled = compiled(&task);
         let mut pairs = Pairs::of(&compiled).expect("small");
         let mut budget = 3_000;
         earliest_end(&compiled, &mut pairs, &root(&compiled), MOST, &mut budget);

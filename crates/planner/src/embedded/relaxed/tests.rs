@@ -3,20 +3,19 @@
 
 use std::cell::Cell;
 
-use elbowroom_model::Situation;
 use elbowroom_model::problem::Comparison;
-use elbowroom_model::reachability::{self, Answer};
 use elbowroom_num::Rational;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 
 use super::graph::{Gain, Kind};
 use super::{Estimate, MOST, Relaxed, UNREACHED};
-use crate::embedded::apply::{Step, Stepper};
-use crate::embedded::compile::{Compiled, Compressibility, NONE, Wanted, compile};
+use crate::embedded::apply::Stepper;
+use crate::embedded::compile::{Compiled, Compressibility, NONE};
 use crate::embedded::pairs::tests::{Draft, drafts, numeric_drafts};
 use crate::embedded::root::root;
 use crate::embedded::state::State;
+use crate::embedded::testing::{self, compiled};
 
 /// The estimate that goes over everything that can be reached.
 fn whole(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Estimate> {
@@ -168,18 +167,7 @@ fn compare(
 /// Compares the estimates of the states on a way through a problem. How many tests of numbers were not passed.
 fn walk(draft: &Draft, prices: &[u32], choices: &[prop::sample::Index]) -> usize {
     let task = draft.task();
-    let situation = Situation::initial(&task);
-    let limits = reachability::Settings::default();
-    let Answer::Complete(grounding) = reachability::ground(&task, &limits) else {
-        panic!("a small task");
-    };
-    let tuning = crate::embedded::Tuning::default();
-    let wanted = Wanted {
-        situation: &situation,
-        metric: false,
-        tuning: &tuning,
-    };
-    let compiled = compile(&task, &grounding, wanted, &mut || true).expect("plain");
+    let compiled = compiled(&task);
     let mut state = root(&compiled);
     let mut failed = 0;
     for choice in choices {
@@ -190,10 +178,7 @@ fn walk(draft: &Draft, prices: &[u32], choices: &[prop::sample::Index]) -> usize
         failed += tests
             .filter(|&test| !state.passes(&compiled, test, None))
             .count();
-        let actions = u32::try_from(compiled.actions.len()).expect("few");
-        let open = u32::try_from(state.open.len()).expect("few");
-        let starts = (0..actions).map(Step::Start);
-        let steps = starts.chain((0..open).map(Step::End)).chain([Step::Timed]);
+        let steps = testing::choices(&compiled, &state);
         let nexts = steps.filter_map(|step| Stepper::new(&compiled).apply(&state, step));
         let nexts: Vec<State> = nexts.collect();
         if nexts.is_empty() {

@@ -2,12 +2,11 @@
 
 use std::fmt::Write;
 
-use elbowroom_model::reachability::{self, Answer};
-use elbowroom_model::{Situation, Task};
+use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_problem};
 
 use super::*;
-use crate::embedded::compile::{Wanted, compile};
+use crate::embedded::testing::compiled;
 use crate::embedded::time::NEVER;
 
 /// So many lamps, all of which have to burn: a relaxed plan lights each of them.
@@ -34,19 +33,7 @@ fn lamps(count: usize) -> Task {
 
 /// What comes of the search for a plan of which nothing is left, and what it keeps, with so much memory.
 fn searched(task: &Task, most_memory: usize) -> (Option<Vec<Item>>, Tree) {
-    let situation = Situation::initial(task);
-    let Answer::Complete(grounding) =
-        reachability::ground(task, &reachability::Settings::default())
-    else {
-        panic!("a small task");
-    };
-    let tuning = crate::embedded::Tuning::default();
-    let wanted = Wanted {
-        situation: &situation,
-        metric: false,
-        tuning: &tuning,
-    };
-    let compiled = compile(task, &grounding, wanted, &mut || true).expect("plain");
+    let compiled = compiled(task);
     let compresses = Some(Compressibility::HoldsResource);
     let mut relaxed = Relaxed::new(&compiled, compresses);
     relaxed.serves_repairs = true;

@@ -3,13 +3,13 @@
 
 use std::fmt::Write;
 
-use elbowroom_model::reachability::{self, Answer};
-use elbowroom_model::{Situation, Task};
+use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_problem};
 
 use super::super::super::apply::Stepper;
-use super::super::super::compile::{Compiled, NONE, Wanted, compile};
+use super::super::super::compile::{Compiled, NONE};
 use super::super::super::search::is_goal;
+use super::super::super::testing::compiled_with;
 use super::super::super::time::{NEVER, Ticks};
 use super::super::super::tuning::{Technique, Tuning};
 use super::super::incumbent::Incumbent;
@@ -247,20 +247,9 @@ fn compare(kinds: Kinds, seeds: std::ops::Range<u64>) -> (usize, usize) {
     for seed in seeds {
         let mut random = Random::new(seed);
         let task = random_task(&mut random, kinds);
-        let situation = Situation::initial(&task);
-        let Answer::Complete(grounding) =
-            reachability::ground(&task, &reachability::Settings::default())
-        else {
-            continue;
-        };
         let mut tuning = Tuning::default();
         tuning.without.push(Technique::Relevance);
-        let wanted = Wanted {
-            situation: &situation,
-            metric: false,
-            tuning: &tuning,
-        };
-        let Ok(compiled) = compile(&task, &grounding, wanted, &mut || true) else {
+        let Some(compiled) = compiled_with(&task, &tuning) else {
             continue;
         };
         let plans = (0..8).filter_map(|_| random_plan(&compiled, &mut random));

@@ -1,0 +1,37 @@
+//! What tests of the parts have in common.
+
+use elbowroom_model::reachability::{self, Answer};
+use elbowroom_model::{Situation, Task};
+
+use super::apply::Step;
+use super::compile::{Compiled, Wanted, compile};
+use super::state::State;
+use super::tuning::Tuning;
+
+/// A small task from its initial state on.
+pub(crate) fn compiled(task: &Task) -> Compiled {
+    compiled_with(task, &Tuning::default()).expect("a small task, of which nothing is refused")
+}
+
+/// The same with other constants; `None` if something of it is refused.
+pub(crate) fn compiled_with(task: &Task, tuning: &Tuning) -> Option<Compiled> {
+    let situation = Situation::initial(task);
+    let limits = reachability::Settings::default();
+    let Answer::Complete(grounding) = reachability::ground(task, &limits) else {
+        return None;
+    };
+    let wanted = Wanted {
+        situation: &situation,
+        metric: false,
+        tuning,
+    };
+    compile(task, &grounding, wanted, &mut || true).ok()
+}
+
+/// All choices in a state, possible or not.
+pub(crate) fn choices(compiled: &Compiled, state: &State) -> impl Iterator<Item = Step> + use<> {
+    let count = |length: usize| u32::try_from(length).expect("few");
+    let starts = (0..count(compiled.actions.len())).map(Step::Start);
+    let ends = (0..count(state.open.len())).map(Step::End);
+    starts.chain(ends).chain([Step::Timed])
+}
