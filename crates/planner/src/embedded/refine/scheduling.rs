@@ -65,8 +65,7 @@ impl<'a> Scheduling<'a> {
         end: Ticks,
         ticker: &mut Ticker<'_>,
     ) -> Option<Self> {
-        let is_free = vec![true; items.len()];
-        let model = Model::of(compiled, items, is_free, ticker)?;
+        let model = Model::of(compiled, items, ticker)?;
         let mut scheduling = Self {
             model,
             pairs: Vec::new(),

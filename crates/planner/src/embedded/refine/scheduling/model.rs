@@ -51,8 +51,6 @@ pub(super) struct Model<'a> {
     pub(super) compiled: &'a Compiled,
     pub(super) solver: Solver,
     pub(super) items: Vec<Item>,
-    /// Which happenings may come in another order among each other.
-    is_free: Vec<bool>,
     /// The block of each node.
     pub(super) block_of: Vec<u32>,
     pub(super) blocks: Vec<Block>,
@@ -69,12 +67,10 @@ pub(super) struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// The plan of these items, the happenings of which keep their order but for those that are free.
-    /// `None` if there is something that cannot be told like this.
+    /// The plan of these items, of which timed initials keep their order. `None` if there is something that cannot be told like this.
     pub(super) fn of(
         compiled: &'a Compiled,
         items: &[Item],
-        is_free: Vec<bool>,
         ticker: &mut Ticker<'_>,
     ) -> Option<Self> {
         if !compiled.strata.is_empty() || compiled.is_symbolic {
@@ -84,7 +80,6 @@ impl<'a> Model<'a> {
             compiled,
             solver: Solver::new(),
             items: items.to_vec(),
-            is_free,
             block_of: Vec::new(),
             blocks: Vec::new(),
             pairs: Map::default(),
@@ -281,9 +276,7 @@ impl<'a> Model<'a> {
 
     fn may_differ(&self, first: u32, second: u32) -> bool {
         let is_timed = |node: u32| self.items[node as usize].kind == Kind::Timed;
-        self.is_free[first as usize]
-            && self.is_free[second as usize]
-            && !(is_timed(first) && is_timed(second))
+        !(is_timed(first) && is_timed(second))
     }
 
     /// The literal that one happening comes before another one.
