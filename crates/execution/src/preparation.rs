@@ -14,7 +14,6 @@ use elbowroom_plan::{
     DecoupledEnvelope, InstanceId, ParameterId, ParametrizedPlan, PartialOrderPlan, Schedule,
     Valuation,
 };
-use elbowroom_stn::ConsistentNetwork;
 
 use crate::event::Ticket;
 use crate::executor::{Mission, Need, StepId};
@@ -170,21 +169,9 @@ pub trait Region: Send {
         values: &Valuation,
     ) -> Option<String>;
 
-    /// The same, of a plan that has nothing but further constraints in addition to one that is guaranteed to work
-    /// in a box: where the box holds the values, all schedules that are left are schedules of that plan, and all
-    /// that is to be known is whether there is one.
-    fn objection_inside(
-        &mut self,
-        task: &Arc<Task>,
-        plan: &ParametrizedPlan,
-        values: &Valuation,
-        guaranteed: &DecoupledEnvelope,
-    ) -> Option<String> {
-        let has_schedule = || ConsistentNetwork::try_from(plan.plan.network(values)).is_ok();
-        if guaranteed.contains(values) && has_schedule() {
-            return None;
-        }
-        self.objection(task, plan, values)
+    /// Whether it is to be asked about plans of which an envelope says already that they work.
+    fn is_asked_inside(&self) -> bool {
+        false
     }
 
     /// Asks again and again how much greater one of the values may be, the others being as they are: whether the

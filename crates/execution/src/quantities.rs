@@ -114,21 +114,6 @@ pub(crate) fn expression(action: &Action, is_end: bool, fluent: FluentId) -> Opt
     })
 }
 
-/// The amount by the plan at these values, where no number decides it that changes; the duration is that of the
-/// action.
-pub(crate) fn value_at(
-    action: &Action,
-    is_end: bool,
-    fluent: FluentId,
-    (values, duration): (&Valuation, Option<&Rational>),
-) -> Option<Rational> {
-    expression(action, is_end, fluent)?.evaluate(&mut |leaf| match leaf {
-        Expression::Duration => duration.cloned(),
-        Expression::Unknown(Unknown::Parameter(index)) => Some(values[ParameterId(*index)].clone()),
-        _ => None,
-    })
-}
-
 fn note(
     plan: &ParametrizedPlan,
     place: &Place<'_>,

@@ -1,13 +1,15 @@
 //! `live`: the envelope after each observation, with what was observed fixed.
 
+mod inside;
 mod limits;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_model::ground::{Action, Body, Change, Effect, Expression};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, InstanceId, ParameterId, ParametrizedPlan, Valuation};
+use inside::Inside;
 
 use super::{Registered, promise};
 use crate::dispatch::{Bounds, Dispatch, replan};
@@ -16,7 +18,7 @@ use crate::executor::Need;
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Planned, StepId};
 use crate::odds::{Odds, Remainder};
 use crate::preparation::Region;
-use crate::quantities::{Amounts, amounts, duration_parameters, places, value_at};
+use crate::quantities::{Amounts, amounts, duration_parameters, places};
 use crate::reason::{About, Cause, Promise, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
@@ -58,8 +60,11 @@ struct Rest {
     mission: Arc<Mission>,
     /// The values observed, and the nominal ones of the rest.
     values: Valuation,
-    /// The parameters that are durations, by instance.
+    /// The parameters that are durations, by instance, and those that stand in constraints.
     durations: BTreeMap<InstanceId, ParameterId>,
+    in_constraints: BTreeSet<ParameterId>,
+    /// What was observed, as long as it lies within the envelope.
+    inside: Inside,
     /// The amounts that were observed: by which instance, at its end or its start.
     amounts: Vec<(InstanceId, bool, Measured)>,
     /// The values with which the rest was last found to work, if nothing else has deviated since. As
@@ -68,8 +73,9 @@ struct Rest {
     /// Whether the plan needs more than facts, one by one, and whether durations move any number.
     reads_more_than_facts: bool,
     durations_move_numbers: bool,
-    /// How long the actions under way may take, where the numbers limit it.
-    limits: BTreeMap<InstanceId, Rational>,
+    /// How long the actions under way may take of which that has been found out; `None` where numbers do not limit
+    /// it. Of the others it is known that they may take as long as the envelope has it.
+    limits: BTreeMap<InstanceId, Option<Rational>>,
 }
 
 impl Executor for Live {
@@ -89,6 +95,8 @@ impl Executor for Live {
             reads_more_than_facts,
             durations_move_numbers: reads_more_than_facts && plan.durations_move_numbers(),
             limits: BTreeMap::new(),
+            inside: Inside::default(),
+            in_constraints: in_constraints(plan),
             // What has an envelope works as planned.
             accepted: mission.envelope.is_some().then(|| plan.nominal()),
             values: plan.nominal(),
@@ -96,7 +104,7 @@ impl Executor for Live {
                 .map(|(parameter, instance)| (instance, parameter))
                 .collect(),
         };
-        rest.find_limits(&mission.now, self.region.as_mut());
+        rest.begin(self.region.as_mut());
         self.state = Some(rest);
         Ok(())
     }
@@ -114,6 +122,9 @@ impl Executor for Live {
             && let Some(reason) = rest.likelier(moment, odds.as_mut(), advantage)
         {
             return replan(reason);
+        }
+        if let Some(reason) = rest.come_to_limits(moment.now, self.region.as_mut()) {
+            return replan(*reason);
         }
         if let Some(reason) = rest.outlived(moment.now) {
             return replan(reason);
@@ -163,7 +174,8 @@ impl Rest {
     fn learn(&mut self, moment: &Moment<'_>, region: &mut dyn Region) -> Option<Box<Reason>> {
         let trouble = self.dispatch.take(moment);
         let moves_times = self.observe(moment);
-        if trouble.is_some() || moves_times {
+        let has_trouble = trouble.is_some();
+        if has_trouble || moves_times {
             self.accepted = None;
         }
         if let Some(reason) = trouble {
@@ -179,28 +191,42 @@ impl Rest {
                 return Some(reason);
             }
         }
+        if has_trouble || moves_times {
+            self.look_at_times(moment.now);
+        }
+        if self.is_covered(moment.now, region) {
+            return None;
+        }
         // Only ends and amounts can move the rest out of its envelope.
-        let step = moment.news.iter().find_map(may_matter);
-        if let Some(step) =
-            step.filter(|_| self.reads_more_than_facts && !self.is_accepted(moment.now))
+        if let Some(step) = moment.news.iter().find_map(may_matter)
+            && let Some(reason) = self.ask(step.instance(), moment.now, region)
         {
-            let (plan, values) = self.remainder(moment.now);
-            let task = &self.mission.task;
-            let guaranteed = self.mission.envelope.as_ref();
-            let why = match guaranteed.filter(|_| self.is_as_valued(&values)) {
-                Some(guaranteed) => region.objection_inside(task, &plan, &values, guaranteed),
-                None => region.objection(task, &plan, &values),
-            };
-            if let Some(why) = why {
-                let action = &self.dispatch.action(step.instance()).name;
-                let reason = Reason::new(Cause::GuaranteeLost)
-                    .of(action)
-                    .about(About::Said(why));
-                return Some(Box::new(reason.since(moment.now.clone())));
-            }
-            self.accepted = Some(values);
+            return Some(reason);
         }
         self.find_limits(moment.now, region);
+        None
+    }
+
+    /// Asks whether the rest works in all of its schedules if nothing deviates any more; if not, why not. What has
+    /// happened to an action is why it is asked.
+    fn ask(
+        &mut self,
+        instance: InstanceId,
+        now: &Rational,
+        region: &mut dyn Region,
+    ) -> Option<Box<Reason>> {
+        if !self.reads_more_than_facts || self.is_accepted(now) {
+            return None;
+        }
+        let (plan, values) = self.remainder(now);
+        if let Some(why) = region.objection(&self.mission.task, &plan, &values) {
+            let action = &self.dispatch.action(instance).name;
+            let reason = Reason::new(Cause::GuaranteeLost)
+                .of(action)
+                .about(About::Said(why));
+            return Some(Box::new(reason.since(now.clone())));
+        }
+        self.accepted = Some(values);
         None
     }
 
@@ -208,17 +234,6 @@ impl Rest {
     fn is_accepted(&self, now: &Rational) -> bool {
         let accepted = self.accepted.as_ref();
         accepted.is_some_and(|accepted| *accepted == self.values_at(now))
-    }
-
-    /// Whether all amounts that were observed are what the plan says at these values.
-    fn is_as_valued(&self, values: &Valuation) -> bool {
-        let mut amounts = self.amounts.iter();
-        amounts.all(|(instance, is_end, measured)| {
-            let action = &self.mission.plan.plan.instance(*instance).action;
-            let duration = self.durations.get(instance).map(|own| &values[*own]);
-            value_at(action, *is_end, measured.fluent, (values, duration)).as_ref()
-                == Some(&measured.amount)
-        })
     }
 
     /// Why another plan is to be preferred. Asked when an action has ended and nothing is under
@@ -265,19 +280,13 @@ impl Rest {
     /// from what has happened.
     fn observe(&mut self, moment: &Moment<'_>) -> bool {
         for instance in moment.news.iter().filter_map(instance_of) {
-            let Some(parameter) = self.durations.get(&instance) else {
-                continue;
-            };
-            let [start, end] = self.dispatch.nodes_of(instance);
-            let happened = |node| self.dispatch.happened(node);
-            if let (Some(start), Some(end)) = (happened(start), happened(end)) {
-                self.values[*parameter] = end - start;
-            }
+            self.observe_duration(instance);
         }
         for place in places(moment.news) {
             let measured = place.amount.measured.clone();
             self.amounts.push((place.instance, place.is_end, measured));
         }
+        self.observe_early_amounts(moment);
         let mut moves_times = false;
         let Amounts {
             readings,
@@ -287,14 +296,14 @@ impl Rest {
         let is_told = readings.iter().all(|reading| reading.value().is_some());
         if unread > 0 || !deviations.is_empty() || !is_told {
             self.accepted = None;
+            self.inside.leave();
         }
         for reading in readings {
             // Of one amount in which several stand nobody knows which it was.
             if let Some((parameter, value)) = reading.value() {
-                let bound = Bound::Parameter(parameter);
-                let mut constraints = self.mission.plan.plan.constraints.iter();
-                moves_times |= self.values[parameter] != value
-                    && constraints.any(|own| own.lower == bound || own.upper == bound);
+                self.observe_amount(parameter, &value);
+                moves_times |=
+                    self.values[parameter] != value && self.in_constraints.contains(&parameter);
                 self.values[parameter] = value;
             }
         }
@@ -332,6 +341,17 @@ impl Rest {
         }
         values
     }
+}
+
+/// The parameters that stand in constraints of the plan.
+fn in_constraints(plan: &ParametrizedPlan) -> BTreeSet<ParameterId> {
+    let constraints = plan.plan.constraints.iter();
+    let bounds = constraints.flat_map(|constraint| [&constraint.lower, &constraint.upper]);
+    let parameters = bounds.filter_map(|bound| match bound {
+        Bound::Parameter(parameter) => Some(*parameter),
+        _ => None,
+    });
+    parameters.collect()
 }
 
 /// The bounds of a parameter's values.

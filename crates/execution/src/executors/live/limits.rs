@@ -25,9 +25,7 @@ impl Rest {
             let least = &values[parameter];
             let (_, most) = range(&self.mission.plan, parameter);
             let limit = greatest(least, most.as_ref(), self.mission.task.epsilon(), &mut does);
-            if let Some(limit) = limit {
-                self.limits.insert(instance, limit);
-            }
+            self.limits.insert(instance, limit);
         }
     }
 
@@ -44,6 +42,7 @@ impl Rest {
         let local = self.dispatch.local(now);
         let mut limits = self.limits.iter();
         limits.find_map(|(instance, limit)| {
+            let limit = limit.as_ref()?;
             let time = self.limit_of(*instance, limit)?;
             if time >= local {
                 return None;
@@ -66,10 +65,12 @@ impl Rest {
         };
         let limits = self.limits.iter();
         let times = limits.filter_map(|(instance, limit)| {
-            let time = self.limit_of(*instance, limit)?;
+            let time = self.limit_of(*instance, limit.as_ref()?)?;
             Some(self.dispatch.world(&time) + self.mission.task.epsilon())
         });
-        let until = times.chain(until.clone()).min();
+        let first_due = self.first_due();
+        let due = first_due.map(|time| self.dispatch.world(time) + self.mission.task.epsilon());
+        let until = times.chain(due).chain(until.clone()).min();
         Decided {
             decision: Decision::Wait { until },
             ..decided

@@ -1,0 +1,199 @@
+//! As long as all that was observed lies within the plan's envelope, the rest of the plan works, and nothing needs to
+//! be asked: a schedule in which it works is what the network keeps to, and of numbers the envelope says it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_model::ground::{Expression, FluentId};
+use elbowroom_model::problem::Unknown;
+use elbowroom_num::{End, Rational};
+use elbowroom_plan::{InstanceId, ParameterId, ParameterKind};
+use elbowroom_stn::ConsistentNetwork;
+
+use super::Rest;
+use crate::executor::Moment;
+use crate::preparation::Region;
+use crate::quantities::{expression, places};
+use crate::reason::{Promise, Reason};
+
+/// What was observed, held against the envelope.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Inside {
+    /// Whether something was observed that the envelope does not hold, or of which it does not say anything.
+    has_left: bool,
+    /// The amounts that were observed.
+    amounts: BTreeSet<ParameterId>,
+    /// When actions under way will have taken as long as the envelope has it, on the plan's clock: by action, and the
+    /// first one first.
+    ends: BTreeMap<InstanceId, Rational>,
+    due: BTreeSet<(Rational, InstanceId)>,
+}
+
+impl Inside {
+    pub(super) fn leave(&mut self) {
+        self.has_left = true;
+    }
+
+    /// Takes note of when an action will have taken as long as the envelope has it; `None` if it is over, or has no
+    /// such time.
+    fn set_due(&mut self, instance: InstanceId, time: Option<Rational>) {
+        if let Some(old) = self.ends.remove(&instance) {
+            self.due.remove(&(old, instance));
+        }
+        if let Some(time) = time {
+            self.due.insert((time.clone(), instance));
+            self.ends.insert(instance, time);
+        }
+    }
+
+    /// The actions that have taken as long as the envelope has it by this time, on the plan's clock, and since when.
+    fn due_by(&self, local: &Rational) -> impl Iterator<Item = &(Rational, InstanceId)> {
+        self.due.iter().take_while(move |(time, _)| time <= local)
+    }
+}
+
+impl Rest {
+    /// Takes up a plan, parts of which may be under way.
+    pub(super) fn begin(&mut self, region: &mut dyn Region) {
+        let running: Vec<InstanceId> = self.dispatch.running().iter().copied().collect();
+        for instance in running {
+            self.observe_duration(instance);
+        }
+        let now = self.mission.now.clone();
+        if !self.is_covered(&now, region) {
+            self.find_limits(&now, region);
+        }
+    }
+
+    /// An action has started or ended: how long it takes, or may take within the envelope.
+    pub(super) fn observe_duration(&mut self, instance: InstanceId) {
+        let [start, end] = self.dispatch.nodes_of(instance);
+        let Some(start) = self.dispatch.happened(start).cloned() else {
+            return;
+        };
+        let duration = self.dispatch.happened(end).map(|end| end - &start);
+        if duration.is_some() {
+            self.limits.remove(&instance);
+        }
+        let Some(&parameter) = self.durations.get(&instance) else {
+            return;
+        };
+        let envelope = self.mission.envelope.as_ref();
+        let interval = envelope.map(|envelope| envelope.interval(parameter));
+        // What ends just before an open end is as good as what ends there: neither is let be over it.
+        let most = interval.and_then(|interval| match &interval.upper {
+            End::Closed(most) | End::Open(most) => Some(most),
+            End::Infinite => None,
+        });
+        let due = most.map(|most| start + most);
+        if let Some(duration) = duration {
+            self.inside.has_left |= interval.is_none_or(|interval| !interval.contains(&duration));
+            self.inside.set_due(instance, None);
+            self.values[parameter] = duration;
+        } else {
+            let is_running = self.dispatch.running().contains(&instance);
+            self.inside.set_due(instance, due.filter(|_| is_running));
+        }
+    }
+
+    /// An amount was measured that says the value of one parameter.
+    pub(super) fn observe_amount(&mut self, parameter: ParameterId, value: &Rational) {
+        let envelope = self.mission.envelope.as_ref();
+        let is_held = envelope.is_some_and(|envelope| envelope.interval(parameter).contains(value));
+        let is_new = self.inside.amounts.insert(parameter);
+        // No value of a parameter stands for two amounts that differ.
+        self.inside.has_left |= !is_held || !is_new && self.values[parameter] != *value;
+    }
+
+    /// Amounts were measured while it was not known yet how long their actions take: those that depend on it are not
+    /// what the envelope is about.
+    pub(super) fn observe_early_amounts(&mut self, moment: &Moment<'_>) {
+        let depends = places(moment.news).any(|place| {
+            !place.is_end && self.depends_on_duration(place.instance, place.amount.measured.fluent)
+        });
+        self.inside.has_left |= depends;
+    }
+
+    /// Whether what an action does to a number at its start depends on how long it takes.
+    fn depends_on_duration(&self, instance: InstanceId, fluent: FluentId) -> bool {
+        let plan = &self.mission.plan;
+        let action = &plan.plan.instance(instance).action;
+        let is_duration = |index: u32| {
+            let parameter = plan.parameters.get(index as usize);
+            parameter.is_some_and(|own| matches!(own.kind, ParameterKind::Duration(_)))
+        };
+        let mut depends = false;
+        if let Some(expression) = expression(action, false, fluent) {
+            expression.visit_leaves(&mut |leaf| {
+                depends |= match leaf {
+                    Expression::Duration => true,
+                    Expression::Unknown(Unknown::Parameter(index)) => is_duration(*index),
+                    _ => false,
+                };
+            });
+        }
+        depends
+    }
+
+    /// Something has happened at a time at which the plan did not have it: only where its constraints hold all the same,
+    /// with the values that were observed, is what happens still one of the plan's schedules.
+    pub(super) fn look_at_times(&mut self, now: &Rational) {
+        if self.inside.has_left || !self.reads_more_than_facts {
+            return;
+        }
+        let (plan, values) = self.remainder(now);
+        let network = ConsistentNetwork::try_from(plan.plan.network(&values));
+        self.inside.has_left |= network.is_err();
+    }
+
+    /// Whether the rest of the plan works without asking, whatever is under way ends by now or as long after as the
+    /// envelope has it: all that was observed lies within the envelope, and the network has a schedule with it, since
+    /// it keeps to its windows with all values of the envelope.
+    pub(super) fn is_covered(&self, now: &Rational, region: &dyn Region) -> bool {
+        let local = self.dispatch.local(now);
+        let mut due = self.inside.due_by(&local);
+        !region.is_asked_inside()
+            && self.mission.envelope.is_some()
+            && self.promise != Promise::Luck
+            && !self.inside.has_left
+            && due.all(|(time, _)| *time == local)
+    }
+
+    /// Where actions have taken as long as the envelope has it, finds out how much longer they may take. Why the rest
+    /// does not work, if it does not.
+    pub(super) fn come_to_limits(
+        &mut self,
+        now: &Rational,
+        region: &mut dyn Region,
+    ) -> Option<Box<Reason>> {
+        if !self.durations_move_numbers {
+            return None;
+        }
+        let local = self.dispatch.local(now);
+        let (time, instance) = {
+            let mut due = self.inside.due_by(&local);
+            due.find(|(_, id)| !self.limits.contains_key(id))?.clone()
+        };
+        let at = self.dispatch.world(&time);
+        if self.is_covered(&at, region) {
+            // Then it was still known to work.
+            self.find_limits(&at, region);
+            return None;
+        }
+        let reason = self.ask(instance, now, region);
+        if reason.is_none() {
+            self.find_limits(now, region);
+        }
+        reason
+    }
+
+    /// When the first action under way will have taken as long as the envelope has it, on the plan's clock, of those of
+    /// which no more is known.
+    pub(super) fn first_due(&self) -> Option<&Rational> {
+        if !self.durations_move_numbers {
+            return None;
+        }
+        let mut due = self.inside.due.iter();
+        let unknown = due.find(|(_, instance)| !self.limits.contains_key(instance));
+        unknown.map(|(time, _)| time)
+    }
+}
