@@ -14,6 +14,7 @@ use elbowroom::num::Rational;
 use elbowroom::plan::{ParametrizedPlan, Valuation};
 
 use crate::guarantee::one_order;
+use crate::own;
 use crate::scene::Scene;
 
 /// Ten sites more, and nothing about time: only how much a survey takes of the battery.
@@ -326,18 +327,28 @@ fn difference(one: &Report, other: &Report, epsilon: &Rational) -> Option<String
 fn what_stays_within_the_envelope_needs_no_question() {
     let asked = Arc::new(AtomicUsize::new(0));
     let mut lost = 0;
-    let durations = |name: &str| {
-        let mut scene = Scene::case(name);
+    let varied = |mut scene: Scene| {
         scene.flow.vary = vec!["durations".parse().expect("a specification")];
         scene
     };
-    for (name, scene) in [
-        ("battery", durations("battery")),
-        ("tank", durations("tank")),
-        ("hatchery", durations("hatchery")),
+    let cases = [
+        "battery",
+        "tank",
+        "hatchery",
+        "match",
+        "delivery",
+        "paintshop",
+        "lamp",
+    ];
+    let cases = cases.map(|name| (name, varied(Scene::case(name))));
+    let own = own::OWN.iter().map(|[name, domain, problem, plan]| {
+        (*name, varied(Scene::new(domain, problem, Some(plan))))
+    });
+    let batteries = [
         ("small battery", one_order("160", "151")),
         ("large battery", one_order("180", "171")),
-    ] {
+    ];
+    for (name, scene) in cases.into_iter().chain(own).chain(batteries) {
         for (seed, spread) in (0..15).zip(["0.05", "0.2", "0.5"].into_iter().cycle()) {
             let varies = |heading: &str, spread: &str| {
                 format!(
@@ -345,7 +356,7 @@ fn what_stays_within_the_envelope_needs_no_question() {
                 )
             };
             let mut world = varies("[[duration]]\naction = \"*\"", spread);
-            if name.ends_with(" battery") {
+            if ["small battery", "large battery"].contains(&name) {
                 for (action, fluent) in [("make-base-1", "charge"), ("make-base-2", "weight")] {
                     let heading =
                         format!("[[amount]]\naction = \"{action}\"\nfluent = \"{fluent}\"");

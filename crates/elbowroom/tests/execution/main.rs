@@ -17,6 +17,8 @@ mod nothing_left;
 mod one_time;
 mod openings;
 mod others;
+#[path = "../../examples/promise/own.rs"]
+mod own;
 mod readying;
 mod reasons;
 mod refusals;
