@@ -4,7 +4,9 @@
 
 *Begun* is when the trace has its first command, everything before that included: reading, judging, relaxing the
 plan, and making the network ready. *Run* is the whole process. With --numbers, conditions read numbers; with
---shape, robots limit each other in one of the ways of `shapes.py`. Standard library only; memory is read from /proc.
+--shape, robots limit each other in one of the ways of `shapes.py`. With --files, nothing is measured: domain, problem and
+plan are written to that folder, and a world in which each duration is up to a tenth longer or shorter than planned.
+Standard library only; memory is read from /proc.
 """
 
 import argparse
@@ -58,18 +60,31 @@ def processor(process):
     return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
 
+WORLD = """format = "elbowroom-world"
+version = 1
+[[duration]]
+action = "*"
+uniform = { from = 0.9, to = 1.1 }
+relative = true
+"""
+
+
+def write(folder, points, has_numbers, shape=None):
+    """Writes domain, problem and plan."""
+    if shape:
+        domain, problem, plan = shapes.files(shape, points // 2)
+    else:
+        domain, problem = rounds.domain(has_numbers), rounds.problem(ROBOTS, DOCKS, has_numbers)
+        plan = rounds.plan(ROBOTS, DOCKS, points // 2)
+    for name, text in {"d.pddl": domain, "p.pddl": problem, "plan": plan}.items():
+        (folder / name).write_text(text)
+
+
 def row(program, executor, points, patience, has_numbers, shape=None):
     """Measures one plan."""
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        if shape:
-            domain, problem, plan = shapes.files(shape, points // 2)
-        else:
-            domain, problem = rounds.domain(has_numbers), rounds.problem(ROBOTS, DOCKS, has_numbers)
-            plan = rounds.plan(ROBOTS, DOCKS, points // 2)
-        texts = {"d.pddl": domain, "p.pddl": problem, "plan": plan}
-        for name, text in texts.items():
-            (folder / name).write_text(text)
+        write(folder, points, has_numbers, shape)
         line = [pathlib.Path(program).resolve(), "run", "d.pddl", "p.pddl", "plan", "--executor", executor]
         line += ["--planner", "none", "--trace", "trace.jsonl"]
         begin = time.monotonic()
@@ -93,13 +108,19 @@ def row(program, executor, points, patience, has_numbers, shape=None):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("program")
+    parser.add_argument("program", help="with --files: any word")
     parser.add_argument("points", nargs="*", type=int, default=[1_000, 10_000, 40_000, 100_000])
     parser.add_argument("--executor", default="stn")
     parser.add_argument("--patience", type=float, default=300)
     parser.add_argument("--numbers", action="store_true", help="driving takes charge")
     parser.add_argument("--shape", choices=shapes.SHAPES, help="how robots limit each other")
+    parser.add_argument("--files", type=pathlib.Path, help="write files for the first number of time points")
     chosen = parser.parse_intermixed_args()
+    if chosen.files:
+        chosen.files.mkdir(parents=True, exist_ok=True)
+        write(chosen.files, chosen.points[0], chosen.numbers, chosen.shape)
+        (chosen.files / "world.toml").write_text(WORLD)
+        return
     print("| time points | executor | begun | memory | run | memory |")
     print("|---:|---|---:|---:|---:|---:|", flush=True)
     for points in chosen.points:

@@ -169,7 +169,24 @@ pub trait Region: Send {
         values: &Valuation,
     ) -> Option<String>;
 
-    /// Whether it is to be asked about plans of which an envelope says already that they work.
+    /// A box around these values in which the plan is guaranteed to work: as much of the room nearby as is found soon,
+    /// or no more than the values.
+    ///
+    /// # Errors
+    /// Why the plan is not guaranteed to work for the values themselves.
+    fn surroundings(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &ParametrizedPlan,
+        values: &Valuation,
+    ) -> Result<DecoupledEnvelope, String> {
+        match self.objection(task, plan, values) {
+            None => Ok(DecoupledEnvelope::point(values)),
+            Some(why) => Err(why),
+        }
+    }
+
+    /// Whether it is to be asked about plans of which a box says already that they work.
     fn is_asked_inside(&self) -> bool {
         false
     }

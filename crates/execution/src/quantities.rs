@@ -3,7 +3,7 @@
 use elbowroom_model::ground::{Action, Body, Change, Effect, Expression, FluentId};
 use elbowroom_model::problem::Unknown;
 use elbowroom_num::Rational;
-use elbowroom_plan::{InstanceId, ParameterId, ParameterKind, ParametrizedPlan, Valuation};
+use elbowroom_plan::{InstanceId, ParameterId, ParameterKind, ParametrizedPlan};
 
 use crate::executor::{Amount, Moment, News};
 

@@ -5,10 +5,12 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_envelope::obligations::Refusal;
-use elbowroom_envelope::{BestSettings, Guarantee, Objective, Oracle, best, irr};
+use elbowroom_envelope::{
+    BestSettings, Guarantee, Objective, Oracle, Settings as SearchSettings, best, irr,
+};
 use elbowroom_execution::{Forms, Need, PrepareError, Prepared, Preparer, Region};
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
+use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::deorder;
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
 use elbowroom_plan::partial_order::partial_order;
@@ -196,6 +198,12 @@ impl Preparer for Analyst {
     }
 }
 
+/// What is left of a plan is known to work up to this part of each value more or less, at most.
+const NEARBY: i64 = 4;
+
+/// The boxes looked at for that.
+const MOST_CHECKS: usize = 1000;
+
 /// The exact envelope, asked point by point.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WholeRegion;
@@ -212,6 +220,24 @@ impl WholeRegion {
             parameter.nominal = value.clone();
         }
         Oracle::new(task, &Arc::new(plan), Guarantee::Weak)
+    }
+
+    /// The plan, with each range cut down to what is near a value.
+    fn nearby(plan: &ParametrizedPlan, values: &Valuation) -> ParametrizedPlan {
+        let mut plan = plan.clone();
+        for (parameter, value) in plan.parameters.iter_mut().zip(values) {
+            let room = value.abs() / Rational::from(NEARBY);
+            let near = Interval::closed(value - &room, value + &room);
+            let range = parameter.range.intersection(&near);
+            // What was observed may be out of range.
+            let has_value = range.contains(value);
+            parameter.range = if has_value {
+                range
+            } else {
+                Interval::point(value.clone())
+            };
+        }
+        plan
     }
 }
 
@@ -237,6 +263,32 @@ impl Region for WholeRegion {
         };
         let explainer = crate::Explainer::new(task, oracle.plan());
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
+    }
+
+    /// IRR, nearby and in few steps.
+    fn surroundings(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &ParametrizedPlan,
+        values: &Valuation,
+    ) -> Result<DecoupledEnvelope, String> {
+        if !plan.reads_more_than_facts(task) {
+            return Ok(DecoupledEnvelope::point(values));
+        }
+        let plan = Self::nearby(plan, values);
+        let mut oracle = Self::oracle_at(task, &plan, values).map_err(|why| why.to_string())?;
+        let settings = SearchSettings {
+            relative: Some(Rational::new(1, 2 * NEARBY)),
+            most_checks: Some(MOST_CHECKS),
+            ..SearchSettings::default()
+        };
+        let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(()));
+        let run = run.map_err(|why| why.to_string())?;
+        run.envelope.map_err(|objection| {
+            let explainer = crate::Explainer::new(task, oracle.plan());
+            let point = DecoupledEnvelope::point(values);
+            explainer.objection(&oracle, &point, &objection).reason
+        })
     }
 
     /// One oracle for all values: only the proofs that use the greater value are looked for again.

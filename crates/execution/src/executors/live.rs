@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_model::ground::{Action, Body, Change, Effect, Expression};
-use elbowroom_num::Rational;
+use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{Bound, InstanceId, ParameterId, ParametrizedPlan, Valuation};
 use inside::Inside;
 
@@ -67,9 +67,6 @@ struct Rest {
     inside: Inside,
     /// The amounts that were observed: by which instance, at its end or its start.
     amounts: Vec<(InstanceId, bool, Measured)>,
-    /// The values with which the rest was last found to work, if nothing else has deviated since. As
-    /// long as they stay so, what happens only chooses among schedules all of which work.
-    accepted: Option<Valuation>,
     /// Whether the plan needs more than facts, one by one, and whether durations move any number.
     reads_more_than_facts: bool,
     durations_move_numbers: bool,
@@ -95,10 +92,8 @@ impl Executor for Live {
             reads_more_than_facts,
             durations_move_numbers: reads_more_than_facts && plan.durations_move_numbers(),
             limits: BTreeMap::new(),
-            inside: Inside::default(),
+            inside: Inside::of(mission.envelope.clone()),
             in_constraints: in_constraints(plan),
-            // What has an envelope works as planned.
-            accepted: mission.envelope.is_some().then(|| plan.nominal()),
             values: plan.nominal(),
             durations: duration_parameters(plan)
                 .map(|(parameter, instance)| (instance, parameter))
@@ -175,9 +170,6 @@ impl Rest {
         let trouble = self.dispatch.take(moment);
         let moves_times = self.observe(moment);
         let has_trouble = trouble.is_some();
-        if has_trouble || moves_times {
-            self.accepted = None;
-        }
         if let Some(reason) = trouble {
             if !promise::is_about_time(&reason) {
                 return Some(reason);
@@ -197,17 +189,19 @@ impl Rest {
         if self.is_covered(moment.now, region) {
             return None;
         }
-        // Only ends and amounts can move the rest out of its envelope.
+        // Only ends and amounts can move the rest out of what is known of it.
         if let Some(step) = moment.news.iter().find_map(may_matter)
             && let Some(reason) = self.ask(step.instance(), moment.now, region)
         {
             return Some(reason);
         }
-        self.find_limits(moment.now, region);
+        if region.is_asked_inside() {
+            self.find_limits(moment.now, region);
+        }
         None
     }
 
-    /// Asks whether the rest works in all of its schedules if nothing deviates any more; if not, why not. What has
+    /// Looks for a box within which the rest works; if it does not even if nothing deviates any more, why not. What has
     /// happened to an action is why it is asked.
     fn ask(
         &mut self,
@@ -215,25 +209,23 @@ impl Rest {
         now: &Rational,
         region: &mut dyn Region,
     ) -> Option<Box<Reason>> {
-        if !self.reads_more_than_facts || self.is_accepted(now) {
+        if !self.reads_more_than_facts {
             return None;
         }
         let (plan, values) = self.remainder(now);
-        if let Some(why) = region.objection(&self.mission.task, &plan, &values) {
-            let action = &self.dispatch.action(instance).name;
-            let reason = Reason::new(Cause::GuaranteeLost)
-                .of(action)
-                .about(About::Said(why));
-            return Some(Box::new(reason.since(now.clone())));
+        match region.surroundings(&self.mission.task, &plan, &values) {
+            Ok(known) => {
+                self.enter(known);
+                None
+            }
+            Err(why) => {
+                let action = &self.dispatch.action(instance).name;
+                let reason = Reason::new(Cause::GuaranteeLost)
+                    .of(action)
+                    .about(About::Said(why));
+                Some(Box::new(reason.since(now.clone())))
+            }
         }
-        self.accepted = Some(values);
-        None
-    }
-
-    /// Whether nothing has deviated since the rest was last found to work.
-    fn is_accepted(&self, now: &Rational) -> bool {
-        let accepted = self.accepted.as_ref();
-        accepted.is_some_and(|accepted| *accepted == self.values_at(now))
     }
 
     /// Why another plan is to be preferred. Asked when an action has ended and nothing is under
@@ -295,7 +287,6 @@ impl Rest {
         } = amounts(&self.mission.plan, moment);
         let is_told = readings.iter().all(|reading| reading.value().is_some());
         if unread > 0 || !deviations.is_empty() || !is_told {
-            self.accepted = None;
             self.inside.leave();
         }
         for reading in readings {
@@ -319,6 +310,13 @@ impl Rest {
         for (instance, is_end, measured) in &self.amounts {
             let action = &mut plan.plan.instances[instance.index()].action;
             set_amount(Arc::make_mut(action), *is_end, measured);
+        }
+        for (parameter, instance) in duration_parameters(&self.mission.plan) {
+            let [_, end] = self.dispatch.nodes_of(instance);
+            if self.dispatch.happened(end).is_some() {
+                plan.parameters[parameter.index()].range =
+                    Interval::point(values[parameter].clone());
+            }
         }
         plan.plan = plan
             .plan

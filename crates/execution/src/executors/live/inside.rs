@@ -1,12 +1,13 @@
 //! As long as all that was observed lies within the plan's envelope, the rest of the plan works, and nothing needs to
-//! be asked: a schedule in which it works is what the network keeps to, and of numbers the envelope says it.
+//! be asked: a schedule in which it works is what the network keeps to, and of numbers the envelope says it. Once
+//! something has left it, a box is looked for that does the same for the rest.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_model::ground::{Expression, FluentId};
 use elbowroom_model::problem::Unknown;
 use elbowroom_num::{End, Rational};
-use elbowroom_plan::{InstanceId, ParameterId, ParameterKind};
+use elbowroom_plan::{DecoupledEnvelope, InstanceId, ParameterId, ParameterKind};
 use elbowroom_stn::ConsistentNetwork;
 
 use super::Rest;
@@ -15,20 +16,31 @@ use crate::preparation::Region;
 use crate::quantities::{expression, places};
 use crate::reason::{Promise, Reason};
 
-/// What was observed, held against the envelope.
+/// The box within which the rest of the plan is known to work, and what was observed, held against it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inside {
-    /// Whether something was observed that the envelope does not hold, or of which it does not say anything.
+    /// The plan's envelope, and once something has left it the box that was found for the rest then.
+    known: Option<DecoupledEnvelope>,
+    /// Whether something was observed since that this box does not hold, or of which it does not say anything.
     has_left: bool,
-    /// The amounts that were observed.
+    /// The amounts that were observed since.
     amounts: BTreeSet<ParameterId>,
-    /// When actions under way will have taken as long as the envelope has it, on the plan's clock: by action, and the
+    /// When actions under way will have taken as long as the box has it, on the plan's clock: by action, and the
     /// first one first.
     ends: BTreeMap<InstanceId, Rational>,
     due: BTreeSet<(Rational, InstanceId)>,
 }
 
 impl Inside {
+    /// Nothing has been observed yet.
+    pub(super) fn of(known: Option<DecoupledEnvelope>) -> Self {
+        Self {
+            known,
+            ..Self::default()
+        }
+    }
+
+    /// Something was observed that the box does not hold.
     pub(super) fn leave(&mut self) {
         self.has_left = true;
     }
@@ -54,13 +66,25 @@ impl Inside {
 impl Rest {
     /// Takes up a plan, parts of which may be under way.
     pub(super) fn begin(&mut self, region: &mut dyn Region) {
-        let running: Vec<InstanceId> = self.dispatch.running().iter().copied().collect();
-        for instance in running {
-            self.observe_duration(instance);
-        }
+        self.await_running();
         let now = self.mission.now.clone();
         if !self.is_covered(&now, region) {
             self.find_limits(&now, region);
+        }
+    }
+
+    /// From now on this box is what the rest of the plan is known to work in.
+    pub(super) fn enter(&mut self, known: DecoupledEnvelope) {
+        self.inside = Inside::of(Some(known));
+        self.limits.clear();
+        self.await_running();
+    }
+
+    /// Takes note of when the actions under way will have taken as long as the box has it.
+    fn await_running(&mut self) {
+        let running: Vec<InstanceId> = self.dispatch.running().iter().copied().collect();
+        for instance in running {
+            self.observe_duration(instance);
         }
     }
 
@@ -77,8 +101,8 @@ impl Rest {
         let Some(&parameter) = self.durations.get(&instance) else {
             return;
         };
-        let envelope = self.mission.envelope.as_ref();
-        let interval = envelope.map(|envelope| envelope.interval(parameter));
+        let known = self.inside.known.as_ref();
+        let interval = known.map(|known| known.interval(parameter));
         // What ends just before an open end is as good as what ends there: neither is let be over it.
         let most = interval.and_then(|interval| match &interval.upper {
             End::Closed(most) | End::Open(most) => Some(most),
@@ -152,13 +176,13 @@ impl Rest {
         let local = self.dispatch.local(now);
         let mut due = self.inside.due_by(&local);
         !region.is_asked_inside()
-            && self.mission.envelope.is_some()
+            && self.inside.known.is_some()
             && self.promise != Promise::Luck
             && !self.inside.has_left
             && due.all(|(time, _)| *time == local)
     }
 
-    /// Where actions have taken as long as the envelope has it, finds out how much longer they may take. Why the rest
+    /// Where an action has taken as long as the box has it, finds out how much longer they may take. Why the rest
     /// does not work, if it does not.
     pub(super) fn come_to_limits(
         &mut self,
@@ -176,14 +200,10 @@ impl Rest {
         let at = self.dispatch.world(&time);
         if self.is_covered(&at, region) {
             // Then it was still known to work.
-            self.find_limits(&at, region);
+            self.find_limit(instance, &at, region);
             return None;
         }
-        let reason = self.ask(instance, now, region);
-        if reason.is_none() {
-            self.find_limits(now, region);
-        }
-        reason
+        self.ask(instance, now, region)
     }
 
     /// When the first action under way will have taken as long as the envelope has it, on the plan's clock, of those of

@@ -1,12 +1,11 @@
 //! How long actions under way may take before the numbers of the rest of the plan no longer do.
 
 use elbowroom_num::{Interval, Rational};
-use elbowroom_plan::InstanceId;
+use elbowroom_plan::{InstanceId, ParametrizedPlan, Valuation};
 
 use super::{Rest, range};
 use crate::executor::{Decided, Decision};
 use crate::preparation::Region;
-use crate::quantities::duration_parameters;
 use crate::reason::{About, Cause, Reason};
 
 impl Rest {
@@ -17,16 +16,38 @@ impl Rest {
             return;
         }
         let (plan, values) = self.remainder(now);
-        for (parameter, instance) in duration_parameters(&self.mission.plan) {
-            if !self.dispatch.running().contains(&instance) {
-                continue;
-            }
-            let mut does = region.growing(&self.mission.task, &plan, &values, parameter);
-            let least = &values[parameter];
-            let (_, most) = range(&self.mission.plan, parameter);
-            let limit = greatest(least, most.as_ref(), self.mission.task.epsilon(), &mut does);
-            self.limits.insert(instance, limit);
+        let running: Vec<InstanceId> = self.dispatch.running().iter().copied().collect();
+        for instance in running {
+            self.find_limit_in(instance, (&plan, &values), region);
         }
+    }
+
+    /// Finds out how long an action under way may take, as far as numbers depend on it.
+    pub(super) fn find_limit(
+        &mut self,
+        instance: InstanceId,
+        now: &Rational,
+        region: &mut dyn Region,
+    ) {
+        let (plan, values) = self.remainder(now);
+        self.find_limit_in(instance, (&plan, &values), region);
+    }
+
+    fn find_limit_in(
+        &mut self,
+        instance: InstanceId,
+        (plan, values): (&ParametrizedPlan, &Valuation),
+        region: &mut dyn Region,
+    ) {
+        let Some(&parameter) = self.durations.get(&instance) else {
+            return;
+        };
+        let mut does = region.growing(&self.mission.task, plan, values, parameter);
+        let least = &values[parameter];
+        let (_, most) = range(&self.mission.plan, parameter);
+        let limit = greatest(least, most.as_ref(), self.mission.task.epsilon(), &mut does);
+        drop(does);
+        self.limits.insert(instance, limit);
     }
 
     /// The time at which an action under way reaches its limit, on the plan's clock.
