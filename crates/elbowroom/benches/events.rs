@@ -36,7 +36,7 @@ fn main() {
         println!("no plan to measure: give a domain, a problem and a plan");
         return;
     };
-    let (worlds, executors): (Vec<_>, Vec<_>) = rest
+    let (files, executors): (Vec<_>, Vec<_>) = rest
         .iter()
         .partition(|word| Path::new(word.as_str()).is_file());
     let source = |path: &String| {
@@ -46,7 +46,7 @@ fn main() {
     let (problem, _) = read_problem(&source(domain), &source(problem)).expect("a problem");
     let task = Arc::new(Task::new(problem));
     let (plan, _) = read_plan(&source(plan), &task).expect("a plan");
-    let text = worlds.first().map_or_else(
+    let text = files.first().map_or_else(
         || "format = \"elbowroom-world\"\nversion = 1\n".to_owned(),
         |path| std::fs::read_to_string(path).expect("a readable world"),
     );
@@ -59,13 +59,13 @@ fn main() {
         }
         let spec: ExecutorSpec = executor.parse().expect("a known executor");
         let times = Arc::new(Mutex::new(Vec::new()));
-        let timed = Timed {
+        let decider = Timed {
             inner: spec.build(Means::from(Box::new(WholeRegion))),
             times: Arc::clone(&times),
         };
         let execution = Execution::of(&task).beginning_with(plan.clone()).by(spec);
         let mut world = SimWorld::new(Arc::clone(&task), &model, 1);
-        let report = execution.decided_by(timed).run_in(&mut world);
+        let report = execution.decided_by(decider).run_in(&mut world);
         let mut times = times.lock().expect("nobody panics").clone();
         times.sort_unstable();
         let at = |share: usize| {

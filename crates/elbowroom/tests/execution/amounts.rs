@@ -304,7 +304,8 @@ fn difference(one: &Report, other: &Report, epsilon: &Rational) -> Option<String
             let has_succeeded = step.ending == Some(Ending::Succeeded);
             (&step.step.action.name, has_succeeded)
         });
-        let (reasons, executed) = (Vec::from_iter(reasons), Vec::from_iter(executed));
+        let reasons: Vec<_> = reasons.collect();
+        let executed: Vec<_> = executed.collect();
         format!("{:?} {reasons:?} {executed:?}", report.verdict)
     };
     let times = |report: &Report| -> Vec<Rational> {
@@ -327,11 +328,11 @@ fn difference(one: &Report, other: &Report, epsilon: &Rational) -> Option<String
 fn what_stays_within_the_envelope_needs_no_question() {
     let asked = Arc::new(AtomicUsize::new(0));
     let mut lost = 0;
-    let varied = |mut scene: Scene| {
+    let open = |mut scene: Scene| {
         scene.flow.vary = vec!["durations".parse().expect("a specification")];
         scene
     };
-    let cases = [
+    let names = [
         "battery",
         "tank",
         "hatchery",
@@ -340,9 +341,9 @@ fn what_stays_within_the_envelope_needs_no_question() {
         "paintshop",
         "lamp",
     ];
-    let cases = cases.map(|name| (name, varied(Scene::case(name))));
+    let cases = names.map(|name| (name, open(Scene::case(name))));
     let own = own::OWN.iter().map(|[name, domain, problem, plan]| {
-        (*name, varied(Scene::new(domain, problem, Some(plan))))
+        (*name, open(Scene::new(domain, problem, Some(plan))))
     });
     let batteries = [
         ("small battery", one_order("160", "151")),
@@ -373,8 +374,8 @@ fn what_stays_within_the_envelope_needs_no_question() {
             let asking = run(Means::from(Box::new(AlwaysAsked(Arc::clone(&asked)))));
             let difference = difference(&trusting, &asking, scene.task.epsilon());
             assert_eq!(difference, None, "{name}, seed {seed}");
-            let mut causes = trusting.reasons.iter().map(|reason| reason.cause);
-            lost += usize::from(causes.any(|cause| cause == Cause::GuaranteeLost));
+            let mut reasons = trusting.reasons.iter().map(|reason| reason.cause);
+            lost += usize::from(reasons.any(|cause| cause == Cause::GuaranteeLost));
         }
     }
     let asked = asked.load(Ordering::Relaxed);
