@@ -108,7 +108,7 @@ def row(program, executor, points, patience, has_numbers, shape=None):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("program", help="with --files: any word")
+    parser.add_argument("program", help="the program to measure; - with --files")
     parser.add_argument("points", nargs="*", type=int, default=[1_000, 10_000, 40_000, 100_000])
     parser.add_argument("--executor", default="stn")
     parser.add_argument("--patience", type=float, default=300)

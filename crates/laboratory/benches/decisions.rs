@@ -10,8 +10,10 @@
 #![allow(clippy::print_stdout, reason = "the table is what it is for")]
 #![allow(clippy::disallowed_methods, reason = "decisions are timed")]
 
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+mod timed;
+
+use std::sync::Arc;
+use std::time::Instant;
 
 use elbowroom::execute::{
     Embedded, Execution, Rehearse, Replanning, Rollouts, SharedRehearse, WholeRegion,
@@ -19,14 +21,13 @@ use elbowroom::execute::{
 use elbowroom::flow;
 use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom_execution::run::{RunSettings, Verdict};
-use elbowroom_execution::{
-    Decided, Executor, Mission, Moment, Need, Outlook, PlanAnswer, Planned, Planner, Reason, StepId,
-};
+use elbowroom_execution::{Outlook, PlanAnswer, Planner};
 use elbowroom_laboratory::timed::{Policy, Settings};
 use elbowroom_model::{Situation, Task};
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_probability::Likelihoods;
 use elbowroom_sim::WorldModel;
+use timed::{Timed, Times, milliseconds};
 
 const RUNS: u64 = 200;
 
@@ -86,7 +87,7 @@ fn rehearsed(name: &str, folder: &str, world: &str) {
     let PlanAnswer::Plan(plan) = Embedded::default().plan(&task, &beginning).answer else {
         panic!("{name} has a plan");
     };
-    let (times, mut reached) = (Arc::new(Mutex::new(Vec::new())), 0);
+    let (times, mut reached) = (Times::default(), 0);
     for seed in 0..REHEARSED_RUNS {
         let embedded = Embedded::default();
         let rollouts = Rollouts {
@@ -105,7 +106,8 @@ fn rehearsed(name: &str, folder: &str, world: &str) {
                 rehearsal: Some(Box::new(rehearse.clone())),
                 ..Means::from(Box::new(WholeRegion))
             }),
-            times: Arc::clone(&times),
+            times: times.clone(),
+            counts: |_| true,
         };
         let execution = Execution::of(&task).decided_by(clocked);
         let execution = execution.beginning_with(plan.clone());
@@ -113,19 +115,10 @@ fn rehearsed(name: &str, folder: &str, world: &str) {
         let report = execution.run_in(&mut *world.world(&task, seed));
         reached += u64::from(report.verdict == Verdict::GoalReached);
     }
-    let (decisions, [median, p99, worst]) = summary(&times);
+    let (decisions, [median, p99, worst]) = times.summary();
     println!(
         "| `{name}` | `policy` | none | {median} | {p99} | {worst} | {decisions} | {reached} of {REHEARSED_RUNS} | |"
     );
-}
-
-/// How many decisions there were; the median of the times that they took, the 99th percentile, and
-/// the longest.
-fn summary(times: &Mutex<Vec<Duration>>) -> (usize, [String; 3]) {
-    let mut times = std::mem::take(&mut *times.lock().expect("no thread has panicked"));
-    times.sort_unstable();
-    let at = |share: usize| milliseconds(times[(times.len() - 1) * share / 100]);
-    (times.len(), [50, 99, 100].map(at))
 }
 
 fn rows(name: &str) {
@@ -143,7 +136,7 @@ fn rows(name: &str) {
         panic!("{name} has a plan");
     };
     for executor in ["policy", "live"] {
-        let times = Arc::new(Mutex::new(Vec::new()));
+        let times = Times::default();
         let mut reached = 0;
         for seed in 0..RUNS {
             let spec: ExecutorSpec = executor.parse().expect("a known executor");
@@ -157,14 +150,15 @@ fn rows(name: &str) {
                     outlook: spec.asks_outlook().then(|| Arc::clone(&policy)),
                     rehearsal: None,
                 }),
-                times: Arc::clone(&times),
+                times: times.clone(),
+                counts: |_| true,
             };
             let execution = Execution::of(&task).decided_by(clocked);
             let execution = execution.beginning_with(plan.clone());
             let report = execution.run_in(&mut *world.world(&task, seed));
             reached += u64::from(report.verdict == Verdict::GoalReached);
         }
-        let (decisions, [median, p99, worst]) = summary(&times);
+        let (decisions, [median, p99, worst]) = times.summary();
         let table = match executor {
             "policy" => milliseconds(made),
             _ => String::new(),
@@ -172,40 +166,5 @@ fn rows(name: &str) {
         println!(
             "| `{name}` | `{executor}` | {table} | {median} | {p99} | {worst} | {decisions} | {reached} of {RUNS} | {lower:.4} to {upper:.4} |"
         );
-    }
-}
-
-fn milliseconds(time: Duration) -> String {
-    format!("{:.3} ms", time.as_secs_f64() * 1000.0)
-}
-
-/// An executor whose decisions are timed.
-struct Timed {
-    inner: Box<dyn Executor>,
-    times: Arc<Mutex<Vec<Duration>>>,
-}
-
-impl Executor for Timed {
-    fn need(&self) -> Need {
-        self.inner.need()
-    }
-
-    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
-        self.inner.adopt(mission)
-    }
-
-    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
-        let begin = Instant::now();
-        let decided = self.inner.decide(moment);
-        let took = begin.elapsed();
-        self.times
-            .lock()
-            .expect("no thread has panicked")
-            .push(took);
-        decided
-    }
-
-    fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
-        self.inner.window(step, is_end)
     }
 }

@@ -92,7 +92,7 @@ impl Executor for Live {
             reads_more_than_facts,
             durations_move_numbers: reads_more_than_facts && plan.durations_move_numbers(),
             limits: BTreeMap::new(),
-            inside: Inside::of(mission.envelope.clone()),
+            inside: Inside::default(),
             in_constraints: in_constraints(plan),
             values: plan.nominal(),
             durations: duration_parameters(plan)
@@ -189,13 +189,22 @@ impl Rest {
         if self.is_covered(moment.now, region) {
             return None;
         }
-        // Only ends and amounts can move the rest out of what is known of it.
-        if let Some(step) = moment.news.iter().find_map(may_matter)
-            && let Some(reason) = self.ask(step.instance(), moment.now, region)
+        // Only ends and amounts can move the rest out of what is known of it; and what begins while something takes
+        // longer than that needs the room that is left.
+        let is_beyond = self.is_beyond(moment.now);
+        let mut instances = moment
+            .news
+            .iter()
+            .filter_map(|news| match may_matter(news) {
+                Some(step) => Some(step.instance()),
+                None => instance_of(news).filter(|_| is_beyond),
+            });
+        if let Some(instance) = instances.next()
+            && let Some(reason) = self.ask(instance, moment.now, region)
         {
             return Some(reason);
         }
-        if region.is_asked_inside() {
+        if region.is_asked_inside() || !self.is_known() {
             self.find_limits(moment.now, region);
         }
         None

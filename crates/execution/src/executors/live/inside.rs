@@ -19,9 +19,9 @@ use crate::reason::{Promise, Reason};
 /// The box within which the rest of the plan is known to work, and what was observed, held against it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inside {
-    /// The plan's envelope, and once something has left it the box that was found for the rest then.
-    known: Option<DecoupledEnvelope>,
-    /// Whether something was observed since that this box does not hold, or of which it does not say anything.
+    /// What was found for the rest once something had left the plan's envelope, which it is otherwise.
+    found: Option<DecoupledEnvelope>,
+    /// Whether something was observed since that the box does not hold, or of which it does not say anything.
     has_left: bool,
     /// The amounts that were observed since.
     amounts: BTreeSet<ParameterId>,
@@ -32,14 +32,6 @@ pub(super) struct Inside {
 }
 
 impl Inside {
-    /// Nothing has been observed yet.
-    pub(super) fn of(known: Option<DecoupledEnvelope>) -> Self {
-        Self {
-            known,
-            ..Self::default()
-        }
-    }
-
     /// Something was observed that the box does not hold.
     pub(super) fn leave(&mut self) {
         self.has_left = true;
@@ -73,9 +65,23 @@ impl Rest {
         }
     }
 
+    /// The box in which the rest of the plan is known to work, if there is one.
+    fn known(&self) -> Option<&DecoupledEnvelope> {
+        let found = self.inside.found.as_ref();
+        found.or(self.mission.envelope.as_ref())
+    }
+
+    /// Whether there is a box in which the rest of the plan is known to work.
+    pub(super) fn is_known(&self) -> bool {
+        self.known().is_some()
+    }
+
     /// From now on this box is what the rest of the plan is known to work in.
-    pub(super) fn enter(&mut self, known: DecoupledEnvelope) {
-        self.inside = Inside::of(Some(known));
+    pub(super) fn enter(&mut self, found: DecoupledEnvelope) {
+        self.inside = Inside {
+            found: Some(found),
+            ..Inside::default()
+        };
         self.limits.clear();
         self.await_running();
     }
@@ -101,8 +107,7 @@ impl Rest {
         let Some(&parameter) = self.durations.get(&instance) else {
             return;
         };
-        let known = self.inside.known.as_ref();
-        let interval = known.map(|known| known.interval(parameter));
+        let interval = self.known().map(|known| known.interval(parameter));
         // What ends just before an open end is as good as what ends there: neither is let be over it.
         let most = interval.and_then(|interval| match &interval.upper {
             End::Closed(most) | End::Open(most) => Some(most),
@@ -110,7 +115,8 @@ impl Rest {
         });
         let due = most.map(|most| start + most);
         if let Some(duration) = duration {
-            self.inside.has_left |= interval.is_none_or(|interval| !interval.contains(&duration));
+            let is_held = interval.is_some_and(|interval| interval.contains(&duration));
+            self.inside.has_left |= !is_held;
             self.inside.set_due(instance, None);
             self.values[parameter] = duration;
         } else {
@@ -121,8 +127,8 @@ impl Rest {
 
     /// An amount was measured that says the value of one parameter.
     pub(super) fn observe_amount(&mut self, parameter: ParameterId, value: &Rational) {
-        let envelope = self.mission.envelope.as_ref();
-        let is_held = envelope.is_some_and(|envelope| envelope.interval(parameter).contains(value));
+        let interval = self.known().map(|known| known.interval(parameter));
+        let is_held = interval.is_some_and(|interval| interval.contains(value));
         let is_new = self.inside.amounts.insert(parameter);
         // No value of a parameter stands for two amounts that differ.
         self.inside.has_left |= !is_held || !is_new && self.values[parameter] != *value;
@@ -169,51 +175,68 @@ impl Rest {
         self.inside.has_left |= network.is_err();
     }
 
-    /// Whether the rest of the plan works without asking, whatever is under way ends by now or as long after as the
-    /// envelope has it: all that was observed lies within the envelope, and the network has a schedule with it, since
-    /// it keeps to its windows with all values of the envelope.
+    /// Whether the rest of the plan works without asking, as long as what is under way ends within the box: all that was
+    /// observed lies within it, and there is a schedule for the rest, because what is dispatched keeps to its constraints
+    /// whatever the durations are for which it was made ready, and trusts in luck for none.
     pub(super) fn is_covered(&self, now: &Rational, region: &dyn Region) -> bool {
         let local = self.dispatch.local(now);
         let mut due = self.inside.due_by(&local);
         !region.is_asked_inside()
-            && self.inside.known.is_some()
+            && self.is_known()
             && self.promise != Promise::Luck
             && !self.inside.has_left
             && due.all(|(time, _)| *time == local)
     }
 
-    /// Where an action has taken as long as the box has it, finds out how much longer they may take. Why the rest
-    /// does not work, if it does not.
+    /// Whether something under way has taken longer than the box has it.
+    pub(super) fn is_beyond(&self, now: &Rational) -> bool {
+        let local = self.dispatch.local(now);
+        let first = self.inside.due.first();
+        first.is_some_and(|(time, _)| *time < local)
+    }
+
+    /// Where actions have taken as long as the box has it: asks about the rest as it is now, and finds out how long those
+    /// may still take to which the new box gives no more room. Why the rest does not work, if it does not.
     pub(super) fn come_to_limits(
         &mut self,
         now: &Rational,
         region: &mut dyn Region,
     ) -> Option<Box<Reason>> {
-        if !self.durations_move_numbers {
-            return None;
+        let (time, instance) = self.first_due(now)?;
+        let then = self.dispatch.world(&time);
+        let was_covered = self.is_covered(&then, region);
+        if then < *now || !was_covered {
+            let reason = self.ask(instance, now, region);
+            if was_covered && reason.is_some() {
+                // It worked then: there is a limit between.
+                self.find_limit(instance, &then, region);
+                return reason.filter(|_| self.outlived(now).is_none());
+            }
+            if reason.is_some() {
+                return reason;
+            }
         }
-        let local = self.dispatch.local(now);
-        let (time, instance) = {
-            let mut due = self.inside.due_by(&local);
-            due.find(|(_, id)| !self.limits.contains_key(id))?.clone()
-        };
-        let at = self.dispatch.world(&time);
-        if self.is_covered(&at, region) {
-            // Then it was still known to work.
-            self.find_limit(instance, &at, region);
-            return None;
+        while let Some((_, instance)) = self.first_due(now) {
+            self.find_limit(instance, now, region);
         }
-        self.ask(instance, now, region)
+        None
     }
 
-    /// When the first action under way will have taken as long as the envelope has it, on the plan's clock, of those of
-    /// which no more is known.
-    pub(super) fn first_due(&self) -> Option<&Rational> {
+    /// The first action under way that will have taken as long as the box has it by then, and when, on the plan's clock,
+    /// of those of which no more is known.
+    fn first_due(&self, by: &Rational) -> Option<(Rational, InstanceId)> {
+        let local = self.dispatch.local(by);
+        let due = self.next_due()?;
+        (due.0 <= local).then(|| due.clone())
+    }
+
+    /// When the first action under way will have taken as long as the box has it, on the plan's clock, of those of which
+    /// no more is known.
+    pub(super) fn next_due(&self) -> Option<&(Rational, InstanceId)> {
         if !self.durations_move_numbers {
             return None;
         }
         let mut due = self.inside.due.iter();
-        let unknown = due.find(|(_, instance)| !self.limits.contains_key(instance));
-        unknown.map(|(time, _)| time)
+        due.find(|(_, instance)| !self.limits.contains_key(instance))
     }
 }

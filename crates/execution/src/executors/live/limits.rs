@@ -89,8 +89,8 @@ impl Rest {
             let time = self.limit_of(*instance, limit.as_ref()?)?;
             Some(self.dispatch.world(&time) + self.mission.task.epsilon())
         });
-        let first_due = self.first_due();
-        let due = first_due.map(|time| self.dispatch.world(time) + self.mission.task.epsilon());
+        let next_due = self.next_due();
+        let due = next_due.map(|(time, _)| self.dispatch.world(time) + self.mission.task.epsilon());
         let until = times.chain(due).chain(until.clone()).min();
         Decided {
             decision: Decision::Wait { until },
