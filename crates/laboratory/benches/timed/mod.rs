@@ -1,0 +1,60 @@
+//! An executor whose decisions are timed: [`Timed`].
+
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use elbowroom_execution::{Decided, Executor, Mission, Moment, Need, Planned, Reason, StepId};
+
+/// How long decisions took.
+#[derive(Clone, Default)]
+pub(crate) struct Times(Arc<Mutex<Vec<Duration>>>);
+
+impl Times {
+    /// How many decisions there were; the median of the times that they took, the 99th percentile, and
+    /// the longest.
+    pub(crate) fn summary(&self) -> (usize, [String; 3]) {
+        let mut times = self.0.lock().expect("no thread has panicked").clone();
+        times.sort_unstable();
+        let at = |share: usize| {
+            let time = times.get(times.len().saturating_sub(1) * share / 100);
+            time.map_or_else(String::new, |time| milliseconds(*time))
+        };
+        (times.len(), [50, 99, 100].map(at))
+    }
+}
+
+/// An executor whose decisions are timed, those at moments that count.
+pub(crate) struct Timed {
+    pub(crate) inner: Box<dyn Executor>,
+    pub(crate) times: Times,
+    pub(crate) counts: fn(&Moment<'_>) -> bool,
+}
+
+impl Executor for Timed {
+    fn need(&self) -> Need {
+        self.inner.need()
+    }
+
+    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+        self.inner.adopt(mission)
+    }
+
+    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        let begin = Instant::now();
+        let decided = self.inner.decide(moment);
+        let took = begin.elapsed();
+        if (self.counts)(moment) {
+            let mut times = self.times.0.lock().expect("no thread has panicked");
+            times.push(took);
+        }
+        decided
+    }
+
+    fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
+        self.inner.window(step, is_end)
+    }
+}
+
+pub(crate) fn milliseconds(time: Duration) -> String {
+    format!("{:.3} ms", time.as_secs_f64() * 1000.0)
+}
