@@ -107,7 +107,6 @@ fn rehearsed(name: &str, folder: &str, world: &str) {
                 ..Means::from(Box::new(WholeRegion))
             }),
             times: times.clone(),
-            counts: |_| true,
         };
         let execution = Execution::of(&task).decided_by(clocked);
         let execution = execution.beginning_with(plan.clone());
@@ -151,7 +150,6 @@ fn rows(name: &str) {
                     rehearsal: None,
                 }),
                 times: times.clone(),
-                counts: |_| true,
             };
             let execution = Execution::of(&task).decided_by(clocked);
             let execution = execution.beginning_with(plan.clone());

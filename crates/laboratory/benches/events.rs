@@ -1,5 +1,5 @@
-//! How long the decisions of `guarded` and `live` take on a plan from files: median, 99th percentile and worst of those
-//! that follow when an action ends, in one run. Making plans ready is not among them.
+//! How long the decisions of `guarded` and `live` take on a plan from files: median, 99th percentile and worst of all
+//! decisions of one run. Making plans ready is not among them.
 //!
 //! ```text
 //! cargo bench -p elbowroom-laboratory --bench events -- DOMAIN PROBLEM PLAN [WORLD] [EXECUTOR…]
@@ -17,7 +17,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::execute::{Execution, WholeRegion};
-use elbowroom_execution::News;
 use elbowroom_execution::executors::{ExecutorSpec, Means};
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_plan, read_problem};
@@ -67,10 +66,6 @@ fn main() {
         let decider = Timed {
             inner: spec.build(Means::from(Box::new(WholeRegion))),
             times: times.clone(),
-            counts: |moment| {
-                let is_end = |news: &News| matches!(news, News::Ended { .. });
-                moment.news.iter().any(is_end)
-            },
         };
         let execution = Execution::of(&task).beginning_with(plan.clone()).by(spec);
         let mut world = SimWorld::new(Arc::clone(&task), &model, 1);
