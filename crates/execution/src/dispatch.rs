@@ -7,11 +7,13 @@
 
 mod explain;
 mod news;
+mod overrun;
 mod progress;
 mod projection;
 mod retry;
 mod watch;
 
+pub(crate) use overrun::Overdue;
 pub(crate) use watch::{in_words, replan, unmet};
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,6 +31,7 @@ use elbowroom_stn::{ConsistentNetwork, Network};
 use crate::executor::{Mission, Planned, StepId};
 use crate::horizon::{Horizon, NetworkLimit, grounds};
 use crate::reason::{About, Behind, Cause, Reason};
+use overrun::Strain;
 use progress::Progress;
 use retry::Retry;
 
@@ -97,6 +100,8 @@ pub(crate) struct Dispatch {
     resumed: BTreeSet<InstanceId>,
     /// Starts that have failed and are to be tried again.
     retries: BTreeMap<NodeId, Retry>,
+    /// What has happened outside the network's bounds since it was last known to work.
+    strain: Strain,
 }
 
 impl Dispatch {
@@ -229,6 +234,7 @@ impl Dispatch {
         }
         self.horizon = horizon;
         self.sources = sources;
+        self.strain = Strain::default();
         let bounds = |constraint: &Constraint| bounds_of(reading(constraint));
         self.durations = durations(&self.plan, &bounds);
         Ok(())
@@ -268,6 +274,7 @@ impl Dispatch {
             timed,
             resumed: mission.running.keys().map(|step| step.instance()).collect(),
             retries: BTreeMap::new(),
+            strain: Strain::default(),
         };
         dispatch.begin(&mission.running);
         dispatch

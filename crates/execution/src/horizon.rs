@@ -47,6 +47,9 @@ pub(crate) struct Missed {
     pub(crate) end: WindowEnd,
     /// The amount by which it is missed.
     pub(crate) by: Rational,
+    /// Whether it is outside nothing but the bounds of the link that ends there, so that the rest may work all the
+    /// same.
+    pub(crate) is_only_link: bool,
 }
 
 impl Horizon {
@@ -108,6 +111,7 @@ impl Horizon {
             Self::Whole(windows) => windows.fix(node, time).map_err(|out| Missed {
                 end: out.end,
                 by: out.by,
+                is_only_link: false,
             }),
             Self::OneHop(one_hop) => {
                 let (earliest, latest) = one_hop.window(node);
@@ -116,12 +120,14 @@ impl Horizon {
                     return Err(Missed {
                         end: WindowEnd::Earliest,
                         by: earliest - time,
+                        is_only_link: false,
                     });
                 }
                 if let Some(latest) = latest.filter(|latest| time > latest) {
                     return Err(Missed {
                         end: WindowEnd::Latest,
                         by: time - latest,
+                        is_only_link: false,
                     });
                 }
                 Ok(())
@@ -130,7 +136,33 @@ impl Horizon {
                 dispatcher.happen(node, time).map_err(|missed| Missed {
                     end: missed.end,
                     by: missed.by,
+                    is_only_link: missed.is_only_link,
                 })
+            }
+        }
+    }
+
+    /// Whether all goes on to work after a time point has happened outside the bounds of its link, and nothing else.
+    pub(crate) fn bears(&self, node: NodeId, now: &Rational) -> bool {
+        match self {
+            Self::Whole(_) | Self::OneHop(_) => false,
+            Self::Dispatchable(dispatcher) => dispatcher.bears(node, now),
+        }
+    }
+
+    /// Takes the link under way that ends at a time point for one that ends by `until`, or at any time. Whether the
+    /// executor is still sure to satisfy everything.
+    pub(crate) fn prolong(
+        &mut self,
+        end: NodeId,
+        until: Option<&Rational>,
+        now: &Rational,
+    ) -> bool {
+        match self {
+            Self::Whole(_) | Self::OneHop(_) => false,
+            Self::Dispatchable(dispatcher) => {
+                let link = dispatcher.form().network().ending_at(end);
+                link.is_some_and(|link| dispatcher.prolong(link, until, now))
             }
         }
     }

@@ -71,6 +71,7 @@ impl Dispatch {
             self.progress.running.insert(id);
         }
         let missed = fixed.err()?;
+        self.strain.missed(start, &missed);
         let name = self.action(id).name.clone();
         let mut reason = Reason::new(Cause::Unreachable).about(About::Start(name.clone()));
         reason.action = Some(name);
@@ -104,7 +105,9 @@ impl Dispatch {
             && let Horizon::Dispatchable(_) = self.horizon
         {
             // Nobody has said when it began, but it was told to.
-            let _ = self.horizon.fix(network_node(start), &told);
+            if let Err(missed) = self.horizon.fix(network_node(start), &told) {
+                self.strain.missed(start, &missed);
+            }
             self.progress.happen(&self.plan, start, &told);
         }
         let is_own = |end| self.is_limited_by_duration(id, end);
@@ -113,6 +116,7 @@ impl Dispatch {
         self.progress.happen(&self.plan, end, &local);
         self.finish(id);
         let missed = fixed.err()?;
+        self.strain.missed(end, &missed);
         let duration = self.happened(start).map(|start| &local - start);
         let is_own = match missed.end {
             WindowEnd::Earliest => is_own_lower,

@@ -37,6 +37,8 @@ struct Guard {
     /// The box that dispatching keeps: smaller than the envelope, if that requires knowing values
     /// in advance.
     promise: Promise,
+    /// Whether the plan needs more than facts, one by one.
+    reads_more_than_facts: bool,
     /// The weakest promise with which it goes on.
     least: Promise,
     /// The values observed, and the nominal ones of the rest.
@@ -67,6 +69,7 @@ impl Executor for Guarded {
                 _ => Promise::Luck,
             },
             values: mission.plan.nominal(),
+            reads_more_than_facts: mission.plan.reads_more_than_facts(&mission.task),
             mission: mission.clone(),
             envelope,
         });
@@ -155,6 +158,9 @@ impl Guard {
             mission: &self.mission,
             values: &self.values,
             is_inside: was_whole,
+            reads_more_than_facts: self.reads_more_than_facts,
+            promise: self.promise,
+            has_other_constraints: false,
         };
         match promise::weaken(&mut self.dispatch, &rest, now, reason.clone()) {
             Ok(promise) if promise <= self.least => {

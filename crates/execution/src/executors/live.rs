@@ -125,7 +125,7 @@ impl Executor for Live {
             return replan(reason);
         }
         if let Some(reason) = rest.dispatch.overdue(moment)
-            && let Err(reason) = rest.weaken(moment.now, reason)
+            && let Err(reason) = rest.weaken(moment.now, reason, false)
         {
             return replan(*reason);
         }
@@ -153,12 +153,20 @@ impl Executor for Live {
 }
 
 impl Rest {
-    /// Something was not as promised: makes the most of what is left.
-    fn weaken(&mut self, now: &Rational, reason: Reason) -> Result<(), Box<Reason>> {
+    /// Something was not as promised, or other times follow from what was observed: makes the most of what is left.
+    fn weaken(
+        &mut self,
+        now: &Rational,
+        reason: Reason,
+        moves_times: bool,
+    ) -> Result<(), Box<Reason>> {
         let rest = promise::Rest {
             mission: &self.mission,
             values: &self.values,
             is_inside: false,
+            reads_more_than_facts: self.reads_more_than_facts,
+            promise: self.promise,
+            has_other_constraints: moves_times,
         };
         let weaker = promise::weaken(&mut self.dispatch, &rest, now, reason)?;
         self.promise = self.promise.max(weaker);
@@ -174,12 +182,12 @@ impl Rest {
             if !promise::is_about_time(&reason) {
                 return Some(reason);
             }
-            if let Err(reason) = self.weaken(moment.now, *reason) {
+            if let Err(reason) = self.weaken(moment.now, *reason, moves_times) {
                 return Some(reason);
             }
         } else if moves_times {
             let reason = Reason::new(Cause::GuaranteeLost).about(About::TooLittleTime);
-            if let Err(reason) = self.weaken(moment.now, reason.since(moment.now.clone())) {
+            if let Err(reason) = self.weaken(moment.now, reason.since(moment.now.clone()), true) {
                 return Some(reason);
             }
         }

@@ -6,8 +6,9 @@ use elbowroom_plan::{
     Bound, Constraint, InstanceId, ParameterId, ParameterKind, ParametrizedPlan, Valuation,
 };
 
-use crate::dispatch::Dispatch;
+use crate::dispatch::{Dispatch, Overdue};
 use crate::executor::{Mission, StepId};
+use crate::quantities::duration_parameters;
 use crate::reason::{About, Cause, Promise, Reason};
 
 /// How much of the room around what is planned is tried, in halves of the share before.
@@ -65,6 +66,12 @@ pub(super) struct Rest<'a> {
     /// Whether nothing has left the envelope, what is under way included: what numbers bear is known
     /// of all of it then.
     pub(super) is_inside: bool,
+    /// Whether the plan needs more than facts, one by one.
+    pub(super) reads_more_than_facts: bool,
+    /// What was promised of it before.
+    pub(super) promise: Promise,
+    /// Whether its constraints are not what they were, with what was observed.
+    pub(super) has_other_constraints: bool,
 }
 
 /// Something was not as promised: makes the most of what is left.
@@ -81,8 +88,20 @@ pub(super) fn weaken(
         mission,
         values,
         is_inside,
+        reads_more_than_facts,
+        promise: before,
+        has_other_constraints,
     } = *rest;
     let local = dispatch.local(now);
+    // What numbers bear is known only where nothing has left the envelope.
+    let is_unknown = !is_inside && reads_more_than_facts;
+    if !has_other_constraints && dispatch.bear(&local, &|overdue| ends(rest, overdue, &local)) {
+        return Ok(if is_unknown {
+            before.max(Promise::Planned)
+        } else {
+            before
+        });
+    }
     let elapsed: Vec<Option<Rational>> = (0..dispatch.plan().instances.len())
         .map(|index| {
             let [start, end] = dispatch.nodes_of(InstanceId::from(index));
@@ -105,8 +124,6 @@ pub(super) fn weaken(
             .rebound(&local, &reading)
             .map_err(|against| behind = against)
     };
-    // What numbers bear is known only where nothing has left the envelope.
-    let is_unknown = !is_inside && mission.plan.reads_more_than_facts(&mission.task);
     if let Ok(((), promise)) = most(is_unknown, !is_unknown, &mut attempt) {
         return Ok(promise);
     }
@@ -121,6 +138,30 @@ pub(super) fn weaken(
     lost.about = Some(About::TooLittleTime);
     lost.behind = behind;
     Err(Box::new(lost.since(now.clone())))
+}
+
+/// When an action that is overdue may end, on the plan's clock, the most that is asked for first.
+fn ends(rest: &Rest<'_>, overdue: &Overdue, now: &Rational) -> Vec<Option<Rational>> {
+    let plan = &rest.mission.plan;
+    if rest.is_inside
+        && let Some(envelope) = &rest.mission.envelope
+    {
+        // It may be where it has had its share, and is still inside.
+        let mut durations = duration_parameters(plan);
+        let own = durations.find(|(_, instance)| *instance == overdue.instance);
+        let upper = own.and_then(|(parameter, _)| envelope.interval(parameter).upper.value());
+        if let Some(end) = upper.map(|upper| &overdue.begun + upper)
+            && end >= *now
+        {
+            return vec![Some(end)];
+        }
+    }
+    vec![None, Some(now + quarter(rest.mission, &overdue.planned))]
+}
+
+/// How much longer an action is taken to go on that is overdue.
+fn quarter(mission: &Mission, planned: &Rational) -> Rational {
+    (planned / Rational::from(4)).max(mission.task.epsilon().clone())
 }
 
 /// The first attempt to succeed, with what it promises. What numbers bear is known of all of the
@@ -205,9 +246,7 @@ impl Room<'_> {
             _ if has_room => Reading::Contingent { lower, upper },
             Overrun::ForEver => Reading::Contingent { lower, upper: None },
             Overrun::Quarter => {
-                let planned = &plan.parameter(parameter).nominal;
-                let quarter =
-                    (planned / Rational::from(4)).max(self.mission.task.epsilon().clone());
+                let quarter = quarter(self.mission, &plan.parameter(parameter).nominal);
                 Reading::Contingent {
                     lower,
                     upper: Some(elapsed + quarter),

@@ -22,7 +22,7 @@ pub struct Dispatchable<W> {
     entering: Vec<Vec<EdgeId>>,
     /// For each node, the waits that begin when it happens.
     waits_at: Vec<Vec<Wait<W>>>,
-    /// For each node, those that have to have happened before.
+    /// For each node, those that have to have happened before. Where the world decides, nobody sees to it.
     before: Vec<Vec<NodeId>>,
     /// For each node, those that may not be later although they may fall together with it, and
     /// that no other edge holds to that; and the edge that says so.
@@ -71,7 +71,7 @@ impl<W: Weight> Dispatchable<W> {
                 Kind::Plain if edge.bound.infinite == 0 && from != to => {
                     form.leaving[from.index()].push(id);
                     form.entering[to.index()].push(id);
-                    if edge.bound.is_negative() && !form.network.is_contingent(from) {
+                    if edge.bound.is_negative() {
                         form.before[from.index()].push(to);
                     }
                     // A link that takes no time at all: its end is as late as its activation.
@@ -80,7 +80,7 @@ impl<W: Weight> Dispatchable<W> {
                         form.not_after[from.index()].push((to, id));
                     }
                 }
-                Kind::Upper(link) if !form.network.is_contingent(from) => {
+                Kind::Upper(link) if form.network.ending_at(from) != Some(link) => {
                     form.before[from.index()].push(to);
                     form.waits_at[to.index()].push(Wait {
                         node: from,
@@ -178,12 +178,13 @@ impl<W: Weight> Dispatchable<W> {
             })
     }
 
-    /// All waits, by the node that activates their link.
+    /// All waits of nodes that the executor chooses, by the node that activates their link.
     pub fn waits(&self) -> impl Iterator<Item = (NodeId, &Wait<W>)> {
         let nodes = self.network.requirements.nodes();
         nodes.flat_map(|node| {
             self.waits_at[node.index()]
                 .iter()
+                .filter(|wait| !self.network.is_contingent(wait.node))
                 .map(move |wait| (node, wait))
         })
     }
@@ -202,11 +203,13 @@ impl<W: Weight> Dispatchable<W> {
         })
     }
 
+    /// The waits that begin when a node happens, also of nodes that the world decides on.
     pub(super) fn waits_at(&self, node: NodeId) -> &[Wait<W>] {
         &self.waits_at[node.index()]
     }
 
-    /// Those that have to have happened before a node that the executor chooses.
+    /// Those that have to have happened before a node. Where the world decides when it happens, it keeps to that as long as
+    /// it keeps to the bounds of its links.
     pub fn before(&self, node: NodeId) -> &[NodeId] {
         &self.before[node.index()]
     }

@@ -1,6 +1,8 @@
 //! Executing a dispatchable network.
 
-use std::collections::BTreeSet;
+mod beyond;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_num::Rational;
@@ -29,12 +31,15 @@ pub struct Dispatcher<W = Rational> {
     /// For each node that has not happened, its window, as far as events have shown it, and the
     /// edge that each end comes by.
     windows: Vec<[Option<(W, EdgeId)>; 2]>,
-    /// For each node, its waits that are on.
+    /// For each node, its waits that are on. Those of nodes that the world decides on say when it has to be, and nobody
+    /// sees to them.
     waits: Vec<Vec<ActiveWait<W>>>,
     /// For each link, the nodes with a wait for its end.
     waiting_for: Vec<Vec<NodeId>>,
     /// Nodes that the executor chooses and that have all behind them that must come before.
     ready: BTreeSet<NodeId>,
+    /// Links under way that may end later than their upper bound says: by when, `None` if there is no such time.
+    prolonged: BTreeMap<LinkId, Option<W>>,
 }
 
 #[derive(Clone, Debug)]
@@ -58,6 +63,9 @@ pub struct Missed<W = Rational> {
     pub by: W,
     /// The path behind that end, from the event that it counts from.
     pub behind: Vec<Step<W>>,
+    /// Whether the time is outside nothing but the bounds of the link that ends there: whatever else is known of the
+    /// node permits it. What comes after may then still work: see [`Dispatcher::bears`].
+    pub is_only_link: bool,
 }
 
 impl<W: Weight> Dispatcher<W> {
@@ -87,6 +95,7 @@ impl<W: Weight> Dispatcher<W> {
             waits: vec![Vec::new(); count],
             waiting_for: vec![Vec::new(); form.network().links().len()],
             ready,
+            prolonged: BTreeMap::new(),
             form,
         }
     }
@@ -130,7 +139,7 @@ impl<W: Weight> Dispatcher<W> {
         let mut earliest = self.windows[node.index()][WindowEnd::Earliest as usize]
             .as_ref()
             .map(|(time, _)| time);
-        for wait in &self.waits[node.index()] {
+        for wait in self.own_waits(node) {
             let until = wait.until.as_ref().ok_or(wait.link)?;
             if earliest.is_none_or(|known| until > known) {
                 earliest = Some(until);
@@ -141,10 +150,18 @@ impl<W: Weight> Dispatcher<W> {
 
     /// The link whose end a node waits for longest at present.
     pub fn waits_for(&self, node: NodeId) -> Option<LinkId> {
-        let waits = self.waits[node.index()].iter();
+        let waits = self.own_waits(node).iter();
         waits
             .max_by_key(|wait| (wait.until.is_none(), wait.until.clone()))
             .map(|wait| wait.link)
+    }
+
+    /// The waits of a node that the executor sees to.
+    fn own_waits(&self, node: NodeId) -> &[ActiveWait<W>] {
+        if self.form.network().is_contingent(node) {
+            return &[];
+        }
+        &self.waits[node.index()]
     }
 
     /// The path that keeps a node from happening earlier, or later: from the event that it counts
@@ -153,7 +170,7 @@ impl<W: Weight> Dispatcher<W> {
         let window = &self.windows[node.index()][end as usize];
         let mut last = window.as_ref().map(|(time, edge)| (time, *edge));
         if end == WindowEnd::Earliest {
-            for wait in &self.waits[node.index()] {
+            for wait in self.own_waits(node) {
                 let is_later = match (&wait.until, &last) {
                     (Some(until), Some((time, _))) => until > *time,
                     _ => true,
@@ -207,6 +224,7 @@ impl<W: Weight> Dispatcher<W> {
             }
         }
         if let Some(link) = form.network().ending_at(node) {
+            self.prolonged.remove(&link);
             for waiting in std::mem::take(&mut self.waiting_for[link.index()]) {
                 self.waits[waiting.index()].retain(|wait| wait.link != link);
             }
@@ -245,6 +263,7 @@ impl<W: Weight> Dispatcher<W> {
             limit: limit.clone(),
             by,
             behind: self.behind(node, end),
+            is_only_link: self.permits(node, time),
         };
         if let Some(earliest) = earliest.filter(|earliest| time < earliest) {
             return Some(missed(WindowEnd::Earliest, &earliest, earliest.minus(time)));
@@ -257,11 +276,11 @@ impl<W: Weight> Dispatcher<W> {
     pub fn bounds(&self, node: NodeId) -> (Option<W>, Option<W>) {
         let (earliest, latest) = self.window(node);
         let (mut earliest, mut latest) = (earliest.cloned(), latest.cloned());
-        if let Some(link) = self.form.network().ending_at(node) {
-            let link = self.form.network().link(link);
+        if let Some(id) = self.form.network().ending_at(node) {
+            let link = self.form.network().link(id);
             if let Some(begun) = self.happened(link.activation) {
                 let least = begun.plus(&link.lower);
-                let most = link.upper.as_ref().map(|upper| begun.plus(upper));
+                let most = self.last_end(id, begun);
                 earliest = earliest.into_iter().chain([least]).max();
                 latest = latest.into_iter().chain(most).min();
             }

@@ -1,0 +1,267 @@
+//! What a dispatcher says of the rest when links take longer, or less time, than their bounds say, against a check of
+//! the whole rest from scratch.
+
+#![allow(
+    clippy::unwrap_used,
+    dead_code,
+    reason = "the helpers of a test are part of it, and the game has some for other tests"
+)]
+
+mod game;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_stn::uncertain::{ContingentLink, Dispatcher, LinkId, UncertainNetwork};
+use elbowroom_stn::{Constraint, Network, NodeId};
+use game::{Board, Random, rows};
+
+/// As many as the variable says, to try more by hand.
+fn many(default: u64) -> u64 {
+    std::env::var("ELBOWROOM_NETWORKS")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(default)
+}
+
+/// A network under way in a world that does not keep to the bounds of its links.
+struct Run {
+    network: UncertainNetwork<i64>,
+    dispatcher: Dispatcher<i64>,
+    now: i64,
+    /// Links that may last until another time than their bounds say.
+    prolonged: BTreeMap<LinkId, Option<i64>>,
+}
+
+/// How often the rest worked and did not work, after an end outside its bounds and for an end that is overdue.
+#[derive(Debug, Default)]
+struct Counts {
+    ended: [usize; 2],
+    overdue: [usize; 2],
+    /// What only a check from scratch finds to work.
+    late: usize,
+    finished: usize,
+}
+
+impl Run {
+    /// Whether an executor can be sure of the rest, by a check from scratch.
+    fn is_sure(&self) -> bool {
+        let happened = |node: NodeId| self.dispatcher.happened(node).copied();
+        let requirements = self.network.requirements();
+        let mut rest = Network::with_nodes(requirements.node_count());
+        for constraint in requirements.constraints() {
+            match (happened(constraint.from), happened(constraint.to)) {
+                (Some(from), Some(to)) if to - from > constraint.bound => return false,
+                (Some(_), Some(_)) => {}
+                _ => {
+                    rest.add(constraint.clone());
+                }
+            }
+        }
+        for node in requirements.nodes().skip(1) {
+            if let Some(time) = happened(node) {
+                rest.add(Constraint::at_least(NodeId(0), node, time));
+                rest.add(Constraint::at_most(NodeId(0), node, time));
+            } else if !self.network.is_contingent(node) {
+                rest.add(Constraint::at_least(NodeId(0), node, self.now));
+            }
+        }
+        let mut links = Vec::new();
+        for id in self.network.link_ids() {
+            let link = self.network.link(id);
+            let mut link = link.clone();
+            if happened(link.end).is_some() {
+                continue;
+            }
+            if let Some(begun) = happened(link.activation) {
+                link.lower = link.lower.max(self.now - begun);
+                if let Some(until) = self.prolonged.get(&id) {
+                    link.upper = until.map(|until| until - begun);
+                }
+            }
+            links.push(link);
+        }
+        UncertainNetwork::new(rest, links)
+            .unwrap()
+            .is_dynamically_controllable()
+    }
+
+    /// The links under way, with when they began.
+    fn active(&self) -> Vec<(LinkId, ContingentLink<i64>, i64)> {
+        let links = self.network.link_ids().filter_map(|id| {
+            let link = self.network.link(id);
+            let begun = *self.dispatcher.happened(link.activation)?;
+            let is_over = self.dispatcher.happened(link.end).is_some();
+            (!is_over).then(|| (id, link.clone(), begun))
+        });
+        links.collect()
+    }
+
+    /// Whether a time is within the bounds of a link, or what has become of them.
+    fn is_within(&self, id: LinkId, link: &ContingentLink<i64>, begun: i64) -> bool {
+        let last = match self.prolonged.get(&id) {
+            Some(until) => *until,
+            None => link.upper.map(|upper| begun + upper),
+        };
+        link.lower <= self.now - begun && last.is_none_or(|last| self.now <= last)
+    }
+
+    /// The world lets links end or not; `None` when the rest does not work any more.
+    fn world(&mut self, random: &mut Random, counts: &mut Counts, told: &str) -> Option<()> {
+        loop {
+            let mut ending = self.active();
+            ending.retain(|(id, link, begun)| {
+                let is_within = self.is_within(*id, link, *begun);
+                random.below(if is_within { 3 } else { 12 }) == 0
+            });
+            let Some((id, link, begun)) = ending.first() else {
+                return Some(());
+            };
+            let is_within = self.is_within(*id, link, *begun);
+            let missed = self.dispatcher.happen(link.end, &self.now).err();
+            self.prolonged.remove(id);
+            assert_eq!(missed.is_none(), is_within, "{told}: {missed:?}");
+            let Some(missed) = missed else {
+                continue;
+            };
+            let bears = missed.is_only_link && self.dispatcher.bears(link.end, &self.now);
+            self.compare(bears, &mut counts.ended, &mut counts.late, told)?;
+        }
+    }
+
+    /// What is overdue by now goes on for ever, or for a while.
+    fn overdue(&mut self, random: &mut Random, counts: &mut Counts, told: &str) -> Option<()> {
+        for (id, link, begun) in self.active() {
+            let is_late = link.lower <= self.now - begun && !self.is_within(id, &link, begun);
+            if !is_late {
+                continue;
+            }
+            let until = (random.below(2) == 0).then(|| self.now + random.whole(0, 4));
+            let does = self.dispatcher.prolong(id, until.as_ref(), &self.now);
+            self.prolonged.insert(id, until);
+            let others = self.active();
+            let mut others = others.iter().filter(|(other, link, begun)| {
+                link.lower <= self.now - begun && !self.is_within(*other, link, *begun)
+            });
+            if others.next().is_some() {
+                // It is only known of all together what can be borne.
+                if does {
+                    continue;
+                }
+                return None;
+            }
+            self.compare(does, &mut counts.overdue, &mut counts.late, told)?;
+        }
+        Some(())
+    }
+
+    fn compare(
+        &self,
+        says: bool,
+        counts: &mut [usize; 2],
+        late: &mut usize,
+        told: &str,
+    ) -> Option<()> {
+        let is_sure = self.is_sure();
+        assert!(!says || is_sure, "{told} at {}", self.now);
+        *late += usize::from(is_sure && !says);
+        counts[usize::from(says)] += 1;
+        says.then_some(())
+    }
+
+    /// Executes the network, point by point, as long as all that happens can be borne.
+    fn go(&mut self, random: &mut Random, counts: &mut Counts, told: &str) -> Option<()> {
+        let trouble = |missed| panic!("{told}: {missed:?}");
+        self.dispatcher
+            .happen(NodeId(0), &0)
+            .unwrap_or_else(trouble);
+        while self.now < 200 {
+            self.overdue(random, counts, told)?;
+            self.world(random, counts, told)?;
+            let ready: Vec<(i64, Option<i64>, NodeId)> = self
+                .dispatcher
+                .ready()
+                .filter_map(|node| {
+                    let earliest = self.dispatcher.earliest(node).ok()?.copied();
+                    let latest = self.dispatcher.window(node).1.copied();
+                    Some((earliest.unwrap_or(0), latest, node))
+                })
+                .collect();
+            let open = ready.iter().filter(|(earliest, ..)| *earliest <= self.now);
+            let deadline = ready.iter().filter_map(|(_, latest, _)| *latest).min();
+            let first = open.min_by_key(|(_, latest, node)| (latest.unwrap_or(i64::MAX), *node));
+            if let Some(&(_, _, node)) = first
+                && (deadline.is_some_and(|deadline| deadline <= self.now) || random.below(3) == 0)
+            {
+                self.dispatcher
+                    .happen(node, &self.now)
+                    .unwrap_or_else(trouble);
+                continue;
+            }
+            assert!(
+                deadline.is_none_or(|deadline| deadline > self.now),
+                "{told}: {ready:?}"
+            );
+            self.now += 1;
+        }
+        for constraint in self.network.requirements().constraints() {
+            let times = [constraint.to, constraint.from].map(|node| self.dispatcher.happened(node));
+            if let [Some(to), Some(from)] = times {
+                assert!(to - from <= constraint.bound, "{told}");
+            }
+        }
+        let mut nodes = self.network.requirements().nodes();
+        assert!(
+            nodes.all(|node| self.dispatcher.happened(node).is_some()),
+            "{told}: not all has happened"
+        );
+        counts.finished += 1;
+        Some(())
+    }
+}
+
+/// The network without what holds from node 0 to others.
+fn without_horizon(network: &UncertainNetwork<i64>) -> UncertainNetwork<i64> {
+    let mut requirements = Network::with_nodes(network.requirements().node_count());
+    for constraint in network.requirements().constraints() {
+        if constraint.from != NodeId(0) {
+            requirements.add(constraint.clone());
+        }
+    }
+    UncertainNetwork::new(requirements, network.links().to_vec()).unwrap()
+}
+
+#[test]
+fn what_is_borne_is_known_from_the_neighbours() {
+    let mut counts = Counts::default();
+    for seed in 0..many(6_000) {
+        let mut random = Random(seed);
+        let board = Board::random(&mut random).network();
+        let open = without_horizon(&board);
+        for (kind, network) in [board, open, rows(&mut random)].into_iter().enumerate() {
+            let form = match seed % 4 {
+                0 => network.dynamic(),
+                _ => network.executable(),
+            };
+            let Ok(form) = form else {
+                continue;
+            };
+            for run in 0..3 {
+                let told = format!("seed {seed}, kind {kind}, run {run}: {network:?}");
+                let mut run = Run {
+                    network: network.clone(),
+                    dispatcher: Dispatcher::new(Arc::new(form.clone())),
+                    now: 0,
+                    prolonged: BTreeMap::new(),
+                };
+                run.go(&mut random, &mut counts, &told);
+            }
+        }
+    }
+    println!("{counts:?}");
+    let cases = counts.ended.iter().chain(&counts.overdue);
+    assert!(
+        cases.chain([&counts.finished]).all(|&count| count > 1_000),
+        "{counts:?}"
+    );
+}
