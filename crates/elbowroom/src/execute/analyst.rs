@@ -10,7 +10,7 @@ use elbowroom_envelope::{
 };
 use elbowroom_execution::{Forms, Need, PrepareError, Prepared, Preparer, Region};
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_num::{Interval, Rational};
+use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::deorder;
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
 use elbowroom_plan::partial_order::partial_order;
@@ -201,8 +201,8 @@ impl Preparer for Analyst {
 /// What is left of a plan is known to work up to this part of each value more or less, at most.
 const NEARBY: i64 = 4;
 
-/// The boxes looked at for that.
-const MOST_CHECKS: usize = 1000;
+/// The boxes looked at for that, for each value.
+const MOST_CHECKS: usize = 4;
 
 /// The exact envelope, asked point by point.
 #[derive(Clone, Copy, Debug, Default)]
@@ -238,6 +238,28 @@ impl WholeRegion {
             };
         }
         plan
+    }
+}
+
+/// A box within which a plan works, with the ends moved on to the borders of ranges that steps in proportion to the
+/// values do not meet, if it works there, too: what is under way may end at once.
+fn up_to_ranges(oracle: &mut Oracle, known: DecoupledEnvelope) -> DecoupledEnvelope {
+    let plan = Arc::clone(oracle.plan());
+    let mut wider = known.clone();
+    for end in BoxEnd::all(plan.parameters.len()) {
+        let own = plan.parameter(end.parameter);
+        let value = Interval::point(own.nominal.clone());
+        let room = own.nominal.abs() / Rational::from(NEARBY);
+        let nearby = end.side.reach(&value).map(|reach| reach + room);
+        let border = end.side.reach(&own.range);
+        let is_closed = matches!(end.side.of(&own.range), End::Closed(_));
+        if is_closed && border < nearby {
+            wider.set_reach(end, border);
+        }
+    }
+    match oracle.objection(&wider) {
+        Ok(None) => wider,
+        _ => known,
     }
 }
 
@@ -279,16 +301,17 @@ impl Region for WholeRegion {
         let mut oracle = Self::oracle_at(task, &plan, values).map_err(|why| why.to_string())?;
         let settings = SearchSettings {
             relative: Some(Rational::new(1, 2 * NEARBY)),
-            most_checks: Some(MOST_CHECKS),
+            most_checks: Some(MOST_CHECKS * plan.parameters.len()),
             ..SearchSettings::default()
         };
         let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(()));
         let run = run.map_err(|why| why.to_string())?;
-        run.envelope.map_err(|objection| {
+        let known = run.envelope.map_err(|objection| {
             let explainer = crate::Explainer::new(task, oracle.plan());
             let point = DecoupledEnvelope::point(values);
             explainer.objection(&oracle, &point, &objection).reason
-        })
+        })?;
+        Ok(up_to_ranges(&mut oracle, known))
     }
 
     /// One oracle for all values: only the proofs that use the greater value are looked for again.

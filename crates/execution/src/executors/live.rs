@@ -329,10 +329,16 @@ impl Rest {
             set_amount(Arc::make_mut(action), *is_end, measured);
         }
         for (parameter, instance) in duration_parameters(&self.mission.plan) {
-            let [_, end] = self.dispatch.nodes_of(instance);
+            let [start, end] = self.dispatch.nodes_of(instance);
+            let Some(start) = self.dispatch.happened(start) else {
+                continue;
+            };
+            let range = &mut plan.parameters[parameter.index()].range;
             if self.dispatch.happened(end).is_some() {
-                plan.parameters[parameter.index()].range =
-                    Interval::point(values[parameter].clone());
+                *range = Interval::point(values[parameter].clone());
+            } else {
+                // What is under way has taken so long already.
+                *range = range.intersection(&Interval::at_least(&now - start));
             }
         }
         plan.plan = plan
