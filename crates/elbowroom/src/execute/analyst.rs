@@ -198,11 +198,12 @@ impl Preparer for Analyst {
     }
 }
 
-/// What is left of a plan is known to work up to this part of each value more or less, at most.
-const NEARBY: i64 = 4;
+/// Where a box is looked for around what is left of a plan, all values are moved in turn, by this part of themselves at
+/// first, so that none takes the room of the others.
+const FIRST_STEP: i64 = 16;
 
 /// The boxes looked at for that, for each value.
-const MOST_CHECKS: usize = 4;
+const MOST_CHECKS: usize = 64;
 
 /// The exact envelope, asked point by point.
 #[derive(Clone, Copy, Debug, Default)]
@@ -222,11 +223,12 @@ impl WholeRegion {
         Oracle::new(task, &Arc::new(plan), Guarantee::Weak)
     }
 
-    /// The plan, with each range cut down to what is near a value.
+    /// The plan, with each range cut down to what is no farther from a value than 0.
     fn nearby(plan: &ParametrizedPlan, values: &Valuation) -> ParametrizedPlan {
         let mut plan = plan.clone();
         for (parameter, value) in plan.parameters.iter_mut().zip(values) {
-            let room = value.abs() / Rational::from(NEARBY);
+            parameter.weight = Rational::new(1, FIRST_STEP);
+            let room = value.abs();
             let near = Interval::closed(value - &room, value + &room);
             let range = parameter.range.intersection(&near);
             // What was observed may be out of range.
@@ -249,8 +251,10 @@ fn up_to_ranges(oracle: &mut Oracle, known: DecoupledEnvelope) -> DecoupledEnvel
     for end in BoxEnd::all(plan.parameters.len()) {
         let own = plan.parameter(end.parameter);
         let value = Interval::point(own.nominal.clone());
-        let room = own.nominal.abs() / Rational::from(NEARBY);
-        let nearby = end.side.reach(&value).map(|reach| reach + room);
+        let nearby = end
+            .side
+            .reach(&value)
+            .map(|reach| reach + own.nominal.abs());
         let border = end.side.reach(&own.range);
         let is_closed = matches!(end.side.of(&own.range), End::Closed(_));
         if is_closed && border < nearby {
@@ -287,7 +291,7 @@ impl Region for WholeRegion {
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }
 
-    /// IRR, nearby and in few steps.
+    /// IRR, nearby and in small steps.
     fn surroundings(
         &mut self,
         task: &Arc<Task>,
@@ -300,7 +304,7 @@ impl Region for WholeRegion {
         let plan = Self::nearby(plan, values);
         let mut oracle = Self::oracle_at(task, &plan, values).map_err(|why| why.to_string())?;
         let settings = SearchSettings {
-            relative: Some(Rational::new(1, 2 * NEARBY)),
+            relative: Some(Rational::new(1, 2 * FIRST_STEP)),
             most_checks: Some(MOST_CHECKS * plan.parameters.len()),
             ..SearchSettings::default()
         };

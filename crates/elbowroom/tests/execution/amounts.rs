@@ -11,7 +11,7 @@ use elbowroom::execution::{
 };
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
-use elbowroom::plan::{ParameterId, ParametrizedPlan, Valuation};
+use elbowroom::plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan, Valuation};
 
 use crate::guarantee::one_order;
 use crate::own;
@@ -339,6 +339,82 @@ fn once_something_has_left_the_envelope_amounts_are_held_against_what_is_left() 
     assert_eq!(reason.since, Some("40.001".parse().expect("a number")));
     let report = scene.run("live", &world(30), 0);
     assert_eq!((report.verdict, report.replans), (Verdict::GoalReached, 0));
+}
+
+/// Looks for boxes as usual, and counts how often.
+struct CountingBoxes(Arc<AtomicUsize>);
+
+impl Region for CountingBoxes {
+    fn objection(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &ParametrizedPlan,
+        values: &Valuation,
+    ) -> Option<String> {
+        WholeRegion.objection(task, plan, values)
+    }
+
+    fn surroundings(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &ParametrizedPlan,
+        values: &Valuation,
+    ) -> Result<DecoupledEnvelope, String> {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        WholeRegion.surroundings(task, plan, values)
+    }
+}
+
+/// Three robots drive twelve times each, which their batteries allow with an eighth to spare. The envelope gives that to
+/// some of the drives; the box for the rest gives each a share, and what is under way may end before it was planned to.
+#[test]
+fn the_box_for_the_rest_has_room_for_all_of_it() {
+    let domain = "(define (domain patrol)
+        (:requirements :durative-actions :fluents :typing) (:types robot)
+        (:predicates (idle ?r - robot)) (:functions (charge ?r - robot) (trips ?r - robot))
+        (:durative-action drive :parameters (?r - robot) :duration (= ?duration 8)
+          :condition (and (at start (idle ?r)) (over all (>= (charge ?r) 0)))
+          :effect (and (at start (not (idle ?r))) (at end (idle ?r)) (at end (increase (trips ?r) 1))
+                       (decrease (charge ?r) (* #t 1)))))";
+    let robots = ["a", "b", "c"];
+    let each = |text: &str| robots.map(|robot| text.replace('?', robot)).join(" ");
+    let problem = format!(
+        "(define (problem p) (:domain patrol) (:objects a b c - robot) (:init {}) (:goal (and {})))",
+        each("(idle ?) (= (charge ?) 108) (= (trips ?) 0)"),
+        each("(>= (trips ?) 12)")
+    );
+    let mut plan = String::new();
+    for trip in 0..12 {
+        for (place, robot) in robots.iter().enumerate() {
+            let start = trip * 8001 + place * 100;
+            plan += &format!(
+                "{}.{:03}: (drive {robot}) [8]\n",
+                start / 1000,
+                start % 1000
+            );
+        }
+    }
+    let mut scene = Scene::new(domain, &problem, Some(&plan));
+    scene.flow.vary = vec!["durations".parse().expect("a specification")];
+    let world =
+        "[[duration]]\naction = \"*\"\nuniform = { from = 0.9, to = 1.1 }\nrelative = true\n";
+    let model = scene.world(world);
+    let mut most = 0;
+    for seed in 0..10 {
+        let asked = Arc::new(AtomicUsize::new(0));
+        let live: ExecutorSpec = "live".parse().unwrap();
+        let region = CountingBoxes(Arc::clone(&asked));
+        let live = live.build(Means::from(Box::new(region)));
+        let execution = scene.execution("live").decided_by(Made(live));
+        let report = execution.run_in(&mut *model.world(&scene.task, seed));
+        assert_eq!(
+            (report.verdict, report.replans),
+            (Verdict::GoalReached, 0),
+            "seed {seed}"
+        );
+        most = most.max(asked.load(Ordering::Relaxed));
+    }
+    assert!((1..=6).contains(&most), "{most}");
 }
 
 /// What two runs differ in, if it is more than that limits of durations, which are found up to ε, were looked for from
