@@ -365,7 +365,7 @@ impl Region for CountingBoxes {
     }
 }
 
-/// Three robots drive twelve times each, which their batteries allow with an eighth to spare. The envelope gives that to
+/// Twenty robots drive 32 times each, which their batteries allow with an eighth to spare. The envelope gives that to
 /// some of the drives; the box for the rest gives each a share, and what is under way may end before it was planned to.
 #[test]
 fn the_box_for_the_rest_has_room_for_all_of_it() {
@@ -376,17 +376,21 @@ fn the_box_for_the_rest_has_room_for_all_of_it() {
           :condition (and (at start (idle ?r)) (over all (>= (charge ?r) 0)))
           :effect (and (at start (not (idle ?r))) (at end (idle ?r)) (at end (increase (trips ?r) 1))
                        (decrease (charge ?r) (* #t 1)))))";
-    let robots = ["a", "b", "c"];
-    let each = |text: &str| robots.map(|robot| text.replace('?', robot)).join(" ");
+    let robots: Vec<String> = (0..20).map(|robot| format!("r{robot}")).collect();
+    let each = |text: &str| {
+        let texts = robots.iter().map(|robot| text.replace('?', robot));
+        texts.collect::<Vec<_>>().join(" ")
+    };
     let problem = format!(
-        "(define (problem p) (:domain patrol) (:objects a b c - robot) (:init {}) (:goal (and {})))",
-        each("(idle ?) (= (charge ?) 108) (= (trips ?) 0)"),
-        each("(>= (trips ?) 12)")
+        "(define (problem p) (:domain patrol) (:objects {} - robot) (:init {}) (:goal (and {})))",
+        robots.join(" "),
+        each("(idle ?) (= (charge ?) 288) (= (trips ?) 0)"),
+        each("(>= (trips ?) 32)")
     );
     let mut plan = String::new();
-    for trip in 0..12 {
+    for trip in 0..32 {
         for (place, robot) in robots.iter().enumerate() {
-            let start = trip * 8001 + place * 100;
+            let start = trip * 8001 + place * 10;
             plan += &format!(
                 "{}.{:03}: (drive {robot}) [8]\n",
                 start / 1000,
@@ -400,7 +404,7 @@ fn the_box_for_the_rest_has_room_for_all_of_it() {
         "[[duration]]\naction = \"*\"\nuniform = { from = 0.9, to = 1.1 }\nrelative = true\n";
     let model = scene.world(world);
     let mut most = 0;
-    for seed in 0..10 {
+    for seed in 0..2 {
         let asked = Arc::new(AtomicUsize::new(0));
         let live: ExecutorSpec = "live".parse().unwrap();
         let region = CountingBoxes(Arc::clone(&asked));
@@ -414,7 +418,7 @@ fn the_box_for_the_rest_has_room_for_all_of_it() {
         );
         most = most.max(asked.load(Ordering::Relaxed));
     }
-    assert!((1..=6).contains(&most), "{most}");
+    assert!((1..=4).contains(&most), "{most}");
 }
 
 /// What two runs differ in, if it is more than that limits of durations, which are found up to ε, were looked for from
