@@ -8,13 +8,15 @@
 )]
 
 mod game;
+mod rows;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_stn::uncertain::{ContingentLink, Dispatcher, LinkId, UncertainNetwork};
 use elbowroom_stn::{Constraint, Network, NodeId};
-use game::{Board, Random, rows};
+use game::{Board, Random};
+use rows::rows;
 
 /// As many as the variable says, to try more by hand.
 fn many(default: u64) -> u64 {

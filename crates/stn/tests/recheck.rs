@@ -7,11 +7,13 @@
 )]
 
 mod game;
+mod rows;
 
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{ContingentLink, Recheck, UncertainNetwork};
-use elbowroom_stn::{Constraint, Network, NodeId, Weight};
-use game::{Board, Random, rows as plan};
+use elbowroom_stn::{Constraint, Network, Weight};
+use game::{Board, Random};
+use rows::rows;
 
 /// Changes links at random, one at a time; counts refusals and acceptances.
 fn change(network: UncertainNetwork<i64>, random: &mut Random, counts: &mut [usize; 2]) {
@@ -62,7 +64,7 @@ fn the_verdict_is_that_of_a_check_from_scratch() {
             &mut random,
             &mut counts,
         );
-        change(plan(&mut random), &mut random, &mut counts);
+        change(rows(&mut random), &mut random, &mut counts);
     }
     assert!(counts.iter().all(|&count| count > 5_000), "{counts:?}");
 }
@@ -72,7 +74,7 @@ fn the_verdict_is_that_of_a_check_from_scratch() {
 fn whole_numbers_change_nothing() {
     let mut controllable = 0;
     for seed in 0..2_000 {
-        let network = plan(&mut Random(seed));
+        let network = rows(&mut Random(seed));
         let seventh = |number: i64| Rational::new(number, 7);
         let mut requirements = Network::with_nodes(network.requirements().node_count());
         for constraint in network.requirements().constraints() {

@@ -387,17 +387,14 @@ fn the_box_for_the_rest_has_room_for_all_of_it() {
         each("(idle ?) (= (charge ?) 288) (= (trips ?) 0)"),
         each("(>= (trips ?) 32)")
     );
-    let mut plan = String::new();
-    for trip in 0..32 {
-        for (place, robot) in robots.iter().enumerate() {
-            let start = trip * 8001 + place * 10;
-            plan += &format!(
-                "{}.{:03}: (drive {robot}) [8]\n",
-                start / 1000,
-                start % 1000
-            );
-        }
-    }
+    let steps = (0..32).flat_map(|trip| {
+        let starts = robots.iter().zip(0..).map(move |(robot, place)| {
+            let start = Rational::new(trip * 8001 + place * 10, 1000);
+            format!("{}: (drive {robot}) [8]\n", start.to_decimal(3))
+        });
+        starts.collect::<Vec<_>>()
+    });
+    let plan: String = steps.collect();
     let mut scene = Scene::new(domain, &problem, Some(&plan));
     scene.flow.vary = vec!["durations".parse().expect("a specification")];
     let world =

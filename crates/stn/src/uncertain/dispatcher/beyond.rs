@@ -120,8 +120,8 @@ impl<W: Weight> Dispatcher<W> {
                 let other = form.network().link(other);
                 let lower = Extended::from(other.lower.clone());
                 if let Some(begun) = self.happened(other.activation) {
-                    let least = lower.plus(&begun.clone().into());
-                    if time > least.max(soonest.clone()) {
+                    let first_end = lower.plus(&begun.clone().into());
+                    if time > first_end.max(soonest.clone()) {
                         return false;
                     }
                 } else {
