@@ -7,6 +7,7 @@
 //! point next to what has happened has room left, and, while the link goes on, which time points have to wait for its end
 //! now.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::sync::Arc;
 
@@ -86,24 +87,11 @@ impl<W: Weight> Dispatcher<W> {
     pub fn prolong(&mut self, id: LinkId, until: Option<&W>, now: &W) -> bool {
         let form = Arc::clone(&self.form);
         let link = form.network().link(id);
-        let until = until.cloned();
-        let last = until.clone().map_or_else(Extended::infinity, Into::into);
         let soonest = Extended::from(now.clone());
-        // For each node that has to wait for the link's end: until when, and the edge by which that follows.
-        let mut waits: BTreeMap<NodeId, (Extended<W>, EdgeId)> = BTreeMap::new();
-        // Latest first, so that what is found first of a node is what there is to find.
-        let mut open: BinaryHeap<(Extended<W>, NodeId, EdgeId)> = BinaryHeap::new();
-        let before = |time: &Extended<W>, node: NodeId| {
-            let edges = form.entering(node);
-            let edges = edges.filter(|(from, bound, _)| **bound >= W::zero() && *from != link.end);
-            let times = edges.map(|(from, bound, edge)| {
-                let bound = Extended::from(bound.clone());
-                (time.minus(&bound), from, edge)
-            });
-            times.collect::<Vec<_>>()
-        };
-        open.extend(before(&last, link.end));
-        while let Some((time, node, edge)) = open.pop() {
+        let mut waiting = Waiting::default();
+        let last = until.cloned().map_or_else(Extended::infinity, Into::into);
+        self.reach_before(link.end, &last, link.end, &mut waiting);
+        while let Some((node, time, edge)) = waiting.next() {
             if let Some(happened) = self.happened(node) {
                 if time > Extended::from(happened.clone()) {
                     return false;
@@ -113,7 +101,7 @@ impl<W: Weight> Dispatcher<W> {
             if !self.has_room(node, now) {
                 return false;
             }
-            if time <= soonest || waits.contains_key(&node) {
+            if time <= soonest {
                 continue;
             }
             if let Some(other) = form.network().ending_at(node) {
@@ -125,13 +113,15 @@ impl<W: Weight> Dispatcher<W> {
                         return false;
                     }
                 } else {
-                    open.push((time.minus(&lower), other.activation, edge));
+                    waiting.reach(other.activation, time.minus(&lower), edge);
                 }
             }
-            open.extend(before(&time, node));
-            waits.insert(node, (time, edge));
+            self.reach_before(node, &time, link.end, &mut waiting);
         }
-        for (node, (time, edge)) in waits {
+        for (node, (time, edge)) in waiting.known {
+            if time <= soonest || self.happened(node).is_some() {
+                continue;
+            }
             let known = &mut self.waits[node.index()];
             known.retain(|wait| wait.link != id);
             known.push(ActiveWait {
@@ -141,7 +131,59 @@ impl<W: Weight> Dispatcher<W> {
             });
             self.waiting_for[id.index()].push(node);
         }
-        self.prolonged.insert(id, until);
+        self.prolonged.insert(id, until.cloned());
         true
+    }
+
+    /// What may not happen long before a node that may not happen before that time, but for the end of the link itself.
+    fn reach_before(
+        &self,
+        node: NodeId,
+        time: &Extended<W>,
+        end: NodeId,
+        waiting: &mut Waiting<W>,
+    ) {
+        for (from, bound, edge) in self.form.entering(node) {
+            if from != end && *bound >= W::zero() {
+                waiting.reach(from, time.minus(&bound.clone().into()), edge);
+            }
+        }
+    }
+}
+
+/// The nodes that have to wait for the end of a link.
+struct Waiting<W> {
+    /// Until when, and the edge by which that follows.
+    known: BTreeMap<NodeId, (Extended<W>, EdgeId)>,
+    /// Those to be looked at, the latest time first, so that each is looked at once; the times are negated.
+    open: BinaryHeap<Reverse<(Extended<W>, NodeId)>>,
+}
+
+impl<W: Weight> Default for Waiting<W> {
+    fn default() -> Self {
+        Self {
+            known: BTreeMap::new(),
+            open: BinaryHeap::new(),
+        }
+    }
+}
+
+impl<W: Weight> Waiting<W> {
+    fn reach(&mut self, node: NodeId, time: Extended<W>, edge: EdgeId) {
+        if self.known.get(&node).is_none_or(|(known, _)| *known < time) {
+            self.open.push(Reverse((time.negated(), node)));
+            self.known.insert(node, (time, edge));
+        }
+    }
+
+    /// The next node, until when it waits, and the edge by which that follows.
+    fn next(&mut self) -> Option<(NodeId, Extended<W>, EdgeId)> {
+        while let Some(Reverse((negated, node))) = self.open.pop() {
+            let (time, edge) = &self.known[&node];
+            if time.negated() == negated {
+                return Some((node, time.clone(), *edge));
+            }
+        }
+        None
     }
 }
