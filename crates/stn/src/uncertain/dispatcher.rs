@@ -2,7 +2,7 @@
 
 mod beyond;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use elbowroom_num::Rational;
@@ -39,7 +39,7 @@ pub struct Dispatcher<W = Rational> {
     /// Nodes that the executor chooses and that have all behind them that must come before.
     ready: BTreeSet<NodeId>,
     /// Links under way that may end later than their upper bound says: by when, `None` if there is no such time.
-    prolonged: BTreeMap<LinkId, Option<W>>,
+    prolonged: Vec<(LinkId, Option<W>)>,
 }
 
 #[derive(Clone, Debug)]
@@ -95,7 +95,7 @@ impl<W: Weight> Dispatcher<W> {
             waits: vec![Vec::new(); count],
             waiting_for: vec![Vec::new(); form.network().links().len()],
             ready,
-            prolonged: BTreeMap::new(),
+            prolonged: Vec::new(),
             form,
         }
     }
@@ -224,7 +224,7 @@ impl<W: Weight> Dispatcher<W> {
             }
         }
         if let Some(link) = form.network().ending_at(node) {
-            self.prolonged.remove(&link);
+            self.prolonged.retain(|(other, _)| *other != link);
             for waiting in std::mem::take(&mut self.waiting_for[link.index()]) {
                 self.waits[waiting.index()].retain(|wait| wait.link != link);
             }

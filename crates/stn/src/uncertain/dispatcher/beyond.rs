@@ -19,7 +19,7 @@ use crate::{NodeId, Weight, WindowEnd};
 impl<W: Weight> Dispatcher<W> {
     /// When a link that began then ends at the latest; `None` if there is no such time.
     pub(super) fn last_end(&self, id: LinkId, begun: &W) -> Option<W> {
-        if let Some(until) = self.prolonged.get(&id) {
+        if let Some((_, until)) = self.prolonged.iter().find(|(other, _)| *other == id) {
             return until.clone();
         }
         let upper = self.form.network().link(id).upper.as_ref();
@@ -118,7 +118,7 @@ impl<W: Weight> Dispatcher<W> {
             }
             self.reach_before(node, &time, link.end, &mut waiting);
         }
-        for (node, (time, edge)) in waiting.known {
+        for (node, time, edge) in waiting.known {
             if time <= soonest || self.happened(node).is_some() {
                 continue;
             }
@@ -131,7 +131,8 @@ impl<W: Weight> Dispatcher<W> {
             });
             self.waiting_for[id.index()].push(node);
         }
-        self.prolonged.insert(id, until.cloned());
+        self.prolonged.retain(|(other, _)| *other != id);
+        self.prolonged.push((id, until.cloned()));
         true
     }
 
@@ -153,8 +154,10 @@ impl<W: Weight> Dispatcher<W> {
 
 /// The nodes that have to wait for the end of a link.
 struct Waiting<W> {
-    /// Until when, and the edge by which that follows.
-    known: BTreeMap<NodeId, (Extended<W>, EdgeId)>,
+    /// Each with the time until which it waits, as far as is known, and the edge by which that follows.
+    known: Vec<(NodeId, Extended<W>, EdgeId)>,
+    /// Their places in that list.
+    places: BTreeMap<NodeId, usize>,
     /// Those to be looked at, the latest time first, so that each is looked at once; the times are negated.
     open: BinaryHeap<Reverse<(Extended<W>, NodeId)>>,
 }
@@ -162,7 +165,8 @@ struct Waiting<W> {
 impl<W: Weight> Default for Waiting<W> {
     fn default() -> Self {
         Self {
-            known: BTreeMap::new(),
+            known: Vec::new(),
+            places: BTreeMap::new(),
             open: BinaryHeap::new(),
         }
     }
@@ -170,16 +174,26 @@ impl<W: Weight> Default for Waiting<W> {
 
 impl<W: Weight> Waiting<W> {
     fn reach(&mut self, node: NodeId, time: Extended<W>, edge: EdgeId) {
-        if self.known.get(&node).is_none_or(|(known, _)| *known < time) {
-            self.open.push(Reverse((time.negated(), node)));
-            self.known.insert(node, (time, edge));
+        let next = self.known.len();
+        let place = *self.places.entry(node).or_insert(next);
+        if self
+            .known
+            .get(place)
+            .is_some_and(|(_, known, _)| time <= *known)
+        {
+            return;
+        }
+        self.open.push(Reverse((time.negated(), node)));
+        match self.known.get_mut(place) {
+            Some(known) => *known = (node, time, edge),
+            None => self.known.push((node, time, edge)),
         }
     }
 
     /// The next node, until when it waits, and the edge by which that follows.
     fn next(&mut self) -> Option<(NodeId, Extended<W>, EdgeId)> {
         while let Some(Reverse((negated, node))) = self.open.pop() {
-            let (time, edge) = &self.known[&node];
+            let (_, time, edge) = &self.known[self.places[&node]];
             if time.negated() == negated {
                 return Some((node, time.clone(), *edge));
             }
