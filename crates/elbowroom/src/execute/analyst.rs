@@ -223,7 +223,7 @@ impl WholeRegion {
         Oracle::new(task, &Arc::new(plan), Guarantee::Weak)
     }
 
-    /// The plan, with each range cut down to what is no farther from a value than 0.
+    /// The plan, with each range cut down to what lies between 0 and twice each value.
     fn nearby(plan: &ParametrizedPlan, values: &Valuation) -> ParametrizedPlan {
         let mut plan = plan.clone();
         for (parameter, value) in plan.parameters.iter_mut().zip(values) {
