@@ -156,8 +156,15 @@ fn a_reason_shows_all_that_bounds_a_duration() {
     }
 }
 
-/// Asks whether the plan works, and counts how often.
-struct Counting(Arc<AtomicUsize>);
+/// Counts how often it is asked about the rest of a plan: about points, or for boxes.
+#[derive(Default)]
+struct Counting {
+    asked: Arc<AtomicUsize>,
+    /// Whether it looks for boxes as usual, and counts these; else it is asked about each point by itself.
+    finds_boxes: bool,
+    /// Whether it is asked although what was observed is within a box that works.
+    is_asked_inside: bool,
+}
 
 impl Region for Counting {
     fn objection(
@@ -166,8 +173,27 @@ impl Region for Counting {
         plan: &ParametrizedPlan,
         values: &Valuation,
     ) -> Option<String> {
-        self.0.fetch_add(1, Ordering::Relaxed);
+        let counts = usize::from(!self.finds_boxes);
+        self.asked.fetch_add(counts, Ordering::Relaxed);
         WholeRegion.objection(task, plan, values)
+    }
+
+    fn surroundings(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &ParametrizedPlan,
+        values: &Valuation,
+    ) -> Result<DecoupledEnvelope, String> {
+        if self.finds_boxes {
+            self.asked.fetch_add(1, Ordering::Relaxed);
+            return WholeRegion.surroundings(task, plan, values);
+        }
+        let works = self.objection(task, plan, values).map_or(Ok(()), Err);
+        works.map(|()| DecoupledEnvelope::point(values))
+    }
+
+    fn is_asked_inside(&self) -> bool {
+        self.is_asked_inside
     }
 }
 
@@ -215,7 +241,10 @@ fn live_looks_at_the_numbers_again_only_when_one_is_not_as_planned() {
     ] {
         let asked = Arc::new(AtomicUsize::new(0));
         let live: ExecutorSpec = "live".parse().unwrap();
-        let live = live.build(Means::from(Box::new(Counting(Arc::clone(&asked)))));
+        let live = live.build(Means::from(Box::new(Counting {
+            asked: Arc::clone(&asked),
+            ..Counting::default()
+        })));
         let model = scene.world(world);
         let execution = scene.execution("live").decided_by(Made(live));
         let report = execution.run_in(&mut *model.world(&scene.task, 0));
@@ -226,21 +255,6 @@ fn live_looks_at_the_numbers_again_only_when_one_is_not_as_planned() {
             count <= questions && (count > 0) == (questions > 0),
             "{world}: {count}"
         );
-    }
-}
-
-/// Asks about each value by itself, as [`Region::growing`] does by default.
-#[derive(Clone, Copy)]
-struct PointByPoint;
-
-impl Region for PointByPoint {
-    fn objection(
-        &mut self,
-        task: &Arc<Task>,
-        plan: &ParametrizedPlan,
-        values: &Valuation,
-    ) -> Option<String> {
-        WholeRegion.objection(task, plan, values)
     }
 }
 
@@ -261,7 +275,7 @@ fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_abou
                 execution.run_in(&mut *model.world(&scene.task, seed))
             };
             let widened = run(Means::from(Box::new(WholeRegion)));
-            let asked = run(Means::from(Box::new(PointByPoint)));
+            let asked = run(Means::from(Box::new(Counting::default())));
             assert_eq!(
                 format!("{widened:?}"),
                 format!("{asked:?}"),
@@ -272,25 +286,6 @@ fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_abou
         }
     }
     assert!(outlived > 3, "{outlived}");
-}
-
-/// Asks about the rest of the plan whether or not what was observed is within its envelope, and counts how often.
-struct AlwaysAsked(Arc<AtomicUsize>);
-
-impl Region for AlwaysAsked {
-    fn objection(
-        &mut self,
-        task: &Arc<Task>,
-        plan: &ParametrizedPlan,
-        values: &Valuation,
-    ) -> Option<String> {
-        self.0.fetch_add(1, Ordering::Relaxed);
-        WholeRegion.objection(task, plan, values)
-    }
-
-    fn is_asked_inside(&self) -> bool {
-        true
-    }
 }
 
 /// A drive takes longer than the envelope has it, so that a survey may take no more of the battery than planned; it
@@ -341,30 +336,6 @@ fn once_something_has_left_the_envelope_amounts_are_held_against_what_is_left() 
     assert_eq!((report.verdict, report.replans), (Verdict::GoalReached, 0));
 }
 
-/// Looks for boxes as usual, and counts how often.
-struct CountingBoxes(Arc<AtomicUsize>);
-
-impl Region for CountingBoxes {
-    fn objection(
-        &mut self,
-        task: &Arc<Task>,
-        plan: &ParametrizedPlan,
-        values: &Valuation,
-    ) -> Option<String> {
-        WholeRegion.objection(task, plan, values)
-    }
-
-    fn surroundings(
-        &mut self,
-        task: &Arc<Task>,
-        plan: &ParametrizedPlan,
-        values: &Valuation,
-    ) -> Result<DecoupledEnvelope, String> {
-        self.0.fetch_add(1, Ordering::Relaxed);
-        WholeRegion.surroundings(task, plan, values)
-    }
-}
-
 /// Twenty robots drive 32 times each, which their batteries allow with an eighth to spare. The envelope gives that to
 /// some of the drives; the box for the rest gives each a share, and what is under way may end before it was planned to.
 #[test]
@@ -404,7 +375,11 @@ fn the_box_for_the_rest_has_room_for_all_of_it() {
     for seed in 0..2 {
         let asked = Arc::new(AtomicUsize::new(0));
         let live: ExecutorSpec = "live".parse().unwrap();
-        let region = CountingBoxes(Arc::clone(&asked));
+        let region = Counting {
+            asked: Arc::clone(&asked),
+            finds_boxes: true,
+            ..Counting::default()
+        };
         let live = live.build(Means::from(Box::new(region)));
         let execution = scene.execution("live").decided_by(Made(live));
         let report = execution.run_in(&mut *model.world(&scene.task, seed));
@@ -504,7 +479,11 @@ fn what_stays_within_the_envelope_needs_no_question() {
                 execution.run_in(&mut *model.world(&scene.task, seed))
             };
             let trusting = run(Means::from(Box::new(WholeRegion)));
-            let asking = run(Means::from(Box::new(AlwaysAsked(Arc::clone(&asked)))));
+            let asking = run(Means::from(Box::new(Counting {
+                asked: Arc::clone(&asked),
+                is_asked_inside: true,
+                ..Counting::default()
+            })));
             let difference = difference(&trusting, &asking, scene.task.epsilon());
             assert_eq!(difference, None, "{name}, seed {seed}");
             let mut reasons = trusting.reasons.iter().map(|reason| reason.cause);

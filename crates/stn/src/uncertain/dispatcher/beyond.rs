@@ -83,10 +83,14 @@ impl<W: Weight> Dispatcher<W> {
     /// Time points that could have relied on that bound wait for its end from now on. Nothing that has not happened
     /// happens before `now`.
     ///
-    /// `false`, and nothing is changed, if the executor could not be sure any more to satisfy every requirement.
+    /// `false`, and nothing is changed, if the executor could not be sure any more to satisfy every requirement, or if the
+    /// link is not under way.
     pub fn prolong(&mut self, id: LinkId, until: Option<&W>, now: &W) -> bool {
         let form = Arc::clone(&self.form);
         let link = form.network().link(id);
+        if self.happened(link.activation).is_none() || self.happened(link.end).is_some() {
+            return false;
+        }
         let soonest = Extended::from(now.clone());
         let mut waiting = Waiting::default();
         let last = until.cloned().map_or_else(Extended::infinity, Into::into);
