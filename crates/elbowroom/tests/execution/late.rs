@@ -164,6 +164,64 @@ impl World for Ticking<'_> {
     }
 }
 
+/// A world at which somebody looks later than he said he would, by so much.
+struct Lagging<'a> {
+    inner: SimWorld<'a>,
+    lag: Rational,
+}
+
+impl World for Lagging<'_> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.inner.command(now, command)
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let first = self.inner.wait(until)?;
+        let mut observations = first.observations;
+        let looked_at = first.now + &self.lag;
+        loop {
+            let passage = self.inner.wait(&looked_at)?;
+            observations.extend(passage.observations);
+            if passage.now >= looked_at {
+                let now = passage.now;
+                return Ok(Passage { now, observations });
+            }
+        }
+    }
+}
+
+/// The envelope takes all the room that there is, so that the first of the welds would have to be inspected at once.
+/// A decision that is late takes from the room as a start does that is late.
+#[test]
+fn a_decision_that_is_late_takes_from_the_room_and_needs_no_new_plan() {
+    let file = |name: &str| read(&format!("cases/match/{name}"));
+    let plan = file("plan.plan");
+    let scene = Scene::new(&file("domain.pddl"), &file("problem.pddl"), Some(&plan));
+    for executor in ["guarded", "live"] {
+        let run = |lag: &str| {
+            let model = scene.world("[[delay]]\naction = \"burn\"\nconstant = 0.03\n");
+            let mut world = Lagging {
+                inner: SimWorld::new(Arc::clone(&scene.task), &model, 1),
+                lag: lag.parse().expect("a number"),
+            };
+            let execution = scene.execution(executor).planned_by(NoPlanner);
+            execution.run_in(&mut world)
+        };
+        for lag in ["0", "0.01", "0.1", "1", "3"] {
+            let report = run(lag);
+            let outcome = (&report.verdict, report.replans);
+            assert_eq!(
+                outcome,
+                (&Verdict::GoalReached, 0),
+                "{executor}, {lag}: {report:#?}"
+            );
+            assert!(scene.judged(&report).is_valid());
+        }
+        // Of the twelve seconds to spare, more than all are lost.
+        assert_eq!(run("7").replans, 1, "{executor}");
+    }
+}
+
 /// Pumping fills the tank with as much as it takes time, and ten is planned, fifteen the most. When one hears that
 /// the walk has started late, the pump has run for longer: nothing is known of the rest then, although
 /// there is time for all of it.

@@ -78,6 +78,10 @@ impl Dispatch {
         if !ends.all(|end| self.horizon.bears(network_node(*end), now)) {
             return false;
         }
+        if self.missing(now).is_some() {
+            // Nobody was in time to decide on it.
+            return false;
+        }
         self.strain.ends.clear();
         true
     }

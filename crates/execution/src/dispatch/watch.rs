@@ -172,53 +172,55 @@ impl Dispatch {
     }
 
     /// What should have happened by now and has not.
+    pub(crate) fn overdue(&self, moment: &Moment<'_>) -> Option<Reason> {
+        let now = self.local(moment.now);
+        let (node, latest) = self.missing(&now)?;
+        let awaited = match self.plan.nodes[node.index()] {
+            Node::Start(id) | Node::End(id) | Node::Instant(id) => Some(id),
+            Node::Zero | Node::Timed(_) => None,
+        };
+        let awaited = awaited.filter(|id| self.progress.running.contains(id));
+        let is_own = |id: InstanceId| {
+            node == self.ends[id.index()][1]
+                && self.is_limited_by_duration(id, WindowEnd::Latest)
+        };
+        let mut reason = if let Some(id) = awaited.filter(|id| is_own(*id)) {
+            let mut reason = Reason::new(Cause::Outlived);
+            if self.resumed.contains(&id) {
+                reason = reason.about(self.duration_of(id));
+            }
+            let start = self.ends[id.index()][0];
+            reason.observed = self.happened(start).map(|start| &now - start);
+            reason.allowed = Some(explain::interval(&self.durations[id.index()]));
+            reason
+        } else {
+            let words = self.plan.node_words(&self.task, node);
+            Reason::new(Cause::Unreachable).about(About::TimePoint(words))
+        };
+        reason.action = awaited.map(|id| self.action(id).name.clone());
+        reason.behind = self.behind(node, WindowEnd::Latest);
+        reason.since = Some(self.world(&latest));
+        reason.by = Some(now - latest);
+        Some(reason)
+    }
+
+    /// The first time point that should have happened by then, on the plan's clock, and has not, with the time by which.
     ///
     /// The windows are exact, so comparing each time point that is awaited with its own window
     /// finds out whether all of them can still happen now or later. They are not moved on by the
     /// mere passing of time, because something that has happened may be reported later.
-    pub(crate) fn overdue(&self, moment: &Moment<'_>) -> Option<Reason> {
-        let now = self.local(moment.now);
-        for &id in &self.progress.running {
-            let node = self.awaited(id);
-            if self.was_told_in_time(id) {
-                continue;
-            }
+    pub(super) fn missing(&self, now: &Rational) -> Option<(NodeId, Rational)> {
+        let running = self.progress.running.iter();
+        let awaited = running
+            .filter(|id| !self.was_told_in_time(**id))
+            .map(|id| self.awaited(*id));
+        let ready = self.progress.ready.iter().copied();
+        awaited.chain(ready).find_map(|node| {
             let latest = self.horizon.window(network_node(node)).1;
-            let Some(latest) = latest.filter(|latest| *latest < now) else {
-                continue;
-            };
-            let [start, end] = self.ends[id.index()];
-            let is_own = node == end && self.is_limited_by_duration(id, WindowEnd::Latest);
-            let mut reason = if is_own {
-                let mut reason = Reason::new(Cause::Outlived);
-                if self.resumed.contains(&id) {
-                    reason = reason.about(self.duration_of(id));
-                }
-                reason.observed = self.happened(start).map(|start| &now - start);
-                reason.allowed = Some(explain::interval(&self.durations[id.index()]));
-                reason
-            } else {
-                let words = self.plan.node_words(&self.task, node);
-                Reason::new(Cause::Unreachable).about(About::TimePoint(words))
-            };
-            reason.action = Some(self.action(id).name.clone());
-            reason.behind = self.behind(node, WindowEnd::Latest);
-            reason.since = Some(self.world(&latest));
-            reason.by = Some(now - latest);
-            return Some(reason);
-        }
-        for node in self.progress.ready.iter().copied() {
-            let latest = self.horizon.window(network_node(node)).1;
-            if let Some(latest) = latest.filter(|latest| *latest < now) {
-                let about = About::TimePoint(self.plan.node_words(&self.task, node));
-                let mut reason = Reason::new(Cause::Unreachable).about(about);
-                reason.behind = self.behind(node, WindowEnd::Latest);
-                reason.since = Some(self.world(&latest));
-                reason.by = Some(now - latest);
-                return Some(reason);
-            }
-        }
-        None
+            latest
+                .filter(|latest| latest < now)
+                .map(|latest| (node, latest))
+        })
     }
 }
 
