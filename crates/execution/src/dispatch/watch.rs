@@ -181,8 +181,7 @@ impl Dispatch {
         };
         let awaited = awaited.filter(|id| self.progress.running.contains(id));
         let is_own = |id: InstanceId| {
-            node == self.ends[id.index()][1]
-                && self.is_limited_by_duration(id, WindowEnd::Latest)
+            node == self.ends[id.index()][1] && self.is_limited_by_duration(id, WindowEnd::Latest)
         };
         let mut reason = if let Some(id) = awaited.filter(|id| is_own(*id)) {
             let mut reason = Reason::new(Cause::Outlived);
