@@ -16,6 +16,8 @@ mod planning;
 mod shared;
 #[path = "../examples/promise/sources.rs"]
 mod sources;
+#[path = "../examples/promise/strain.rs"]
+mod strain;
 #[path = "../examples/promise/subject.rs"]
 mod subject;
 #[path = "../examples/promise/tally.rs"]

@@ -32,6 +32,7 @@ mod options;
 mod planning;
 mod runs;
 mod sources;
+mod strain;
 mod subject;
 mod tally;
 mod trial;

@@ -18,7 +18,8 @@ pub(crate) fn main(options: &Options) {
     let begin = Instant::now();
     let (families, skipped) = counted(options, &|source| tally(source, options));
     let kinds = Kind::ALL.map(Kind::name).join(" | ");
-    println!("| family | plans | {kinds} | failures |\n|---|--:|--:|--:|--:|--:|");
+    let columns = "--:|".repeat(Kind::ALL.len());
+    println!("| family | plans | {kinds} | failures |\n|---|--:|{columns}--:|");
     for (family, tallies) in &families {
         println!("| {family} {}", line(&tallies.iter().collect::<Vec<_>>()));
     }
@@ -28,6 +29,11 @@ pub(crate) fn main(options: &Options) {
     let seconds = begin.elapsed().as_secs();
     let runs: u64 = all.iter().map(|tally| tally.runs()).sum();
     println!("\n{runs} runs, {seconds} s.");
+    for kind in [Kind::Outside, Kind::LateLook] {
+        let counts = all.iter().filter_map(|tally| tally.counts.get(&kind));
+        let given_up: u64 = counts.map(|count| count.given_up).sum();
+        println!("{}: given up {given_up} times.", kind.name());
+    }
 }
 
 fn line(tallies: &[&Tally]) -> String {

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use elbowroom::envelope::{Guarantee, Oracle, StopReason, irr};
 use elbowroom::execute::{Analyst, Execution};
 use elbowroom::execution::run::{Patience, PlanningTime, Report, RunSettings, Verdict};
-use elbowroom::execution::{Forms, Need, NoPlanner, PrepareError, Prepared, Preparer, World};
+use elbowroom::execution::{
+    Forms, Need, NoPlanner, NoRecord, PrepareError, Prepared, Preparer, Promise, Recorder, World,
+};
 use elbowroom::flow;
 use elbowroom::model::validate::{self, validate};
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -15,6 +17,7 @@ use elbowroom::plan::DecoupledEnvelope;
 use elbowroom::sim::{SimWorld, WorldModel};
 
 use super::lateness;
+use super::strain::{Course, Stray};
 use super::subject::Subject;
 
 /// A plan made ready for every executor.
@@ -127,7 +130,32 @@ impl<'a> Ready<'a> {
         (!is_excused).then(|| self.outcome(&report))
     }
 
+    /// Runs in a world in which one thing is not as reckoned with, and the rest so much that a plan with the promise
+    /// `weakest` works; and whether the plan was given up.
+    pub(crate) fn run_strained(
+        &self,
+        executor: &str,
+        world: &mut dyn World,
+        stray: Stray,
+        weakest: Promise,
+    ) -> (Outcome, bool) {
+        let mut course = Course::new(&self.open.plan, stray);
+        let report = self.recorded(executor, world, &mut course);
+        let outcome = self.outcome(&report);
+        let is_in_vain = executor == "live" && course.is_given_up_in_vain(&self.subject.task);
+        let failure = match outcome.failure {
+            Some(_) if is_in_vain => Some("gives up a plan that works"),
+            failure => failure.filter(|_| course.is_promised(weakest)),
+        };
+        let why = outcome.why;
+        (Outcome { failure, why }, course.is_given_up())
+    }
+
     pub(crate) fn report(&self, executor: &str, world: &mut dyn World) -> Report {
+        self.recorded(executor, world, NoRecord)
+    }
+
+    fn recorded(&self, executor: &str, world: &mut dyn World, recorder: impl Recorder) -> Report {
         // What may go on without end is waited for.
         let patience = Patience {
             at_least: Rational::from(1_000_000_000_000_i64),
@@ -145,6 +173,7 @@ impl<'a> Ready<'a> {
             .with_settings(settings)
             .prepared_by(Remembered(self))
             .planned_by(NoPlanner)
+            .recorded_by(recorder)
             .run_in(world)
     }
 

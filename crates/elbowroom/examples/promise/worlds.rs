@@ -13,6 +13,8 @@ use elbowroom::sim::{Durations, Paced, SimWorld, WorldModel};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::strain::Lagging;
+
 /// How durations come about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
@@ -24,10 +26,21 @@ pub(crate) enum Kind {
     Spoiler,
     /// Somewhere in the sixteenth of the interval around what is planned, and one action starts late.
     Late,
+    /// One of them is outside its interval; the others are as with one of the kinds above, but for the spoiler's.
+    Outside,
+    /// As with a late start, but what is late is one look at the world.
+    LateLook,
 }
 
 impl Kind {
-    pub(crate) const ALL: [Self; 4] = [Self::Uniform, Self::Corner, Self::Spoiler, Self::Late];
+    pub(crate) const ALL: [Self; 6] = [
+        Self::Uniform,
+        Self::Corner,
+        Self::Spoiler,
+        Self::Late,
+        Self::Outside,
+        Self::LateLook,
+    ];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -35,6 +48,8 @@ impl Kind {
             Self::Corner => "corners",
             Self::Spoiler => "spoiler",
             Self::Late => "late start",
+            Self::Outside => "one outside",
+            Self::LateLook => "late look",
         }
     }
 }
@@ -124,17 +139,77 @@ impl<'a> Worlds<'a> {
         Paced::new(world, self.durations(Kind::Late, &mut rng))
     }
 
+    /// The world in which one duration is outside its interval and the others are of that kind, as drawn with
+    /// that seed, and whose duration it is. `None` if none can be outside.
+    pub(crate) fn outside(
+        &self,
+        kind: Kind,
+        seed: u64,
+    ) -> Option<(Paced<'_, Durations>, InstanceId)> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let all = self.instances.values().flatten();
+        let open = all.filter_map(|(id, parameter)| Some((*id, (*parameter)?)));
+        let mut strays: Vec<(InstanceId, Rational)> = Vec::new();
+        for (id, parameter) in open {
+            let interval = self.envelope.interval(parameter);
+            let share = Rational::new(rng.random_range(0..1000_i64), 1000);
+            if let Some(lower) = interval.lower.value().filter(|lower| lower.is_positive()) {
+                strays.push((id, lower * &share));
+            }
+            if let Some(upper) = interval.upper.value() {
+                let nominal = &self.prepared.plan.parameter(parameter).nominal;
+                let times = Rational::from(if rng.random_bool(0.2) { 20 } else { 1 });
+                let more = (nominal * share * times).max(Rational::new(1, 1000));
+                strays.push((id, upper + more));
+            }
+        }
+        if strays.is_empty() {
+            return None;
+        }
+        let stray = strays.swap_remove(rng.random_range(0..strays.len()));
+        let durations = self.durations_but(kind, &mut rng, Some(&stray));
+        Some((Paced::new(self.sim(), durations), stray.0))
+    }
+
+    /// The world in which one look comes late, and durations are as drawn with that seed, and which look it is.
+    pub(crate) fn late_look(&self, seed: u64) -> (Lagging<Paced<'_, Durations>>, u64) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let plan = &self.prepared.plan.plan;
+        let looks = rng.random_range(0..=2 * plan.nodes.len() as u64);
+        let times = plan.nodes().map(|(node, _)| &self.prepared.nominal[node]);
+        let whole = times.max().cloned().unwrap_or_default();
+        let lag = whole * Rational::new(rng.random_range(1..=200), 1000);
+        let inner = Paced::new(self.sim(), self.durations(Kind::Late, &mut rng));
+        (Lagging { inner, looks, lag }, looks)
+    }
+
     fn durations(&self, kind: Kind, rng: &mut ChaCha8Rng) -> Durations {
+        self.durations_but(kind, rng, None)
+    }
+
+    /// Durations, but for a stray one.
+    fn durations_but(
+        &self,
+        kind: Kind,
+        rng: &mut ChaCha8Rng,
+        stray: Option<&(InstanceId, Rational)>,
+    ) -> Durations {
+        let stray = |id: InstanceId| stray.filter(|(own, _)| *own == id);
         let mut durations = BTreeMap::new();
         for (name, instances) in &self.instances {
-            let values = instances.iter().map(|(id, parameter)| match parameter {
-                Some(parameter) => drawn(
-                    self.envelope.interval(*parameter),
-                    &self.prepared.plan.parameter(*parameter).nominal,
-                    kind,
-                    rng,
-                ),
-                None => self.nominal(*id),
+            let values = instances.iter().map(|(id, parameter)| {
+                if let Some((_, value)) = stray(*id) {
+                    return value.clone();
+                }
+                match parameter {
+                    Some(parameter) => drawn(
+                        self.envelope.interval(*parameter),
+                        &self.prepared.plan.parameter(*parameter).nominal,
+                        kind,
+                        rng,
+                    ),
+                    None => self.nominal(*id),
+                }
             });
             durations.insert(name.clone(), values.collect());
         }
