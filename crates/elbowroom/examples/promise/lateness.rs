@@ -77,15 +77,15 @@ fn is_overtaken(
     is_overtaken && is_concerned
 }
 
-/// What the plan puts after a node.
+/// What the plan does not allow before a node.
 fn later_than(plan: &ParametrizedPlan, first: NodeId) -> BTreeSet<NodeId> {
     let nominal = plan.nominal();
     let mut later = BTreeSet::new();
     let mut frontier = vec![first];
     while let Some(node) = frontier.pop() {
         for constraint in &plan.plan.constraints {
-            let at_least = |limit: Option<Rational>| limit.is_some_and(|it| it.is_positive());
-            let at_most = |limit: Option<Rational>| limit.is_some_and(|it| it.is_negative());
+            let at_least = |limit: Option<Rational>| limit.is_some_and(|it| !it.is_negative());
+            let at_most = |limit: Option<Rational>| limit.is_some_and(|it| !it.is_positive());
             let next = if constraint.from == node && at_least(constraint.lower.at(&nominal)) {
                 constraint.to
             } else if constraint.to == node && at_most(constraint.upper.at(&nominal)) {

@@ -153,8 +153,10 @@ impl<'a> Worlds<'a> {
         for (id, parameter) in open {
             let interval = self.envelope.interval(parameter);
             let share = Rational::new(rng.random_range(0..1000_i64), 1000);
-            if let Some(lower) = interval.lower.value().filter(|lower| lower.is_positive()) {
-                strays.push((id, lower * &share));
+            // What takes no time at all may stand against itself.
+            let least = self.task.epsilon();
+            if let Some(lower) = interval.lower.value().filter(|lower| *lower > least) {
+                strays.push((id, least + (lower - least) * &share));
             }
             if let Some(upper) = interval.upper.value() {
                 let nominal = &self.prepared.plan.parameter(parameter).nominal;
