@@ -9,7 +9,7 @@ use elbowroom::execution::run::{ExecutedStep, Report};
 use elbowroom::execution::{Cause, Prepared};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
-use elbowroom::plan::{InstanceId, Node, NodeId, ParametrizedPlan};
+use elbowroom::plan::{InstanceId, Node, NodeId, ParameterId, ParametrizedPlan};
 
 /// Whether a run ended because this action, of which the plan has no other, started too late, without the
 /// executor being able to know: it had not heard of the start, and either had no time left, or something failed
@@ -28,7 +28,7 @@ pub(crate) fn excuses(task: &Task, prepared: &Prepared, report: &Report, late: &
         Cause::Unreachable => true,
         Cause::Failed => {
             let failed = reason.action.as_deref().unwrap_or_default();
-            is_overtaken(task, &prepared.plan, report, [late, failed])
+            is_overtaken(task, prepared, report, [late, failed])
         }
         _ => false,
     }
@@ -36,19 +36,29 @@ pub(crate) fn excuses(task: &Task, prepared: &Prepared, report: &Report, late: &
 
 /// Whether an end or a timed initial has come before a start that the plan puts before it, and what failed
 /// is the action that starts there or one that ends after it. Who starts something that has to come later is
-/// to blame, and not the late start.
+/// to blame, and not the late start, unless it comes later only because of such an end.
 fn is_overtaken(
     task: &Task,
-    plan: &ParametrizedPlan,
+    prepared: &Prepared,
     report: &Report,
     [late, failed]: [&str; 2],
 ) -> bool {
+    let plan = &prepared.plan;
     let instances = (0..plan.plan.instances.len()).map(InstanceId::from);
     let name = |id: InstanceId| plan.plan.instance(id).action.name.as_str();
     let Some(start) = instances.clone().find(|id| name(*id) == late) else {
         return false;
     };
-    let later = later_than(plan, plan.plan.start(start));
+    let start = plan.plan.start(start);
+    let has_ended = |id: InstanceId| {
+        let mut executed = report.executed.iter();
+        executed.any(|it| it.ending.is_some() && it.step.action.name == name(id))
+    };
+    let later = later_than(prepared, start);
+    let kept = put_behind(plan, start, &|node| match plan.plan.nodes[node.index()] {
+        Node::End(id) => !has_ended(id),
+        _ => true,
+    });
     let names: BTreeSet<&str> = instances.clone().map(name).collect();
     let mut is_overtaken = plan.plan.nodes().any(|(node, what)| {
         matches!(what, Node::Timed(timed) if task.timed()[timed].time <= report.time)
@@ -62,11 +72,10 @@ fn is_overtaken(
             executed.filter(|executed| executed.step.action.name == own)
         };
         // More than those that need not wait for the late start.
-        let not_later = |node: fn(&ParametrizedPlan, InstanceId) -> NodeId| {
-            all().filter(|id| !later.contains(&node(plan, *id))).count()
-        };
-        let starts = not_later(|plan, id| plan.plan.start(id));
-        let ends = not_later(|plan, id| plan.plan.end(id));
+        let starts = all().filter(|id| !kept.contains(&plan.plan.start(*id)));
+        let starts = starts.count();
+        let ends = all().filter(|id| !later.contains(&plan.plan.end(*id)));
+        let ends = ends.count();
         if executed().count() > starts {
             return false;
         }
@@ -77,15 +86,68 @@ fn is_overtaken(
     is_overtaken && is_concerned
 }
 
-/// What the plan does not allow before a node.
-fn later_than(plan: &ParametrizedPlan, first: NodeId) -> BTreeSet<NodeId> {
+/// What an executor who relies on the box can bring about, or lets come about, only after a node: actions may end as
+/// soon as their lower ends have it, so what must come before their ends must not be left waiting for longer.
+fn later_than(prepared: &Prepared, first: NodeId) -> BTreeSet<NodeId> {
+    let plan = &prepared.plan;
+    let mut values = plan.nominal();
+    let lower_ends = (0..plan.parameters.len()).map(ParameterId::from).map(|id| {
+        let envelope = prepared.envelope.as_ref()?;
+        envelope.interval(id).lower.value().cloned()
+    });
+    for (index, lower) in lower_ends.enumerate() {
+        let value = &mut values[ParameterId::from(index)];
+        *value = lower.unwrap_or_else(|| value.clone());
+    }
+    let mut least: Vec<Option<Rational>> = vec![None; plan.plan.nodes.len()];
+    least[first.index()] = Some(Rational::ZERO);
+    let mut is_new = true;
+    while is_new {
+        is_new = false;
+        for constraint in &plan.plan.constraints {
+            let (from, to) = (constraint.from, constraint.to);
+            let bounds = [
+                (from, to, constraint.lower.at(&values)),
+                (to, from, constraint.upper.at(&values).map(|upper| -upper)),
+            ];
+            for (one, other, bound) in bounds {
+                let (Some(known), Some(bound)) = (&least[one.index()], bound) else {
+                    continue;
+                };
+                let time = known + bound;
+                if least[other.index()]
+                    .as_ref()
+                    .is_none_or(|least| time > *least)
+                {
+                    least[other.index()] = Some(time);
+                    is_new = true;
+                }
+            }
+        }
+    }
+    let nodes = plan.plan.nodes().map(|(node, _)| node);
+    let is_later = |node: &NodeId| {
+        *node != first
+            && least[node.index()]
+                .as_ref()
+                .is_some_and(|it| !it.is_negative())
+    };
+    nodes.filter(is_later).collect()
+}
+
+/// What the plan puts behind a node, one step after the other, each behind a node that `counts`.
+fn put_behind(
+    plan: &ParametrizedPlan,
+    first: NodeId,
+    counts: &dyn Fn(NodeId) -> bool,
+) -> BTreeSet<NodeId> {
     let nominal = plan.nominal();
-    let mut later = BTreeSet::new();
+    let mut behind = BTreeSet::new();
     let mut frontier = vec![first];
     while let Some(node) = frontier.pop() {
         for constraint in &plan.plan.constraints {
-            let at_least = |limit: Option<Rational>| limit.is_some_and(|it| !it.is_negative());
-            let at_most = |limit: Option<Rational>| limit.is_some_and(|it| !it.is_positive());
+            let at_least = |limit: Option<Rational>| limit.is_some_and(|it| it.is_positive());
+            let at_most = |limit: Option<Rational>| limit.is_some_and(|it| it.is_negative());
             let next = if constraint.from == node && at_least(constraint.lower.at(&nominal)) {
                 constraint.to
             } else if constraint.to == node && at_most(constraint.upper.at(&nominal)) {
@@ -93,10 +155,10 @@ fn later_than(plan: &ParametrizedPlan, first: NodeId) -> BTreeSet<NodeId> {
             } else {
                 continue;
             };
-            if later.insert(next) {
+            if behind.insert(next) && counts(next) {
                 frontier.push(next);
             }
         }
     }
-    later
+    behind
 }

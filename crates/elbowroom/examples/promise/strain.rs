@@ -11,7 +11,7 @@ use elbowroom::execution::{
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::plan::{
-    Bound, Constraint, InstanceId, Node, NodeId, ParametrizedPlan, network_node,
+    Bound, Constraint, InstanceId, Node, NodeId, ParametrizedPlan, Valuation, network_node,
 };
 use elbowroom::stn::{self, ConsistentNetwork, Network};
 
@@ -118,12 +118,12 @@ impl<'a> Course<'a> {
     fn works_from(&self, now: &Rational) -> bool {
         let plan = &self.plan.plan;
         let happened = |node: NodeId| self.happened[node.index()].as_ref();
-        let mut rest = plan.remainder(now, happened, |what| !matches!(what, Node::End(_)));
-        rest.constraints = rest.constraints_at(&self.plan.nominal());
+        let rest = plan.remainder(now, happened, |what| !matches!(what, Node::End(_)));
+        let values = self.plan.nominal();
         let mut network = Network::with_nodes(rest.nodes.len());
         for constraint in &rest.constraints {
             let (from, to) = (constraint.from, constraint.to);
-            let (lower, upper) = self.bounds(constraint, now);
+            let (lower, upper) = self.bounds(constraint, &values, now);
             let (from, to) = (network_node(from), network_node(to));
             if let Some(lower) = lower {
                 network.add(stn::Constraint::at_least(from, to, lower));
@@ -138,17 +138,15 @@ impl<'a> Course<'a> {
     fn bounds(
         &self,
         constraint: &Constraint,
+        values: &Valuation,
         now: &Rational,
     ) -> (Option<Rational>, Option<Rational>) {
-        let value = |bound: &Bound| match bound {
-            Bound::Finite(value) => Some(value.clone()),
-            Bound::Infinite | Bound::Parameter(_) => None,
-        };
-        let (lower, upper) = (value(&constraint.lower), value(&constraint.upper));
+        let (lower, upper) = (constraint.lower.at(values), constraint.upper.at(values));
+        let is_open = matches!(constraint.upper, Bound::Parameter(_));
         let happened = |node: NodeId| self.happened[node.index()].as_ref();
         match (happened(constraint.from), happened(constraint.to)) {
             (Some(_), Some(_)) => (None, None),
-            (Some(begun), None) if self.plan.plan.duration_of(constraint).is_some() => {
+            (Some(begun), None) if is_open && self.plan.plan.duration_of(constraint).is_some() => {
                 let elapsed = now - begun;
                 if upper.as_ref().is_some_and(|upper| *upper <= elapsed) {
                     (lower.max(Some(elapsed)), None)

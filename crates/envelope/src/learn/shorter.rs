@@ -6,6 +6,7 @@
 //! and often imply it.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use elbowroom_num::Rational;
 use elbowroom_plan::DecoupledEnvelope;
@@ -91,6 +92,7 @@ impl Shortcuts {
             return Vec::new();
         };
         let mut found = Vec::new();
+        let mut ranges = Vec::new();
         // Where the last one that was found begins: what begins there or before includes it.
         let mut beginning = 0;
         for end in 0..steps.len() {
@@ -100,22 +102,69 @@ impl Shortcuts {
             let mut length = back.length.clone();
             for begin in (beginning..=end).rev().take(FARTHEST) {
                 length += &steps[begin].length;
-                let from = steps[begin.checked_sub(1).unwrap_or(steps.len() - 1)].to;
+                let from = node_before(&steps, begin);
                 let Some(first) = self.after.get(&from) else {
                     continue;
                 };
                 if (&length + &first.length).is_negative() && end + 1 - begin < steps.len() {
-                    let own = steps[begin..=end].iter().map(|step| &step.part);
-                    let parts = first.parts.iter().chain(own).chain(&back.parts);
-                    found.extend(whole(reader, parts, envelope));
-
+                    let range = begin..=end;
+                    found.extend(self.cut_out(reader, &steps, &range, envelope));
+                    ranges.push(range);
                     beginning = begin + 1;
                     break;
                 }
             }
         }
+        found.extend(self.joined(reader, &steps, ranges, envelope));
         found
     }
+
+    /// What cycles say that go along two of these ranges one after the other, along four of them, eight and so on. A longer
+    /// cycle often leaves a little less room for each step than a shorter one; without these, a cycle along one range more
+    /// would come up each time that a box is looked at.
+    fn joined(
+        &self,
+        reader: &Reader<'_>,
+        steps: &[Step],
+        mut ranges: Vec<RangeInclusive<usize>>,
+        envelope: &DecoupledEnvelope,
+    ) -> Vec<Cut> {
+        let mut found = Vec::new();
+        while ranges.len() > 1 {
+            let mut next = Vec::new();
+            for pair in ranges.chunks(2) {
+                let [one, other] = pair else {
+                    next.extend_from_slice(pair);
+                    continue;
+                };
+                let range = *one.start()..=*other.end();
+                found.extend(self.cut_out(reader, steps, &range, envelope));
+                next.push(range);
+            }
+            ranges = next;
+        }
+        found
+    }
+
+    /// What the cycle says that goes from the beginning along these steps, and back.
+    fn cut_out(
+        &self,
+        reader: &Reader<'_>,
+        steps: &[Step],
+        range: &RangeInclusive<usize>,
+        envelope: &DecoupledEnvelope,
+    ) -> Option<Cut> {
+        let first = self.after.get(&node_before(steps, *range.start()))?;
+        let back = self.before.get(&steps[*range.end()].to)?;
+        let own = steps[range.clone()].iter().map(|step| &step.part);
+        let parts = first.parts.iter().chain(own).chain(&back.parts);
+        whole(reader, parts, envelope)
+    }
+}
+
+/// The node at which a step of a cycle begins.
+fn node_before(steps: &[Step], index: usize) -> NodeId {
+    steps[index.checked_sub(1).unwrap_or(steps.len() - 1)].to
 }
 
 fn keep_least(chords: &mut BTreeMap<NodeId, Chord>, node: NodeId, chord: Chord) {
