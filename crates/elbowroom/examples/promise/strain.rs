@@ -11,7 +11,7 @@ use elbowroom::execution::{
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::plan::{
-    Bound, Constraint, InstanceId, Node, NodeId, ParametrizedPlan, Valuation, network_node,
+    Bound, Constraint, InstanceId, NodeId, ParametrizedPlan, Valuation, network_node,
 };
 use elbowroom::stn::{self, ConsistentNetwork, Network};
 
@@ -118,7 +118,7 @@ impl<'a> Course<'a> {
     fn works_from(&self, now: &Rational) -> bool {
         let plan = &self.plan.plan;
         let happened = |node: NodeId| self.happened[node.index()].as_ref();
-        let rest = plan.remainder(now, happened, |what| !matches!(what, Node::End(_)));
+        let rest = plan.remainder(now, happened, |_| true);
         let values = self.plan.nominal();
         let mut network = Network::with_nodes(rest.nodes.len());
         for constraint in &rest.constraints {
