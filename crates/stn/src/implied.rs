@@ -173,8 +173,9 @@ impl<W: Weight> Search<'_, W> {
         });
         let mut reach = Reach::new(group_count);
         let mut outgoing = self.outgoing();
+        let hub = Hub::of(&outgoing);
         for source in sources {
-            reach.look_for_detours(&outgoing, source, &self.can_go);
+            reach.look_for_detours(&outgoing, source, hub.as_ref(), &self.can_go);
             for edges in outgoing.of(source).chunk_by(|a, b| a.target == b.target) {
                 self.thin_out(edges, reach.has_detour[edges[0].target]);
             }
@@ -257,6 +258,68 @@ impl<W> Outgoing<W> {
     }
 }
 
+/// A group with so many edges is a hub.
+const MANY_EDGES: usize = 8;
+
+/// The group from which most edges lead, and how far it is from everywhere: mostly that of the beginning, to which windows
+/// and deadlines bind all else. A search that went on from there would go everywhere.
+struct Hub<W> {
+    group: usize,
+    /// The lengths of the shortest paths to each group, and from each.
+    to: Vec<Option<W>>,
+    from: Vec<Option<W>>,
+}
+
+impl<W: Weight> Hub<W> {
+    fn of(outgoing: &Outgoing<W>) -> Option<Self> {
+        let groups = 0..outgoing.ranges.len();
+        let group = groups.max_by_key(|group| outgoing.of(*group).len())?;
+        if outgoing.of(group).len() < MANY_EDGES {
+            return None;
+        }
+        let mut forth: Vec<Vec<(usize, &W)>> = vec![Vec::new(); outgoing.ranges.len()];
+        let mut back = forth.clone();
+        for source in 0..outgoing.ranges.len() {
+            for edge in outgoing.of(source) {
+                forth[source].push((edge.target, &edge.length));
+                back[edge.target].push((source, &edge.length));
+            }
+        }
+        Some(Self {
+            group,
+            to: shortest(&forth, group),
+            from: shortest(&back, group),
+        })
+    }
+
+    /// The length of the shortest path between two other groups that leads through the hub.
+    fn between(&self, source: usize, target: usize) -> Option<W> {
+        if self.group == source || self.group == target {
+            return None;
+        }
+        let (there, on) = (self.from[source].as_ref()?, self.to[target].as_ref()?);
+        Some(there.plus(on))
+    }
+}
+
+/// The lengths of the shortest paths from a group (Dijkstra's algorithm).
+fn shortest<W: Weight>(edges: &[Vec<(usize, &W)>], start: usize) -> Vec<Option<W>> {
+    let mut known: Vec<Option<W>> = vec![None; edges.len()];
+    let mut queue = BinaryHeap::from([Reverse((W::zero(), start))]);
+    while let Some(Reverse((length, group))) = queue.pop() {
+        if known[group].is_some() {
+            continue;
+        }
+        for (target, own) in &edges[group] {
+            if known[*target].is_none() {
+                queue.push(Reverse((length.plus(own), *target)));
+            }
+        }
+        known[group] = Some(length);
+    }
+    known
+}
+
 /// The groups near a source, kept between searches to spare allocations.
 struct Reach<W> {
     /// The length of the shortest path found.
@@ -280,8 +343,14 @@ impl<W: Weight> Reach<W> {
     }
 
     /// Dijkstra's algorithm from `source`, as far as needed to know which of its edges have a
-    /// detour.
-    fn look_for_detours(&mut self, outgoing: &Outgoing<W>, source: usize, can_go: &[bool]) {
+    /// detour. How long those through the hub are is known beforehand.
+    fn look_for_detours(
+        &mut self,
+        outgoing: &Outgoing<W>,
+        source: usize,
+        hub: Option<&Hub<W>>,
+        can_go: &[bool],
+    ) {
         self.clear();
         self.is_final[source] = true;
         self.touched.push(source);
@@ -294,6 +363,8 @@ impl<W: Weight> Reach<W> {
                 continue;
             };
             self.reach(target, shortest.clone());
+            let by_hub = hub.and_then(|hub| hub.between(source, target));
+            self.has_detour[target] = by_hub.is_some_and(|length| length <= *shortest);
             if edges.iter().any(|edge| can_go[edge.id.index()]) {
                 open.push((shortest.clone(), target));
             }
@@ -310,7 +381,8 @@ impl<W: Weight> Reach<W> {
             if length > *limit {
                 return;
             }
-            if std::mem::replace(&mut self.is_final[group], true) {
+            let is_hub = hub.is_some_and(|hub| hub.group == group);
+            if std::mem::replace(&mut self.is_final[group], true) || is_hub {
                 continue;
             }
             for edge in outgoing.of(group) {
