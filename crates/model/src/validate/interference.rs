@@ -1,9 +1,12 @@
 //! The no-moving-targets rule: interfering happenings keep their distance.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::judge::Judge;
 use super::stop::Stop;
 use super::timeline::{Group, Happening, What};
 use super::violation::Mistake;
+use crate::ground::{FactId, FluentId};
 use crate::interference::Footprint;
 use crate::task::Task;
 
@@ -12,9 +15,13 @@ pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), S
     let Some((group, earlier)) = groups.split_last() else {
         return Ok(());
     };
+    let touched =
+        |group: &Group<'a>| Touched::by(group.happenings.iter().map(|own| &own.footprint));
+    let own = touched(group);
     for (position, second) in group.happenings.iter().enumerate() {
-        for first in &group.happenings[..position] {
-            compare(judge, first, second)?;
+        let near = own.near(&second.footprint).into_iter();
+        for first in near.take_while(|first| *first < position) {
+            compare(judge, &group.happenings[first], second)?;
         }
     }
     if !judge.settings.needs_separation {
@@ -28,8 +35,10 @@ pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), S
         if reach <= group.time && reach <= *latest {
             break;
         }
+        let own = touched(before);
         for second in &group.happenings {
-            for first in &before.happenings {
+            for first in own.near(&second.footprint) {
+                let first = &before.happenings[first];
                 if &second.time - &first.time < *separation {
                     compare(judge, first, second)?;
                 }
@@ -37,6 +46,87 @@ pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), S
         }
     }
     Ok(())
+}
+
+/// So few happenings are compared with each other, whatever they touch.
+const FEW: usize = 16;
+
+/// Which happenings of a group, by position, read and write what: of thousands at once most share nothing, and need not be
+/// compared with each other.
+struct Touched {
+    count: usize,
+    /// `None` if there are few.
+    by: Option<BTreeMap<Touch, Vec<usize>>>,
+}
+
+/// One entry of a [`Footprint`].
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Touch {
+    Reads(FactId),
+    Adds(FactId),
+    Deletes(FactId),
+    ReadsFluent(FluentId),
+    Shifts(FluentId),
+    Assigns(FluentId),
+}
+
+impl Touched {
+    fn by<'a>(footprints: impl ExactSizeIterator<Item = &'a Footprint>) -> Self {
+        let count = footprints.len();
+        let by = (count > FEW).then(|| {
+            let mut by: BTreeMap<Touch, Vec<usize>> = BTreeMap::new();
+            for (position, footprint) in footprints.enumerate() {
+                for touch in touches(footprint) {
+                    by.entry(touch).or_default().push(position);
+                }
+            }
+            by
+        });
+        Self { count, by }
+    }
+
+    /// Those that may interfere with such a happening, in order: all that do are among them.
+    fn near(&self, footprint: &Footprint) -> Vec<usize> {
+        let Some(by) = &self.by else {
+            return (0..self.count).collect();
+        };
+        let against = touches(footprint).flat_map(against);
+        let mut near: Vec<usize> = against
+            .filter_map(|touch| by.get(&touch))
+            .flatten()
+            .copied()
+            .collect();
+        near.sort_unstable();
+        near.dedup();
+        near
+    }
+}
+
+fn touches(footprint: &Footprint) -> impl Iterator<Item = Touch> {
+    let reads = footprint.reads.iter().copied().map(Touch::Reads);
+    let adds = footprint.adds.iter().copied().map(Touch::Adds);
+    let deletes = footprint.deletes.iter().copied().map(Touch::Deletes);
+    let fluents = footprint.reads_fluents.iter().copied();
+    let shifts = footprint.shifts.iter().copied().map(Touch::Shifts);
+    let assigns = footprint.assigns.iter().copied().map(Touch::Assigns);
+    let facts = reads.chain(adds).chain(deletes);
+    let fluents = fluents.map(Touch::ReadsFluent).chain(shifts).chain(assigns);
+    facts.chain(fluents)
+}
+
+/// What one that touches so interferes with.
+fn against(touch: Touch) -> Vec<Touch> {
+    match touch {
+        Touch::Reads(fact) => vec![Touch::Adds(fact), Touch::Deletes(fact)],
+        Touch::Adds(fact) => vec![Touch::Reads(fact), Touch::Deletes(fact)],
+        Touch::Deletes(fact) => vec![Touch::Reads(fact), Touch::Adds(fact)],
+        Touch::ReadsFluent(fluent) => vec![Touch::Shifts(fluent), Touch::Assigns(fluent)],
+        Touch::Shifts(fluent) => vec![Touch::ReadsFluent(fluent), Touch::Assigns(fluent)],
+        Touch::Assigns(fluent) => {
+            let read = Touch::ReadsFluent(fluent);
+            vec![read, Touch::Assigns(fluent), Touch::Shifts(fluent)]
+        }
+    }
 }
 
 fn compare<'a>(
@@ -95,4 +185,42 @@ pub(super) fn over(task: &Task, a: &Footprint, b: &Footprint) -> String {
         }
     }
     "nothing".to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::collection::{btree_set, vec};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn footprint() -> impl Strategy<Value = Footprint> {
+        let facts = || btree_set((0..40_u32).prop_map(FactId), 0..3);
+        let fluents = || btree_set((0..40_u32).prop_map(FluentId), 0..2);
+        let sets = (facts(), facts(), facts(), fluents(), fluents(), fluents());
+        sets.prop_map(
+            |(reads, adds, deletes, reads_fluents, shifts, assigns)| Footprint {
+                reads,
+                adds,
+                deletes,
+                reads_fluents,
+                shifts,
+                assigns,
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn those_near_a_happening_are_those_that_interfere_with_it(
+            all in vec(footprint(), FEW + 1..60),
+            one in footprint(),
+        ) {
+            let interfering = all.iter().enumerate().filter(|(_, other)| other.interferes_with(&one));
+            let interfering: Vec<usize> = interfering.map(|(position, _)| position).collect();
+            prop_assert_eq!(Touched::by(all.iter()).near(&one), interfering);
+            let few = Touched::by(all[..FEW].iter()).near(&one);
+            prop_assert_eq!(few, (0..FEW).collect::<Vec<_>>());
+        }
+    }
 }
