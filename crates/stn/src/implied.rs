@@ -279,9 +279,9 @@ impl<W: Weight> Hub<W> {
         }
         let mut forth: Vec<Vec<(usize, &W)>> = vec![Vec::new(); outgoing.ranges.len()];
         let mut back = forth.clone();
-        for source in 0..outgoing.ranges.len() {
+        for (source, leaving) in forth.iter_mut().enumerate() {
             for edge in outgoing.of(source) {
-                forth[source].push((edge.target, &edge.length));
+                leaving.push((edge.target, &edge.length));
                 back[edge.target].push((source, &edge.length));
             }
         }
