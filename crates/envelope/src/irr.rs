@@ -1,7 +1,6 @@
 //! Incremental Rectangular Robustification.
 
 mod ahead;
-mod own_bounds;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
