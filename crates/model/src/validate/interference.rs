@@ -1,6 +1,6 @@
 //! The no-moving-targets rule: interfering happenings keep their distance.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::judge::Judge;
 use super::stop::Stop;
