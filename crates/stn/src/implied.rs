@@ -4,6 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
+use crate::paths::ShortestPaths;
 use crate::{ConsistentNetwork, ConstraintId, NodeId, Schedule, Weight};
 
 impl<W: Weight> ConsistentNetwork<W> {
@@ -173,7 +174,7 @@ impl<W: Weight> Search<'_, W> {
         });
         let mut reach = Reach::new(group_count);
         let mut outgoing = self.outgoing();
-        let hub = Hub::of(&outgoing);
+        let hub = Hub::of(self, &outgoing);
         for source in sources {
             reach.look_for_detours(&outgoing, source, hub.as_ref(), &self.can_go);
             for edges in outgoing.of(source).chunk_by(|a, b| a.target == b.target) {
@@ -265,30 +266,31 @@ const MANY_EDGES: usize = 8;
 /// and deadlines bind all else. A search that went on from there would go everywhere.
 struct Hub<W> {
     group: usize,
-    /// The lengths of the shortest paths to each group, and from each.
+    /// The lengths of the shortest paths from each group to the hub, and from the hub to each, but for the hub's own time:
+    /// it is subtracted from the one and added to the other.
     to: Vec<Option<W>>,
     from: Vec<Option<W>>,
 }
 
 impl<W: Weight> Hub<W> {
-    fn of(outgoing: &Outgoing<W>) -> Option<Self> {
-        let groups = 0..outgoing.ranges.len();
-        let group = groups.max_by_key(|group| outgoing.of(*group).len())?;
+    fn of(search: &Search<'_, W>, outgoing: &Outgoing<W>) -> Option<Self> {
+        let groups = &search.rigid.groups;
+        let group = (0..groups.len()).max_by_key(|group| outgoing.of(*group).len())?;
         if outgoing.of(group).len() < MANY_EDGES {
             return None;
         }
-        let mut forth: Vec<Vec<(usize, &W)>> = vec![Vec::new(); outgoing.ranges.len()];
-        let mut back = forth.clone();
-        for (source, leaving) in forth.iter_mut().enumerate() {
-            for edge in outgoing.of(source) {
-                leaving.push((edge.target, &edge.length));
-                back[edge.target].push((source, &edge.length));
-            }
-        }
+        let root = groups[group][0];
+        let lengths = |paths: &ShortestPaths<W>| {
+            let length = |members: &Vec<NodeId>| {
+                let distance = paths.distance(members[0])?;
+                Some(paths.direction().key(distance, members[0], search.schedule))
+            };
+            groups.iter().map(length).collect()
+        };
         Some(Self {
             group,
-            to: shortest(&forth, group),
-            from: shortest(&back, group),
+            to: lengths(&search.network.shortest_paths_to(root)),
+            from: lengths(&search.network.shortest_paths_from(root)),
         })
     }
 
@@ -297,27 +299,9 @@ impl<W: Weight> Hub<W> {
         if self.group == source || self.group == target {
             return None;
         }
-        let (there, on) = (self.from[source].as_ref()?, self.to[target].as_ref()?);
+        let (there, on) = (self.to[source].as_ref()?, self.from[target].as_ref()?);
         Some(there.plus(on))
     }
-}
-
-/// The lengths of the shortest paths from a group (Dijkstra's algorithm).
-fn shortest<W: Weight>(edges: &[Vec<(usize, &W)>], start: usize) -> Vec<Option<W>> {
-    let mut known: Vec<Option<W>> = vec![None; edges.len()];
-    let mut queue = BinaryHeap::from([Reverse((W::zero(), start))]);
-    while let Some(Reverse((length, group))) = queue.pop() {
-        if known[group].is_some() {
-            continue;
-        }
-        for (target, own) in &edges[group] {
-            if known[*target].is_none() {
-                queue.push(Reverse((length.plus(own), *target)));
-            }
-        }
-        known[group] = Some(length);
-    }
-    known
 }
 
 /// The groups near a source, kept between searches to spare allocations.

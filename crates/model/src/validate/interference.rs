@@ -1,12 +1,9 @@
 //! The no-moving-targets rule: interfering happenings keep their distance.
 
-use std::collections::BTreeMap;
-
 use super::judge::Judge;
 use super::stop::Stop;
 use super::timeline::{Group, Happening, What};
 use super::violation::Mistake;
-use crate::ground::{FactId, FluentId};
 use crate::interference::Footprint;
 use crate::task::Task;
 
@@ -51,35 +48,42 @@ pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), S
 /// So few happenings are compared with each other, whatever they touch.
 const FEW: usize = 16;
 
+/// The ways in which a footprint touches a fact or a fluent.
+const READS: usize = 0;
+const ADDS: usize = 1;
+const DELETES: usize = 2;
+const READS_FLUENT: usize = 3;
+const SHIFTS: usize = 4;
+const ASSIGNS: usize = 5;
+
+/// For each of these ways, those that it interferes with.
+const AGAINST: [&[usize]; 6] = [
+    &[ADDS, DELETES],
+    &[READS, DELETES],
+    &[READS, ADDS],
+    &[SHIFTS, ASSIGNS],
+    &[READS_FLUENT, ASSIGNS],
+    &[READS_FLUENT, SHIFTS, ASSIGNS],
+];
+
 /// Which happenings of a group, by position, read and write what: of thousands at once most share nothing, and need not be
 /// compared with each other.
 struct Touched {
     count: usize,
-    /// `None` if there are few.
-    by: Option<BTreeMap<Touch, Vec<usize>>>,
-}
-
-/// One entry of a [`Footprint`].
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Touch {
-    Reads(FactId),
-    Adds(FactId),
-    Deletes(FactId),
-    ReadsFluent(FluentId),
-    Shifts(FluentId),
-    Assigns(FluentId),
+    /// What is touched and how, as [`place`] numbers it, and by which; in order. `None` if there are few.
+    by: Option<Vec<(usize, usize)>>,
 }
 
 impl Touched {
     fn by<'a>(footprints: impl ExactSizeIterator<Item = &'a Footprint>) -> Self {
         let count = footprints.len();
         let by = (count > FEW).then(|| {
-            let mut by: BTreeMap<Touch, Vec<usize>> = BTreeMap::new();
+            let mut by = Vec::new();
             for (position, footprint) in footprints.enumerate() {
-                for touch in touches(footprint) {
-                    by.entry(touch).or_default().push(position);
-                }
+                let own = touches(footprint).into_iter();
+                by.extend(own.map(|(id, how)| (place(id, how), position)));
             }
+            by.sort_unstable();
             by
         });
         Self { count, by }
@@ -90,43 +94,41 @@ impl Touched {
         let Some(by) = &self.by else {
             return (0..self.count).collect();
         };
-        let against = touches(footprint).flat_map(against);
-        let mut near: Vec<usize> = against
-            .filter_map(|touch| by.get(&touch))
-            .flatten()
-            .copied()
-            .collect();
+        let mut near = Vec::new();
+        for (id, how) in touches(footprint) {
+            for other in AGAINST[how] {
+                let place = place(id, *other);
+                let first = by.partition_point(|(own, _)| *own < place);
+                let those = by[first..].iter().take_while(|(own, _)| *own == place);
+                near.extend(those.map(|(_, position)| *position));
+            }
+        }
         near.sort_unstable();
         near.dedup();
         near
     }
 }
 
-fn touches(footprint: &Footprint) -> impl Iterator<Item = Touch> {
-    let reads = footprint.reads.iter().copied().map(Touch::Reads);
-    let adds = footprint.adds.iter().copied().map(Touch::Adds);
-    let deletes = footprint.deletes.iter().copied().map(Touch::Deletes);
-    let fluents = footprint.reads_fluents.iter().copied();
-    let shifts = footprint.shifts.iter().copied().map(Touch::Shifts);
-    let assigns = footprint.assigns.iter().copied().map(Touch::Assigns);
-    let facts = reads.chain(adds).chain(deletes);
-    let fluents = fluents.map(Touch::ReadsFluent).chain(shifts).chain(assigns);
-    facts.chain(fluents)
+/// The number of a fact or a fluent that is touched in that way.
+fn place(id: u32, how: usize) -> usize {
+    id as usize * AGAINST.len() + how
 }
 
-/// What one that touches so interferes with.
-fn against(touch: Touch) -> Vec<Touch> {
-    match touch {
-        Touch::Reads(fact) => vec![Touch::Adds(fact), Touch::Deletes(fact)],
-        Touch::Adds(fact) => vec![Touch::Reads(fact), Touch::Deletes(fact)],
-        Touch::Deletes(fact) => vec![Touch::Reads(fact), Touch::Adds(fact)],
-        Touch::ReadsFluent(fluent) => vec![Touch::Shifts(fluent), Touch::Assigns(fluent)],
-        Touch::Shifts(fluent) => vec![Touch::ReadsFluent(fluent), Touch::Assigns(fluent)],
-        Touch::Assigns(fluent) => {
-            let read = Touch::ReadsFluent(fluent);
-            vec![read, Touch::Assigns(fluent), Touch::Shifts(fluent)]
-        }
+fn touches(footprint: &Footprint) -> Vec<(u32, usize)> {
+    let mut touches = Vec::new();
+    let facts = [&footprint.reads, &footprint.adds, &footprint.deletes];
+    for (how, facts) in facts.into_iter().enumerate() {
+        touches.extend(facts.iter().map(|fact| (fact.0, READS + how)));
     }
+    let fluents = [
+        &footprint.reads_fluents,
+        &footprint.shifts,
+        &footprint.assigns,
+    ];
+    for (how, fluents) in fluents.into_iter().enumerate() {
+        touches.extend(fluents.iter().map(|fluent| (fluent.0, READS_FLUENT + how)));
+    }
+    touches
 }
 
 fn compare<'a>(
@@ -193,6 +195,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::ground::{FactId, FluentId};
 
     fn footprint() -> impl Strategy<Value = Footprint> {
         let facts = || btree_set((0..40_u32).prop_map(FactId), 0..3);
