@@ -1,6 +1,7 @@
 //! Incremental Rectangular Robustification.
 
 mod ahead;
+mod own_bounds;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;

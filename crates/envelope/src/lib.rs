@@ -75,7 +75,6 @@ mod method;
 mod objection;
 pub mod obligations;
 mod oracle;
-mod own_bounds;
 mod proved;
 mod ray;
 pub mod reduction;

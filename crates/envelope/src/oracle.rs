@@ -13,7 +13,6 @@ use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
 use crate::known::Known;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
-use crate::own_bounds::OwnBounds;
 use crate::soundness::{Broken, Conditions, Counterexample, Soundness};
 
 /// Decides whether a plan is guaranteed to work in a box: for all values in it there is a
@@ -60,8 +59,6 @@ pub struct Oracle {
     without_schedule: usize,
     /// What the last search has found out.
     known: Known,
-    /// How far single constraints let ends reach, once it has been asked for.
-    own_bounds: Option<OwnBounds>,
 }
 
 /// What of a plan is asked about.
@@ -137,7 +134,6 @@ impl Oracle {
             checks: 0,
             without_schedule: 0,
             known: Known::default(),
-            own_bounds: None,
         })
     }
 

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
+use super::own_bounds::OwnBounds;
 use super::{MOST_UNDECIDED, Settings, StopReason, Widening, farthest};
 use crate::cut::Cut;
 use crate::frontier::Frontier;
@@ -20,7 +21,6 @@ use crate::learn::Learnt;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
-use crate::own_bounds::OwnBounds;
 
 /// So many cuts at once are taken for most of what there is to know.
 const MANY: usize = 2;

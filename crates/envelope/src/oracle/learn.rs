@@ -9,7 +9,6 @@ use crate::known::Known;
 use crate::learn::Learnt;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
-use crate::own_bounds::OwnBounds;
 
 impl Oracle {
     /// Whether the box, which holds the nominal values, is inside the envelope, and if not, what
@@ -133,8 +132,8 @@ impl Oracle {
         self.known = known;
     }
 
-    /// Like [`objection`](Self::objection), of a box with one end moved out. Where a search has come across a reason that
-    /// refuses that box as well, or a single constraint of the plan does, the network is not looked at.
+    /// Like [`objection`](Self::objection), of a box with one end moved out. Where a search has come across a reason that refuses that box as well, it is not looked for
+    /// again.
     ///
     /// # Errors
     /// When there are too many cases to tell apart.
@@ -153,14 +152,6 @@ impl Oracle {
             {
                 self.checks += 1;
                 return Ok(Some(objection));
-            }
-            let plan = &self.plan;
-            let bounds = self.own_bounds.get_or_insert_with(|| OwnBounds::of(plan));
-            if bounds.exclude(end, Some(to)) {
-                self.checks += 1;
-                let mut values = envelope.nearest(&self.plan.nominal());
-                values[end.parameter] = end.side.at_reach(to);
-                return Ok(Some(Objection::NoSchedule(values)));
             }
         }
         self.objection(&end.with_reach(envelope, reach))

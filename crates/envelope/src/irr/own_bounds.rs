@@ -1,0 +1,81 @@
+//! Bounds on the very differences that parameters are.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, BoxEnd, Constraint, NodeId, ParameterId, ParametrizedPlan, Side};
+
+/// How far out the ends of parameters may lie at most because of single constraints of the plan.
+///
+/// A parameter that is the difference of two times cannot be where another bound on this difference forbids it. This
+/// is read off the plan in no time, and where nothing else is in the way, it is all that has to be known.
+pub(super) struct OwnBounds {
+    /// By parameter: how far its lower and its upper end can reach.
+    most: Vec<[Option<Rational>; 2]>,
+}
+
+impl OwnBounds {
+    pub(super) fn of(plan: &ParametrizedPlan) -> Self {
+        let constraints = &plan.plan.constraints;
+        let mut differences: Vec<Vec<(NodeId, ParameterId)>> =
+            vec![Vec::new(); plan.plan.nodes.len()];
+        for (from, to, parameter) in constraints.iter().filter_map(difference) {
+            differences[to.index()].push((from, parameter));
+        }
+        let mut bounds = Self {
+            most: vec![[None, None]; plan.parameters.len()],
+        };
+        for constraint in constraints {
+            let (from, to) = (constraint.from, constraint.to);
+            let [least, most] = [&constraint.lower, &constraint.upper].map(finite);
+            for parameter in with_ends(&differences, (from, to)) {
+                bounds.add(parameter, Side::Lower, least.map(|least| -least));
+                bounds.add(parameter, Side::Upper, most.cloned());
+            }
+            for parameter in with_ends(&differences, (to, from)) {
+                bounds.add(parameter, Side::Lower, most.cloned());
+                bounds.add(parameter, Side::Upper, least.map(|least| -least));
+            }
+        }
+        bounds
+    }
+
+    /// The end can reach no further.
+    fn add(&mut self, parameter: ParameterId, side: Side, reach: Option<Rational>) {
+        let Some(reach) = reach else { return };
+        let most = &mut self.most[parameter.index()][side.index()];
+        if most.as_ref().is_none_or(|most| reach < *most) {
+            *most = Some(reach);
+        }
+    }
+
+    /// Whether no value so far out has a schedule; `None` is infinitely far.
+    pub(super) fn exclude(&self, end: BoxEnd, reach: Option<&Rational>) -> bool {
+        let most = &self.most[end.parameter.index()][end.side.index()];
+        most.as_ref()
+            .is_some_and(|most| reach.is_none_or(|reach| reach > most))
+    }
+}
+
+/// The parameter that a constraint says to be the difference of its nodes' times.
+fn difference(constraint: &Constraint) -> Option<(NodeId, NodeId, ParameterId)> {
+    let parameter = constraint.lower.parameter()?;
+    let is_whole = constraint.upper.parameter() == Some(parameter);
+    is_whole.then_some((constraint.from, constraint.to, parameter))
+}
+
+/// The parameters that are the difference of these times, of those that each node is the later one of.
+fn with_ends(
+    differences: &[Vec<(NodeId, ParameterId)>],
+    (from, to): (NodeId, NodeId),
+) -> impl Iterator<Item = ParameterId> {
+    let those = differences[to.index()].iter();
+    those
+        .filter(move |(start, _)| *start == from)
+        .map(|&(_, parameter)| parameter)
+}
+
+fn finite(bound: &Bound) -> Option<&Rational> {
+    match bound {
+        Bound::Finite(value) => Some(value),
+        Bound::Infinite | Bound::Parameter(_) => None,
+    }
+}
