@@ -65,7 +65,7 @@ pub(crate) struct Course<'a> {
     promises: Vec<Promise>,
     /// How many promises had been made when the stray was noticed.
     noticed: Option<usize>,
-    /// When and why the plan was given up, and what had happened by then.
+    /// When and why the plan was given up; nothing is noted after that.
     given_up: Option<(Rational, Cause)>,
 }
 

@@ -152,16 +152,23 @@ impl World for Ticking<'_> {
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
         let told = (until / &self.every).ceil() * &self.every;
-        let mut observations = Vec::new();
-        loop {
-            let passage = self.inner.wait(&told)?;
-            observations.extend(passage.observations);
-            if passage.now >= told {
-                let now = passage.now;
-                return Ok(Passage { now, observations });
-            }
-        }
+        let first = self.inner.wait(&told)?;
+        all_until(&mut self.inner, first, &told)
     }
+}
+
+/// A passage of time that goes on until then, whatever is observed meanwhile.
+fn all_until(
+    world: &mut SimWorld<'_>,
+    mut passage: Passage,
+    until: &Rational,
+) -> Result<Passage, WorldError> {
+    while passage.now < *until {
+        let later = world.wait(until)?;
+        passage.observations.extend(later.observations);
+        passage.now = later.now;
+    }
+    Ok(passage)
 }
 
 /// A world at which somebody looks later than he said he would, by so much.
@@ -177,16 +184,8 @@ impl World for Lagging<'_> {
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
         let first = self.inner.wait(until)?;
-        let mut observations = first.observations;
-        let looked_at = first.now + &self.lag;
-        loop {
-            let passage = self.inner.wait(&looked_at)?;
-            observations.extend(passage.observations);
-            if passage.now >= looked_at {
-                let now = passage.now;
-                return Ok(Passage { now, observations });
-            }
-        }
+        let looked_at = &first.now + &self.lag;
+        all_until(&mut self.inner, first, &looked_at)
     }
 }
 
