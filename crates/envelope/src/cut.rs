@@ -73,6 +73,36 @@ pub(crate) struct Ends {
     factors: BTreeMap<BoxEnd, Rational>,
 }
 
+/// What one step of a cycle is as long as.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Length {
+    /// Whatever the box.
+    Fixed(Rational),
+    /// So often an end.
+    End(BoxEnd, Rational),
+}
+
+impl Length {
+    /// In a box; `None` if it is infinite.
+    pub(crate) fn value(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
+        match self {
+            Self::Fixed(length) => Some(length.clone()),
+            Self::End(end, factor) => {
+                let interval = envelope.interval(end.parameter);
+                Some(factor * end.side.of(interval).value()?)
+            }
+        }
+    }
+}
+
+impl From<Length> for Ends {
+    fn from(length: Length) -> Self {
+        let mut ends = Self::default();
+        ends.add_length(&length);
+        ends
+    }
+}
+
 impl Ends {
     pub(crate) fn constant(constant: Rational) -> Self {
         Self {
@@ -86,6 +116,13 @@ impl Ends {
         *sum += factor;
         if sum.is_zero() {
             self.factors.remove(&end);
+        }
+    }
+
+    pub(crate) fn add_length(&mut self, length: &Length) {
+        match length {
+            Length::Fixed(length) => self.constant += length,
+            Length::End(end, factor) => self.add_end(*end, factor),
         }
     }
 

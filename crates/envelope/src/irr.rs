@@ -2,6 +2,7 @@
 
 mod ahead;
 mod own_bounds;
+mod pieces;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -29,6 +30,9 @@ pub struct Settings {
     pub growth: Growth,
     /// The limit on box checks.
     pub most_checks: Option<usize>,
+    /// Whether conflicts along many windows are divided into conditions from one window to the next, once more and more
+    /// of them come up. The box of a long plan may be a little smaller so, and is found far sooner.
+    pub divides: bool,
 }
 
 impl Default for Settings {
@@ -38,6 +42,7 @@ impl Default for Settings {
             relative: None,
             growth: Growth::default(),
             most_checks: None,
+            divides: false,
         }
     }
 }

@@ -1,11 +1,14 @@
 //! What is known to stand against wider boxes: [`Known`].
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::cmp::Ordering;
+use std::collections::BTreeSet;
+use std::ops::Range;
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 
-use crate::cut::Cut;
+use crate::cut::{Cut, Ground};
+use crate::row::Row;
 
 /// The cuts that a search has come across, and how much room each leaves to a box inside the
 /// envelope, the present one.
@@ -15,45 +18,67 @@ use crate::cut::Cut;
 /// however many parameters a cut is about.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Known {
-    cuts: Vec<Cut>,
-    /// For each cut, the room that each of its rows leaves; `None` if the row does not hold because
-    /// an infinite end counts.
-    room: Vec<Vec<Option<Rational>>>,
-    /// By end: where it counts.
-    mentions: BTreeMap<BoxEnd, Vec<Mention>>,
+    cuts: Vec<KnownCut>,
+    rows: Vec<Row>,
+    /// For each row, the room that it leaves; `None` if it does not hold because an infinite end counts.
+    room: Vec<Option<Rational>>,
+    /// By end ([`place`]), and then by cut: where it counts.
+    mentions: Vec<Vec<Mention>>,
     /// Ends that cannot be infinite.
     finite: BTreeSet<BoxEnd>,
     /// The present box, if it is known.
     looked_at: Option<DecoupledEnvelope>,
     /// The room of rows before it was changed, in order, since the present box was settled.
-    before: Vec<(usize, usize, Option<Rational>)>,
+    before: Vec<(usize, Option<Rational>)>,
 }
 
-/// A cut that an end counts in.
+/// Rows of which one has to hold.
+#[derive(Clone, Debug)]
+pub(crate) struct KnownCut {
+    rows: Range<usize>,
+    /// Why; `None` if boxes are only wanted to be so.
+    ground: Option<Ground>,
+}
+
+/// A row that an end counts in.
 #[derive(Clone, Debug)]
 struct Mention {
     cut: usize,
-    /// The rows with the end, and its factor in each.
-    rows: Vec<(usize, Rational)>,
+    row: usize,
+    factor: Rational,
 }
 
 impl Known {
     /// One more cut. The present box, which is settled, is this one.
     pub(crate) fn add(&mut self, cut: Cut, envelope: &DecoupledEnvelope) {
+        self.add_rows(cut.rows, Some(cut.ground), envelope);
+    }
+
+    /// One more condition that boxes are wanted to meet, though those inside the envelope need not.
+    pub(crate) fn want(&mut self, row: Row, envelope: &DecoupledEnvelope) {
+        self.add_rows(vec![row], None, envelope);
+    }
+
+    fn add_rows(&mut self, rows: Vec<Row>, ground: Option<Ground>, envelope: &DecoupledEnvelope) {
         self.looked_at = None;
-        let index = self.cuts.len();
-        let mut rows: BTreeMap<BoxEnd, Vec<(usize, Rational)>> = BTreeMap::new();
-        for (place, row) in cut.rows.iter().enumerate() {
+        let (cut, first) = (self.cuts.len(), self.rows.len());
+        for (offset, row) in rows.iter().enumerate() {
             for (end, factor) in &row.factors {
-                rows.entry(*end).or_default().push((place, factor.clone()));
+                let place = place(*end);
+                if place >= self.mentions.len() {
+                    self.mentions.resize_with(place + 1, Vec::new);
+                }
+                self.mentions[place].push(Mention {
+                    cut,
+                    row: first + offset,
+                    factor: factor.clone(),
+                });
             }
+            self.room.push(room(row, envelope));
         }
-        for (end, rows) in rows {
-            let mention = Mention { cut: index, rows };
-            self.mentions.entry(end).or_default().push(mention);
-        }
-        self.room.push(room(&cut, envelope));
-        self.cuts.push(cut);
+        self.rows.extend(rows);
+        let rows = first..self.rows.len();
+        self.cuts.push(KnownCut { rows, ground });
     }
 
     /// The end was refused to be infinite, and will be in all wider boxes.
@@ -64,16 +89,9 @@ impl Known {
     /// The present box is this one, if it was another.
     pub(crate) fn look_at(&mut self, envelope: &DecoupledEnvelope) {
         if self.looked_at.as_ref() != Some(envelope) {
-            self.reset(envelope);
+            self.before.clear();
+            self.room = self.rows.iter().map(|row| room(row, envelope)).collect();
             self.looked_at = Some(envelope.clone());
-        }
-    }
-
-    /// The present box is this one.
-    fn reset(&mut self, envelope: &DecoupledEnvelope) {
-        self.before.clear();
-        for (cut, left) in self.cuts.iter().zip(&mut self.room) {
-            *left = room(cut, envelope);
         }
     }
 
@@ -86,59 +104,65 @@ impl Known {
     /// first.
     pub(crate) fn undo(&mut self) {
         self.looked_at = None;
-        for (cut, place, room) in self.before.drain(..).rev() {
-            self.room[cut][place] = room;
+        for (row, room) in self.before.drain(..).rev() {
+            self.room[row] = room;
         }
     }
 
     /// Whether the present box with an end moved out from `from` to `to` is known not to be inside
-    /// the envelope. `None` is infinitely far.
+    /// the envelope, or not wanted. `None` is infinitely far.
     pub(crate) fn refuses(&self, end: BoxEnd, from: &Rational, to: Option<&Rational>) -> bool {
         to.is_none() && self.finite.contains(&end) || self.against(end, from, to).is_some()
     }
 
-    /// A cut that stands against that box.
+    /// The rows that stand against that box, and why one of them has to hold.
     pub(crate) fn against(
         &self,
         end: BoxEnd,
         from: &Rational,
         to: Option<&Rational>,
-    ) -> Option<&Cut> {
-        let mut mentions = self.mentions.get(&end)?.iter();
-        let found = mentions.find(|mention| {
-            let cut = &self.cuts[mention.cut];
-            let mut rows = cut.rows.iter().zip(&self.room[mention.cut]).enumerate();
-            !rows.any(|(place, (row, room))| {
-                let factor = mention.rows.iter().find(|(own, _)| *own == place);
-                let left = match (room, factor, to) {
+    ) -> Option<(&[Row], Option<&Ground>)> {
+        let mentions = self.mentions.get(place(end))?;
+        let farther = to.map(|to| to - from);
+        let mut cuts = mentions.chunk_by(|one, other| one.cut == other.cut);
+        let found = cuts.find(|mentions| {
+            let mut rows = self.cuts[mentions[0].cut].rows.clone();
+            !rows.any(|row| {
+                let mention = mentions.iter().find(|mention| mention.row == row);
+                let left = match (&self.room[row], mention, &farther) {
                     (None, ..) | (_, Some(_), None) => return false,
-                    (Some(room), None, _) => room.clone(),
-                    (Some(room), Some((_, factor)), Some(to)) => room - &(factor * &(to - from)),
+                    (Some(room), None, _) => room.cmp(&Rational::ZERO),
+                    (Some(room), Some(mention), Some(farther)) => {
+                        room.cmp(&(&mention.factor * farther))
+                    }
                 };
-                left.is_positive() || left.is_zero() && !row.is_strict
+                left == Ordering::Greater || left == Ordering::Equal && !self.rows[row].is_strict
             })
         });
-        found.map(|mention| &self.cuts[mention.cut])
+        let cut = &self.cuts[found?[0].cut];
+        Some((&self.rows[cut.rows.clone()], cut.ground.as_ref()))
     }
 
     /// The present box is the one with this end moved out.
     pub(crate) fn moved(&mut self, end: BoxEnd, from: &Rational, to: Option<&Rational>) {
         self.looked_at = None;
-        for mention in self.mentions.get(&end).into_iter().flatten() {
-            for (place, factor) in &mention.rows {
-                let room = &mut self.room[mention.cut][*place];
-                let less = match (&*room, to) {
-                    (Some(room), Some(to)) => Some(room - &(factor * &(to - from))),
-                    _ => None,
-                };
-                let before = std::mem::replace(room, less);
-                self.before.push((mention.cut, *place, before));
-            }
+        let farther = to.map(|to| to - from);
+        for mention in self.mentions.get(place(end)).into_iter().flatten() {
+            let room = &mut self.room[mention.row];
+            let less = match (&*room, &farther) {
+                (Some(room), Some(farther)) => Some(room - &(&mention.factor * farther)),
+                _ => None,
+            };
+            let before = std::mem::replace(room, less);
+            self.before.push((mention.row, before));
         }
     }
 }
 
-fn room(cut: &Cut, envelope: &DecoupledEnvelope) -> Vec<Option<Rational>> {
-    let room = |row: &crate::row::Row| Some(&row.bound - &row.value(envelope)?);
-    cut.rows.iter().map(room).collect()
+fn place(end: BoxEnd) -> usize {
+    2 * end.parameter.index() + end.side.index()
+}
+
+fn room(row: &Row, envelope: &DecoupledEnvelope) -> Option<Rational> {
+    Some(&row.bound - &row.value(envelope)?)
 }

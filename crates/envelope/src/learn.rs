@@ -22,7 +22,7 @@ use elbowroom_stn::uncertain::{
     Ground as StepGround, LinkId, Part, Refutation, Refuted, StrongConflict, Way,
 };
 
-use crate::cut::{Cut, Ends, Ground, ProofPart, ProofWay};
+use crate::cut::{Cut, Ends, Ground, Length, ProofPart, ProofWay};
 use shorter::Shortcuts;
 
 /// The limit on the rows of a cut.
@@ -149,12 +149,12 @@ pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledE
     let mut total = Ends::default();
     let mut parts = Vec::new();
     for ground in grounds {
-        let (ends, part) = match ground {
+        let (length, part) = match ground {
             StepGround::Requirement(id) => {
-                let Some((ends, origin)) = reader.requirement(id) else {
+                let Some((length, origin)) = reader.requirement(id) else {
                     return Learnt::Unknown;
                 };
-                (ends, ProofPart::Bound(origin))
+                (length, ProofPart::Bound(origin))
             }
             StepGround::Early(link) => (
                 reader.link(link, Side::Lower),
@@ -165,7 +165,7 @@ pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledE
                 ProofPart::Late(network.links[link.index()]),
             ),
         };
-        total.add(&ends);
+        total.add_length(&length);
         parts.push(part);
     }
     learnt(vec![total], Ground::Fixed(parts), envelope)
@@ -206,6 +206,19 @@ fn sums(mut some: Vec<Ends>, others: &[Ends]) -> Vec<Ends> {
     sums.collect()
 }
 
+/// The steps of a cycle one after the other, whatever ways they are parts of.
+fn steps(cycle: &[Way]) -> impl Iterator<Item = &Part> {
+    let mut open: Vec<&Part> = cycle.iter().flat_map(|way| &way.parts).rev().collect();
+    std::iter::from_fn(move || {
+        loop {
+            match open.pop()? {
+                Part::Way(way) => open.extend(way.parts.iter().rev()),
+                step => return Some(step),
+            }
+        }
+    })
+}
+
 /// Reads the bounds of a network in terms of the ends of a box.
 struct Reader<'a> {
     plan: &'a ParametrizedPlan,
@@ -215,7 +228,8 @@ struct Reader<'a> {
 impl Reader<'_> {
     /// What a conflict in the box says about others.
     fn cut(&self, refutation: &Refutation, envelope: &DecoupledEnvelope) -> Option<Cut> {
-        let whole = self.flat(&refutation.cycle)?;
+        let mut whole = Ends::default();
+        self.add_all(&refutation.cycle, &mut whole)?;
         let ways = refutation.cycle.iter().map(|way| self.way(way));
         let ground = Ground::Semireducible(ways.collect::<Option<Vec<ProofWay>>>()?);
         if !whole.tears() {
@@ -235,17 +249,17 @@ impl Reader<'_> {
     }
 
     /// What a step is as long as, and the bound that it is; `None` for a way.
-    fn plain(&self, part: &Part) -> Option<(Ends, Origin)> {
+    fn plain(&self, part: &Part) -> Option<(Length, Origin)> {
         let constraint = |link: &LinkId| self.network.links[link.index()];
         Some(match part {
             Part::Requirement(id) => self.requirement(*id)?,
             Part::Early(link) => {
-                let ends = self.link(*link, Side::Lower);
-                (ends, Origin::AtMost(constraint(link)))
+                let length = self.link(*link, Side::Lower);
+                (length, Origin::AtMost(constraint(link)))
             }
             Part::Late(link) => {
-                let ends = self.link(*link, Side::Upper);
-                (ends, Origin::AtLeast(constraint(link)))
+                let length = self.link(*link, Side::Upper);
+                (length, Origin::AtLeast(constraint(link)))
             }
             Part::Way(_) => return None,
         })
@@ -257,33 +271,29 @@ impl Reader<'_> {
     }
 
     /// The lower bound of a link, or minus its upper one.
-    fn link(&self, link: LinkId, side: Side) -> Ends {
+    fn link(&self, link: LinkId, side: Side) -> Length {
         let constraint = self.constraint(link);
         let (bound, sign) = match side {
             Side::Lower => (&constraint.lower, 1),
             Side::Upper => (&constraint.upper, -1),
         };
-        let mut ends = Ends::default();
+        let sign = Rational::from(sign);
         match bound {
             Bound::Parameter(parameter) => {
-                let end = BoxEnd {
-                    parameter: *parameter,
-                    side,
-                };
-                ends.add_end(end, &Rational::from(sign));
+                let parameter = *parameter;
+                Length::End(BoxEnd { parameter, side }, sign)
             }
-            Bound::Finite(value) => ends.constant = value * &Rational::from(sign),
-            Bound::Infinite => {}
+            Bound::Finite(value) => Length::Fixed(value * &sign),
+            Bound::Infinite => Length::Fixed(Rational::ZERO),
         }
-        ends
     }
 
     /// The bound of a requirement, and where it comes from.
-    fn requirement(&self, id: ConstraintId) -> Option<(Ends, Origin)> {
+    fn requirement(&self, id: ConstraintId) -> Option<(Length, Origin)> {
         let requirement = self.network.network.requirements().constraint(id);
-        let constant = Ends::constant(requirement.bound.clone());
+        let fixed = Length::Fixed(requirement.bound.clone());
         let Some(index) = self.network.constraint_of(id) else {
-            return Some((constant, Origin::Beginning));
+            return Some((fixed, Origin::Beginning));
         };
         let constraint = &self.plan.plan.constraints[index];
         if constraint.from == constraint.to {
@@ -297,7 +307,7 @@ impl Reader<'_> {
         };
         let is_told = self.plan.told_by(constraint).is_some();
         let (Bound::Parameter(parameter), false) = (own, is_told) else {
-            return Some((constant, origin));
+            return Some((fixed, origin));
         };
         if constraint.lower == constraint.upper && self.plan.plan.is_up_to_the_world(constraint) {
             // A second duration that ends at the same node.
@@ -309,28 +319,18 @@ impl Reader<'_> {
         } else {
             (Side::Upper, -1)
         };
-        let mut ends = Ends::default();
-        let end = BoxEnd {
-            parameter: *parameter,
-            side,
-        };
-        ends.add_end(end, &Rational::from(sign));
-        Some((ends, origin))
+        let parameter = *parameter;
+        let end = BoxEnd { parameter, side };
+        Some((Length::End(end, Rational::from(sign)), origin))
     }
 
-    /// The sum of a cycle of ways, if no wait is cut short.
-    fn flat(&self, cycle: &[Way]) -> Option<Ends> {
-        let mut total = Ends::default();
-        for part in cycle.iter().flat_map(|way| &way.parts) {
-            let ends = match part {
-                Part::Requirement(id) => self.requirement(*id)?.0,
-                Part::Early(link) => self.link(*link, Side::Lower),
-                Part::Late(link) => self.link(*link, Side::Upper),
-                Part::Way(way) => self.flat(std::slice::from_ref(way))?,
-            };
-            total.add(&ends);
+    /// Adds what a cycle of ways is as long as, if no wait is cut short. Ways lie in ways, as deep as a plan is
+    /// long; each of their steps is added once.
+    fn add_all(&self, cycle: &[Way], total: &mut Ends) -> Option<()> {
+        for part in steps(cycle) {
+            total.add_length(&self.plain(part)?.0);
         }
-        Some(total)
+        Some(())
     }
 
     /// What a way can be as long as: the greatest of these. Adds to `legal` what has to be negative
@@ -339,12 +339,12 @@ impl Reader<'_> {
         let mut lengths = vec![Ends::default()];
         for part in way.parts.iter().rev() {
             let own = match part {
-                Part::Requirement(id) => vec![self.requirement(*id)?.0],
+                Part::Requirement(id) => vec![self.requirement(*id)?.0.into()],
                 Part::Early(link) => {
                     legal.extend(lengths.iter().cloned());
-                    vec![self.link(*link, Side::Lower)]
+                    vec![self.link(*link, Side::Lower).into()]
                 }
-                Part::Late(link) => vec![self.link(*link, Side::Upper)],
+                Part::Late(link) => vec![self.link(*link, Side::Upper).into()],
                 Part::Way(way) => self.lengths(way, legal)?,
             };
             lengths = sums(lengths, &own);
@@ -353,7 +353,7 @@ impl Reader<'_> {
             }
         }
         if let Some(link) = way.unlabelled {
-            let least = self.link(link, Side::Lower);
+            let least: Ends = self.link(link, Side::Lower).into();
             lengths.push(least.negated());
         }
         Some(lengths)

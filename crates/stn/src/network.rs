@@ -209,16 +209,16 @@ impl<W: Weight> Network<W> {
     }
 
     /// For each node, a number that it shares with just those nodes to and from which edges lead,
-    /// whatever their bounds.
+    /// whatever their bounds. No edges lead to nodes with smaller numbers.
     pub fn components(&self) -> Vec<usize> {
         // Kosaraju's algorithm: the last one left first, and against the edges.
         let order = self.depth_first_postorder(|_| true);
         let mut component = vec![usize::MAX; self.node_count()];
-        for &root in order.iter().rev() {
+        for (number, &root) in order.iter().rev().enumerate() {
             let mut stack = vec![root];
             while let Some(node) = stack.pop() {
                 if component[node.index()] == usize::MAX {
-                    component[node.index()] = root.index();
+                    component[node.index()] = number;
                     stack.extend(self.entering(node).map(|id| self.constraint(id).from));
                 }
             }

@@ -139,8 +139,12 @@ impl Analyst {
             Oracle::new(task, plan, guarantee)
         };
         let mut oracle = oracle.map_err(beyond)?;
-        let search = &self.settings.search;
-        let run = irr(&mut oracle, search, &mut |_| self.flow()).map_err(beyond)?;
+        // A long plan has to begin, even if its box is a little smaller.
+        let search = SearchSettings {
+            divides: true,
+            ..self.settings.search.clone()
+        };
+        let run = irr(&mut oracle, &search, &mut |_| self.flow()).map_err(beyond)?;
         let envelope = run.envelope.map_err(|_| PrepareError::NoGuarantee)?;
         let Some(objective) = self.settings.objective else {
             return Ok(envelope);

@@ -13,6 +13,7 @@ use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
 use super::own_bounds::OwnBounds;
+use super::pieces::Pieces;
 use super::{MOST_UNDECIDED, Settings, StopReason, Widening, farthest};
 use crate::cut::Cut;
 use crate::frontier::Frontier;
@@ -42,6 +43,8 @@ pub(super) struct Ahead<'a> {
     length: usize,
     /// What is known beforehand of how far ends can go, where the oracle is not asked.
     bounds: Option<OwnBounds>,
+    /// What is made of conflicts that grow, if they are to be divided.
+    pieces: Option<Pieces>,
 }
 
 /// A step that was taken.
@@ -87,6 +90,7 @@ impl<'a> Ahead<'a> {
             checks: 1,
             undecided: 0,
             bounds: None,
+            pieces: settings.divides.then(Pieces::default),
         }
     }
 
@@ -178,6 +182,11 @@ impl<'a> Ahead<'a> {
     /// The box after a leap is refused, and that is what is known now.
     fn refused(&mut self, cuts: Vec<Cut>) {
         self.known.undo();
+        if let Some(pieces) = &mut self.pieces {
+            for row in pieces.of(&self.plan, &cuts, &self.envelope) {
+                self.known.want(row, &self.envelope);
+            }
+        }
         for cut in cuts {
             self.known.add(cut, &self.envelope);
         }

@@ -13,7 +13,7 @@ use elbowroom_plan::DecoupledEnvelope;
 use elbowroom_stn::uncertain::{LinkId, Part, Refutation, Way};
 use elbowroom_stn::{ConstraintId, NodeId};
 
-use super::{Reader, cut};
+use super::{Reader, cut, steps};
 use crate::cut::{Cut, Ends, Ground};
 
 /// How many steps a cycle may go back from the point at which it is cut.
@@ -88,7 +88,7 @@ impl Shortcuts {
         refutation: &Refutation,
         envelope: &DecoupledEnvelope,
     ) -> Vec<Cut> {
-        let Some(steps) = steps(reader, &refutation.cycle, envelope) else {
+        let Some(steps) = measured(reader, &refutation.cycle, envelope) else {
             return Vec::new();
         };
         let mut found = Vec::new();
@@ -207,29 +207,23 @@ fn fixed_pairs(reader: &Reader<'_>, origin: NodeId) -> Vec<((NodeId, Chord), Cho
     fixed.chain(links).collect()
 }
 
-/// The steps of a cycle one after the other, whatever ways they are parts of; `None` if one of them is endless.
-fn steps(reader: &Reader<'_>, cycle: &[Way], envelope: &DecoupledEnvelope) -> Option<Vec<Step>> {
-    let mut steps = Vec::new();
-    let mut open: Vec<&Part> = cycle.iter().flat_map(|way| &way.parts).rev().collect();
-    while let Some(part) = open.pop() {
-        if let Part::Way(way) = part {
-            open.extend(way.parts.iter().rev());
-            continue;
-        }
-        let network = &reader.network.network;
+/// The steps of a cycle one after the other; `None` if one of them is endless.
+fn measured(reader: &Reader<'_>, cycle: &[Way], envelope: &DecoupledEnvelope) -> Option<Vec<Step>> {
+    let network = &reader.network.network;
+    let step = |part: &Part| {
         let to = match part {
             Part::Requirement(id) => network.requirements().constraint(*id).to,
             Part::Early(id) => network.link(*id).end,
             Part::Late(id) => network.link(*id).activation,
-            Part::Way(_) => continue,
+            Part::Way(_) => return None,
         };
-        steps.push(Step {
+        Some(Step {
             to,
             part: part.clone(),
             length: reader.plain(part)?.0.value(envelope)?,
-        });
-    }
-    Some(steps)
+        })
+    };
+    steps(cycle).map(step).collect()
 }
 
 /// What a cycle of such steps says, if at its ends, one for each parameter, there is no schedule.
@@ -241,8 +235,8 @@ fn whole<'a>(
     let mut total = Ends::default();
     let mut origins = Vec::new();
     for part in parts {
-        let (ends, origin) = reader.plain(part)?;
-        total.add(&ends);
+        let (length, origin) = reader.plain(part)?;
+        total.add_length(&length);
         origins.push(origin);
     }
     if total.tears() {

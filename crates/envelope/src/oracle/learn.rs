@@ -9,6 +9,7 @@ use crate::known::Known;
 use crate::learn::Learnt;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
+use crate::row::Row;
 
 impl Oracle {
     /// Whether the box, which holds the nominal values, is inside the envelope, and if not, what
@@ -147,8 +148,8 @@ impl Oracle {
             && let (Some(from), Some(to)) = (end.reach(envelope), &reach)
         {
             self.known.look_at(envelope);
-            let cut = self.known.against(end, &from, Some(to));
-            if let Some(objection) = cut.and_then(|cut| self.objection_by(cut, envelope, (end, to)))
+            if let Some(([row], Some(ground))) = self.known.against(end, &from, Some(to))
+                && let Some(objection) = self.objection_by((row, ground), envelope, (end, to))
             {
                 self.checks += 1;
                 return Ok(Some(objection));
@@ -157,18 +158,15 @@ impl Oracle {
         self.objection(&end.with_reach(envelope, reach))
     }
 
-    /// The objection that a cut is to a box with one end moved out so far; `None` if it has to be
+    /// The objection that a row is to a box with one end moved out so far; `None` if it has to be
     /// worked out.
     fn objection_by(
         &self,
-        cut: &Cut,
+        (row, ground): (&Row, &Ground),
         envelope: &DecoupledEnvelope,
         (moved, reach): (BoxEnd, &Rational),
     ) -> Option<Objection> {
-        let [row] = &cut.rows[..] else {
-            return None;
-        };
-        match &cut.ground {
+        match ground {
             Ground::Condition(broken) => Some(Objection::Broken(broken.clone())),
             // One end of each parameter counts, and at these ends there is no schedule.
             Ground::Cycle(_) | Ground::Semireducible(_) => {

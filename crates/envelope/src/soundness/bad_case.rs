@@ -28,8 +28,7 @@ pub(crate) struct Schedules<'a, S: Scale> {
     /// Where the next question begins, as far as that is not where this one did: those of a plan resemble each
     /// other, so it is a schedule at which the last one that was answered by a flow came out greatest.
     next: Vec<(ClassId, S::Weight)>,
-    /// A schedule in which all that can take long does, if there is one, until the first question is answered by a
-    /// flow.
+    /// A schedule in which all that can take long does, if there is one, until the first question about inequalities.
     longest: Option<Schedule<S::Weight>>,
     workspace: flow::Workspace<S::Weight>,
     /// For the first constraints of the network, a position in [`Reduction::edges`].
@@ -342,15 +341,16 @@ impl<'a, S: Scale> Schedules<'a, S> {
         }
         let longest = self.longest.take();
         let longest = longest.filter(|longest| self.is_greater_at(longest, &demand));
-        let (flow, moved) = flow::cheapest(&self.network, demand, &mut self.workspace)?;
-        match longest {
-            Some(longest) => {
-                let times = longest.into_times().into_iter();
-                let classes = self.network.network().nodes();
-                self.begin_at(classes.zip(times).collect());
-            }
-            None => self.begin_at(moved),
+        let lasting = self.edges.len();
+        let found = flow::cheapest(&self.network, lasting, demand, &mut self.workspace);
+        if let Some(longest) = longest {
+            let times = longest.into_times().into_iter();
+            let classes = self.network.network().nodes();
+            self.begin_at(classes.zip(times).collect());
+        } else if let Some((_, moved)) = &found {
+            self.begin_at(moved.clone());
         }
+        let (flow, _) = found?;
         for (id, amount) in flow.iter().filter(|(_, amount)| amount.is_positive()) {
             let index = id.index();
             if self.tells {

@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
 use elbowroom_num::Rational;
-use elbowroom_stn::{ConsistentNetwork, ConstraintId, NodeId, Schedule, Weight};
+use elbowroom_stn::{ConsistentNetwork, ConstraintId, Network, NodeId, Schedule, Weight};
 
 /// The flow along each constraint that has any.
 pub(crate) type Flow = BTreeMap<ConstraintId, Rational>;
@@ -22,18 +22,23 @@ pub(crate) type Demand = BTreeMap<NodeId, Rational>;
 /// network's present one; `None` if there is none: then it has no greatest value.
 ///
 /// The search begins at the network's present schedule. The nearer that is to such a one, the
-/// shorter are the paths.
+/// shorter are the paths. The workspace is one for networks that have the first `lasting` constraints in common.
 pub(crate) fn cheapest<W: Weight>(
     network: &ConsistentNetwork<W>,
+    lasting: usize,
     mut demand: Demand,
     workspace: &mut Workspace<W>,
 ) -> Option<(Flow, Vec<(NodeId, W)>)> {
-    workspace.resize(network.network().node_count());
+    workspace.resize(network.network(), lasting);
     let mut search = Search {
         network,
+        lasting,
         flow: Flow::new(),
         workspace,
     };
+    if search.is_endless(&demand) {
+        return None;
+    }
     let is_met = search.meet(&mut demand);
     let flow = search.flow;
     let moved = workspace.take_moved();
@@ -61,10 +66,13 @@ pub(crate) struct Workspace<W> {
     reached: Vec<Option<Reached<W>>>,
     /// The nodes of which something is known.
     touched: Vec<NodeId>,
+    /// For nodes that lasting constraints are about: these lead to nodes with the same number or a greater one.
+    components: Vec<usize>,
 }
 
 struct Search<'a, 'b, W> {
     network: &'a ConsistentNetwork<W>,
+    lasting: usize,
     flow: Flow,
     /// Invariant: no residual step is cheaper than the difference of its nodes' potentials. A schedule `t` satisfies
     /// `t_to - t_from <= w`, so with its times for potentials that is so from the beginning.
@@ -87,12 +95,21 @@ impl<W> Default for Workspace<W> {
             moved: Vec::new(),
             reached: Vec::new(),
             touched: Vec::new(),
+            components: Vec::new(),
         }
     }
 }
 
-impl<W> Workspace<W> {
-    fn resize(&mut self, node_count: usize) {
+impl<W: Weight> Workspace<W> {
+    fn resize(&mut self, network: &Network<W>, lasting: usize) {
+        let node_count = network.node_count();
+        if self.components.is_empty() {
+            let mut lasting_ones = Network::with_nodes(node_count);
+            for constraint in &network.constraints()[..lasting] {
+                lasting_ones.add(constraint.clone());
+            }
+            self.components = lasting_ones.components();
+        }
         self.potential.resize_with(node_count, || None);
         self.reached.resize_with(node_count, || None);
     }
@@ -113,6 +130,35 @@ impl<W> Workspace<W> {
 }
 
 impl<W: Weight> Search<'_, '_, W> {
+    /// Whether some nodes from which only constraints between themselves lead have more units that leave them than come into
+    /// them. Then there is no flow; the search for a path would go everywhere before it says so.
+    ///
+    /// Such nodes are those of one component, and all of the greater ones, unless what is assumed leads away from them.
+    fn is_endless(&self, demand: &Demand) -> bool {
+        let components = &self.workspace.components;
+        let component = |node: NodeId| components.get(node.index()).copied();
+        let assumed = &self.network.network().constraints()[self.lasting..];
+        let left = assumed
+            .iter()
+            .filter_map(|constraint| component(constraint.from));
+        let left = left.max();
+        let mut inside: Vec<(usize, &Rational)> = demand
+            .iter()
+            .filter_map(|(node, amount)| Some((component(*node)?, amount)))
+            .filter(|(component, _)| Some(*component) > left)
+            .collect();
+        inside.sort_by_key(|(component, _)| Reverse(*component));
+        let mut sum = Rational::ZERO;
+        inside
+            .chunk_by(|one, other| one.0 == other.0)
+            .any(|component| {
+                for (_, amount) in component {
+                    sum += *amount;
+                }
+                sum.is_negative()
+            })
+    }
+
     /// Sends what is demanded, by one cheapest path after the other; whether there are such.
     fn meet(&mut self, demand: &mut Demand) -> bool {
         let sources = demand.iter().filter(|(_, amount)| amount.is_negative());

@@ -1,0 +1,233 @@
+//! From long conflicts to conditions on few ends each: [`Pieces`].
+//!
+//! Where one window follows the other, a plan may be late by a little more in each of them, until it is too late in
+//! one. Of these conflicts there are as many as pairs of windows, and the longer they are, the less each of them says.
+//! They all hold where each piece, from one window to the next, keeps to a share of the room that there is. That asks
+//! for more than need be, so the box may become a little smaller, and it is found after a few looks.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, NodeId, Origin, ParametrizedPlan, Side};
+
+use crate::cut::{Cut, Ends, Ground, Length, ProofPart, ProofWay};
+use crate::row::Row;
+
+/// A conflict of more ends than these is long.
+const LONG: usize = 10;
+
+/// Looks at boxes may come across long conflicts until they have gone through so many parameters; then these are
+/// divided.
+const MOST_SEEN: usize = 50_000;
+
+/// The points of a plan at which conflicts are divided, and what has come of that so far.
+#[derive(Default)]
+pub(super) struct Pieces {
+    bounds: Option<Bounds>,
+    /// The parameters that looks have gone through, of those that have come across long conflicts.
+    seen: usize,
+    /// By their ends: the pieces that are known.
+    known: BTreeSet<Vec<BoxEnd>>,
+}
+
+/// How early and how late points are, as single constraints say.
+struct Bounds {
+    least: BTreeMap<NodeId, Rational>,
+    most: BTreeMap<NodeId, Rational>,
+    /// In both, with the same time.
+    fixed: BTreeSet<NodeId>,
+}
+
+/// A part of a conflict, from one point to the next.
+struct Piece {
+    length: Ends,
+    from: NodeId,
+    to: NodeId,
+}
+
+impl Pieces {
+    /// Conditions that hold in the box, which is inside the envelope; where they go on to hold, the long ones among these
+    /// conflicts do not come up. None as long as it does not seem that more and more of them will.
+    pub(super) fn of(
+        &mut self,
+        plan: &ParametrizedPlan,
+        cuts: &[Cut],
+        envelope: &DecoupledEnvelope,
+    ) -> Vec<Row> {
+        let long = |cut: &&Cut| matches!(&cut.rows[..], [row] if row.factors.len() > LONG);
+        let long: Vec<&Cut> = cuts.iter().filter(long).collect();
+        if long.is_empty() {
+            return Vec::new();
+        }
+        self.seen += plan.parameters.len();
+        if self.seen < MOST_SEEN {
+            return Vec::new();
+        }
+        let bounds = self.bounds.get_or_insert_with(|| Bounds::of(plan));
+        let mut rows = Vec::new();
+        for cut in long {
+            let origins = match &cut.ground {
+                Ground::Cycle(origins) => origins.clone(),
+                Ground::Semireducible(ways) => {
+                    let mut origins = Vec::new();
+                    ways.iter().for_each(|way| spell_out(way, &mut origins));
+                    origins
+                }
+                _ => continue,
+            };
+            for row in bounds.divided(plan, &origins, envelope).unwrap_or_default() {
+                let ends: Vec<BoxEnd> = row.factors.keys().copied().collect();
+                if !ends.is_empty() && row.holds_in(envelope) && self.known.insert(ends) {
+                    rows.push(row);
+                }
+            }
+        }
+        rows
+    }
+}
+
+impl Bounds {
+    fn of(plan: &ParametrizedPlan) -> Self {
+        let mut fixed = BTreeMap::from([(NodeId::ZERO, Rational::ZERO)]);
+        for constraint in &plan.plan.constraints {
+            if let (NodeId::ZERO, Bound::Finite(time)) = (constraint.from, &constraint.lower)
+                && constraint.lower == constraint.upper
+            {
+                fixed.insert(constraint.to, time.clone());
+            }
+        }
+        let mut bounds = Self {
+            least: fixed.clone(),
+            most: fixed.clone(),
+            fixed: fixed.keys().copied().collect(),
+        };
+        for constraint in &plan.plan.constraints {
+            let (from, to) = (constraint.from, constraint.to);
+            if let Some(time) = fixed.get(&from) {
+                if let Bound::Finite(lower) = &constraint.lower {
+                    bounds.at_least(to, time + lower);
+                }
+                if let Bound::Finite(upper) = &constraint.upper {
+                    bounds.at_most(to, time + upper);
+                }
+            }
+            if let Some(time) = fixed.get(&to) {
+                if let Bound::Finite(lower) = &constraint.lower {
+                    bounds.at_most(from, time - lower);
+                }
+                if let Bound::Finite(upper) = &constraint.upper {
+                    bounds.at_least(from, time - upper);
+                }
+            }
+        }
+        bounds
+    }
+
+    fn at_least(&mut self, node: NodeId, time: Rational) {
+        let least = self.least.entry(node).or_insert_with(|| time.clone());
+        if time > *least {
+            *least = time;
+        }
+    }
+
+    fn at_most(&mut self, node: NodeId, time: Rational) {
+        let most = self.most.entry(node).or_insert_with(|| time.clone());
+        if time < *most {
+            *most = time;
+        }
+    }
+
+    /// A conflict divided at the points that have a bound on the side on which more of them have one; `None` if it is not
+    /// about fixed times.
+    fn divided(
+        &self,
+        plan: &ParametrizedPlan,
+        origins: &[Origin],
+        envelope: &DecoupledEnvelope,
+    ) -> Option<Vec<Row>> {
+        let steps: Vec<(Length, NodeId)> = origins
+            .iter()
+            .map(|&origin| step(plan, origin))
+            .collect::<Option<_>>()?;
+        let first = steps.iter().position(|(_, to)| self.fixed.contains(to))?;
+        let count = |side: &BTreeMap<NodeId, Rational>| {
+            steps.iter().filter(|(_, to)| side.contains_key(to)).count()
+        };
+        let is_least = count(&self.least) >= count(&self.most);
+        let side = if is_least { &self.least } else { &self.most };
+        let mut pieces = Vec::new();
+        let mut piece = Piece {
+            length: Ends::default(),
+            from: steps[first].1,
+            to: steps[first].1,
+        };
+        for offset in 1..=steps.len() {
+            let (length, to) = &steps[(first + offset) % steps.len()];
+            piece.length.add_length(length);
+            if side.contains_key(to) {
+                piece.to = *to;
+                pieces.push(piece);
+                piece = Piece {
+                    length: Ends::default(),
+                    from: *to,
+                    to: *to,
+                };
+            }
+        }
+        // Where a piece is longer than the time between its bounds, the next one begins so much too late (or
+        // the one before has to end so much too early): in the box, and so it may remain.
+        let mut late = Rational::ZERO;
+        let mut rows = Vec::with_capacity(pieces.len());
+        if is_least {
+            pieces.reverse();
+        }
+        for Piece {
+            mut length,
+            from,
+            to,
+        } in pieces
+        {
+            length.constant += &side[&from];
+            length.constant -= &side[&to];
+            length.constant -= &late;
+            let excess = -length.value(envelope)?;
+            late = excess.max(Rational::ZERO);
+            length.constant += &late;
+            rows.push(length.not_negative());
+        }
+        Some(rows)
+    }
+}
+
+/// How long a step of a cycle is, and where it leads.
+fn step(plan: &ParametrizedPlan, origin: Origin) -> Option<(Length, NodeId)> {
+    let (index, side) = match origin {
+        Origin::Beginning => return Some((Length::Fixed(Rational::ZERO), NodeId::ZERO)),
+        Origin::AtLeast(index) => (index, Side::Upper),
+        Origin::AtMost(index) => (index, Side::Lower),
+    };
+    let constraint = &plan.plan.constraints[index];
+    let (bound, to, sign) = match side {
+        Side::Upper => (&constraint.lower, constraint.from, -1),
+        Side::Lower => (&constraint.upper, constraint.to, 1),
+    };
+    let sign = Rational::from(sign);
+    let length = match (plan.told_by(constraint), bound) {
+        (Some(planned), _) | (None, Bound::Finite(planned)) => Length::Fixed(planned * &sign),
+        (None, &Bound::Parameter(parameter)) => Length::End(BoxEnd { parameter, side }, sign),
+        (None, Bound::Infinite) => return None,
+    };
+    Some((length, to))
+}
+
+/// Adds the steps of a way one after the other.
+fn spell_out(way: &ProofWay, origins: &mut Vec<Origin>) {
+    for part in &way.parts {
+        match part {
+            ProofPart::Bound(origin) => origins.push(*origin),
+            ProofPart::Early(index) => origins.push(Origin::AtMost(*index)),
+            ProofPart::Late(index) => origins.push(Origin::AtLeast(*index)),
+            ProofPart::Way(way) => spell_out(way, origins),
+        }
+    }
+}
