@@ -30,9 +30,10 @@ pub struct Settings {
     pub growth: Growth,
     /// The limit on box checks.
     pub most_checks: Option<usize>,
-    /// Whether conflicts along many windows are divided into conditions from one window to the next, once more and more
-    /// of them come up. The box of a long plan may be a little smaller so, and is found far sooner.
-    pub divides: bool,
+    /// If it is there: once looks at boxes that are refused for conflicts of many ends have gone through so many parameters,
+    /// such conflicts are divided into conditions from one window to the next. The box of a long plan may become a
+    /// little smaller so, and is found far sooner.
+    pub divide_after: Option<usize>,
 }
 
 impl Default for Settings {
@@ -42,7 +43,7 @@ impl Default for Settings {
             relative: None,
             growth: Growth::default(),
             most_checks: None,
-            divides: false,
+            divide_after: None,
         }
     }
 }

@@ -206,7 +206,26 @@ fn sums(mut some: Vec<Ends>, others: &[Ends]) -> Vec<Ends> {
     sums.collect()
 }
 
-/// The steps of a cycle one after the other, whatever ways they are parts of.
+/// What a cycle of such steps says, if at its ends, one for each parameter, there is no schedule.
+fn whole<'a>(
+    reader: &Reader<'_>,
+    parts: impl Iterator<Item = &'a Part>,
+    envelope: &DecoupledEnvelope,
+) -> Option<Cut> {
+    let mut total = Ends::default();
+    let mut origins = Vec::new();
+    for part in parts {
+        let (length, origin) = reader.plain(part)?;
+        total.add_length(&length);
+        origins.push(origin);
+    }
+    if total.tears() {
+        return None;
+    }
+    cut(vec![total], Ground::Cycle(origins), envelope)
+}
+
+/// The steps of a cycle one after the other, whatever ways they are parts of: ways lie in ways, as deep as a plan is long.
 fn steps(cycle: &[Way]) -> impl Iterator<Item = &Part> {
     let mut open: Vec<&Part> = cycle.iter().flat_map(|way| &way.parts).rev().collect();
     std::iter::from_fn(move || {
@@ -228,13 +247,9 @@ struct Reader<'a> {
 impl Reader<'_> {
     /// What a conflict in the box says about others.
     fn cut(&self, refutation: &Refutation, envelope: &DecoupledEnvelope) -> Option<Cut> {
-        let mut whole = Ends::default();
-        self.add_all(&refutation.cycle, &mut whole)?;
-        let ways = refutation.cycle.iter().map(|way| self.way(way));
-        let ground = Ground::Semireducible(ways.collect::<Option<Vec<ProofWay>>>()?);
-        if !whole.tears() {
-            // At these ends, one for each parameter, there is no schedule at all.
-            return cut(vec![whole], ground, envelope);
+        let whole = whole(self, steps(&refutation.cycle), envelope);
+        if whole.is_some() {
+            return whole;
         }
         let mut rows = Vec::new();
         let mut total = vec![Ends::default()];
@@ -245,6 +260,8 @@ impl Reader<'_> {
             }
         }
         rows.extend(total);
+        let ways = refutation.cycle.iter().map(|way| self.way(way));
+        let ground = Ground::Semireducible(ways.collect::<Option<Vec<ProofWay>>>()?);
         cut(rows, ground, envelope)
     }
 
@@ -322,15 +339,6 @@ impl Reader<'_> {
         let parameter = *parameter;
         let end = BoxEnd { parameter, side };
         Some((Length::End(end, Rational::from(sign)), origin))
-    }
-
-    /// Adds what a cycle of ways is as long as, if no wait is cut short. Ways lie in ways, as deep as a plan is
-    /// long; each of their steps is added once.
-    fn add_all(&self, cycle: &[Way], total: &mut Ends) -> Option<()> {
-        for part in steps(cycle) {
-            total.add_length(&self.plain(part)?.0);
-        }
-        Some(())
     }
 
     /// What a way can be as long as: the greatest of these. Adds to `legal` what has to be negative

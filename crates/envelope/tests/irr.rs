@@ -75,9 +75,9 @@ fn plan_text(dice: &mut Dice) -> String {
 }
 
 /// Actions one after the other, many of which have to be in a window: conflicts are along several windows.
-fn plan_in_windows(dice: &mut Dice) -> String {
+fn plan_in_windows(dice: &mut Dice, count: usize) -> String {
     let mut text = String::new();
-    for action in 0..4 + dice.below(8) {
+    for action in 0..count {
         let range = ["lb 0 ub inf", "lb 0 ub 6", "lb 1 ub 9"][dice.below(3)];
         let _ = write!(
             text,
@@ -285,7 +285,10 @@ fn the_search_takes_the_steps_of_one_check_after_the_other() {
     for round in 0..800 {
         let text = match round {
             ..600 => plan_text(&mut dice),
-            _ => plan_in_windows(&mut dice),
+            _ => {
+                let count = 4 + dice.below(8);
+                plan_in_windows(&mut dice, count)
+            }
         };
         let given = Given {
             domain: DOMAIN,
@@ -326,4 +329,59 @@ fn the_search_takes_the_steps_of_one_check_after_the_other() {
         objected > 1_000 && long > 60 && limited > 60 && cancelled > 60 && without < 600,
         "{long} {limited} {cancelled} {without} {objected}"
     );
+}
+
+/// The sum of how far ends are from the nominal values, without those that nothing keeps near.
+fn room(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Rational {
+    let point = DecoupledEnvelope::point(&plan.nominal());
+    BoxEnd::all(plan.parameters.len())
+        .filter_map(|end| Some(&end.reach(envelope)? - &end.reach(&point)?))
+        .filter(|room| *room < Rational::from(1_000))
+        .sum()
+}
+
+#[test]
+fn where_long_conflicts_are_divided_the_box_is_inside_and_hardly_smaller() {
+    let mut dice = Dice(5);
+    let (mut divided, mut rooms) = (0, [Rational::ZERO, Rational::ZERO]);
+    for _ in 0..40 {
+        let text = plan_in_windows(&mut dice, 60);
+        let given = Given {
+            domain: DOMAIN,
+            init: "",
+            plan: &text,
+            ..Given::default()
+        };
+        let (task, plan) = given.task_and_plan();
+        for guarantee in Guarantee::ALL {
+            let oracle = Oracle::new(&task, &plan, guarantee).expect("few cases");
+            let settings = Settings {
+                precision: Rational::new(1, 16),
+                ..Settings::default()
+            };
+            let dividing = Settings {
+                divide_after: Some(0),
+                ..settings.clone()
+            };
+            let found = [settings, dividing].map(|settings| {
+                let found = as_built(&mut oracle.clone(), &settings, usize::MAX);
+                assert_eq!(found.stop, StopReason::Converged);
+                found.envelope
+            });
+            let [Some(whole), Some(other)] = &found else {
+                assert_eq!(found, [None, None], "{guarantee} {text}");
+                continue;
+            };
+            assert_eq!(
+                oracle.clone().objection(other),
+                Ok(None),
+                "{guarantee} {text}"
+            );
+            divided += usize::from(whole != other);
+            rooms[0] += room(&plan, whole);
+            rooms[1] += room(&plan, other);
+        }
+    }
+    let share = (&rooms[1] / &rooms[0]).to_f64();
+    assert!(divided > 20 && share > 0.98, "{divided} {share}");
 }

@@ -113,7 +113,7 @@ impl Search {
             relative: self.relative.clone(),
             growth: self.growth,
             most_checks: self.most_checks,
-            divides: false,
+            divide_after: None,
         }
     }
 }

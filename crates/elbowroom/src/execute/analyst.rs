@@ -23,6 +23,9 @@ use super::vary::is_about_an_absent_action;
 use crate::chances::{ChanceError, chances};
 use crate::flow::{self, FlowError};
 
+/// See [`divide_after`](SearchSettings::divide_after): more than plans of a thousand actions come to.
+const DIVIDE_AFTER: usize = 50_000;
+
 impl From<FlowError> for PrepareError {
     fn from(error: FlowError) -> Self {
         match error {
@@ -141,7 +144,7 @@ impl Analyst {
         let mut oracle = oracle.map_err(beyond)?;
         // A long plan has to begin, even if its box is a little smaller.
         let search = SearchSettings {
-            divides: true,
+            divide_after: Some(DIVIDE_AFTER),
             ..self.settings.search.clone()
         };
         let run = irr(&mut oracle, &search, &mut |_| self.flow()).map_err(beyond)?;

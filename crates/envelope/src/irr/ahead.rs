@@ -90,7 +90,7 @@ impl<'a> Ahead<'a> {
             checks: 1,
             undecided: 0,
             bounds: None,
-            pieces: settings.divides.then(Pieces::default),
+            pieces: settings.divide_after.map(Pieces::after),
         }
     }
 

@@ -16,16 +16,11 @@ use crate::row::Row;
 /// A conflict of more ends than these is long.
 const LONG: usize = 10;
 
-/// Looks at boxes may come across long conflicts until they have gone through so many parameters; then these are
-/// divided.
-const MOST_SEEN: usize = 50_000;
-
 /// The points of a plan at which conflicts are divided, and what has come of that so far.
-#[derive(Default)]
 pub(super) struct Pieces {
     bounds: Option<Bounds>,
-    /// The parameters that looks have gone through, of those that have come across long conflicts.
-    seen: usize,
+    /// How many parameters looks that come across long conflicts are still to go through before these are divided.
+    left: usize,
     /// By their ends: the pieces that are known.
     known: BTreeSet<Vec<BoxEnd>>,
 }
@@ -46,6 +41,15 @@ struct Piece {
 }
 
 impl Pieces {
+    /// Conflicts are divided after looks have gone through so many parameters.
+    pub(super) fn after(left: usize) -> Self {
+        Self {
+            bounds: None,
+            left,
+            known: BTreeSet::new(),
+        }
+    }
+
     /// Conditions that hold in the box, which is inside the envelope; where they go on to hold, the long ones among these
     /// conflicts do not come up. None as long as it does not seem that more and more of them will.
     pub(super) fn of(
@@ -59,8 +63,8 @@ impl Pieces {
         if long.is_empty() {
             return Vec::new();
         }
-        self.seen += plan.parameters.len();
-        if self.seen < MOST_SEEN {
+        self.left = self.left.saturating_sub(plan.parameters.len());
+        if self.left > 0 {
             return Vec::new();
         }
         let bounds = self.bounds.get_or_insert_with(|| Bounds::of(plan));

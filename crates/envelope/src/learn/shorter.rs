@@ -13,8 +13,8 @@ use elbowroom_plan::DecoupledEnvelope;
 use elbowroom_stn::uncertain::{LinkId, Part, Refutation, Way};
 use elbowroom_stn::{ConstraintId, NodeId};
 
-use super::{Reader, cut, steps};
-use crate::cut::{Cut, Ends, Ground};
+use super::{Reader, steps, whole};
+use crate::cut::Cut;
 
 /// How many steps a cycle may go back from the point at which it is cut.
 const FARTHEST: usize = 64;
@@ -224,23 +224,4 @@ fn measured(reader: &Reader<'_>, cycle: &[Way], envelope: &DecoupledEnvelope) ->
         })
     };
     steps(cycle).map(step).collect()
-}
-
-/// What a cycle of such steps says, if at its ends, one for each parameter, there is no schedule.
-fn whole<'a>(
-    reader: &Reader<'_>,
-    parts: impl Iterator<Item = &'a Part>,
-    envelope: &DecoupledEnvelope,
-) -> Option<Cut> {
-    let mut total = Ends::default();
-    let mut origins = Vec::new();
-    for part in parts {
-        let (length, origin) = reader.plain(part)?;
-        total.add_length(&length);
-        origins.push(origin);
-    }
-    if total.tears() {
-        return None;
-    }
-    cut(vec![total], Ground::Cycle(origins), envelope)
 }

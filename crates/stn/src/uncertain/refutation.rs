@@ -138,9 +138,13 @@ impl Told {
         way: WayId,
         count: &mut usize,
     ) -> Option<Way> {
-        let parts = ways_from(graph, way).map(|way| self.part(graph, graph.ways[way].edge, count));
+        // There are many of them, most of them short.
+        let mut parts = Vec::with_capacity(ways_from(graph, way).count());
+        for way in ways_from(graph, way) {
+            parts.push(self.part(graph, graph.ways[way].edge, count)?);
+        }
         Some(Way {
-            parts: parts.collect::<Option<_>>()?,
+            parts,
             unlabelled: None,
         })
     }
