@@ -16,6 +16,10 @@ use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::reduction::Reduction;
 
+/// In a plan with more parameters than these, what is remembered of a box takes more memory than the time it saves is worth
+/// when another box is looked at.
+const MANY: usize = 10_000;
+
 /// What is guaranteed inside an envelope.
 ///
 /// Whichever it is, every schedule that the plan's network allows is valid. They differ in what
@@ -172,7 +176,12 @@ impl Controllability {
                     without_schedule(plan, &values, envelope)
                 }))
             }
-            Self::Dynamic(..) => Ok(without_strategy(plan, envelope, most)),
+            Self::Dynamic(_, dynamic) => {
+                if plan.parameters.len() > MANY {
+                    *dynamic = DynamicControl::default();
+                }
+                Ok(without_strategy(plan, envelope, most))
+            }
             Self::Strong(_) => Ok(without_fixed_times(plan, envelope)),
         }
     }

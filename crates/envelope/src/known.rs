@@ -28,8 +28,10 @@ pub(crate) struct Known {
     finite: BTreeSet<BoxEnd>,
     /// The present box, if it is known.
     looked_at: Option<DecoupledEnvelope>,
-    /// The room of rows before it was changed, in order, since the present box was settled.
+    /// The room of rows in the box that was settled, where it has changed since.
     before: Vec<(usize, Option<Rational>)>,
+    /// For each row, whether it has.
+    has_changed: Vec<bool>,
 }
 
 /// Rows of which one has to hold.
@@ -75,6 +77,7 @@ impl Known {
                 });
             }
             self.room.push(room(row, envelope));
+            self.has_changed.push(false);
         }
         self.rows.extend(rows);
         let rows = first..self.rows.len();
@@ -89,7 +92,7 @@ impl Known {
     /// The present box is this one, if it was another.
     pub(crate) fn look_at(&mut self, envelope: &DecoupledEnvelope) {
         if self.looked_at.as_ref() != Some(envelope) {
-            self.before.clear();
+            self.settle();
             self.room = self.rows.iter().map(|row| room(row, envelope)).collect();
             self.looked_at = Some(envelope.clone());
         }
@@ -97,15 +100,18 @@ impl Known {
 
     /// The present box is the one to come back to.
     pub(crate) fn settle(&mut self) {
-        self.before.clear();
+        for (row, _) in self.before.drain(..) {
+            self.has_changed[row] = false;
+        }
     }
 
     /// The present box is the one that was settled last; at first, that of the cut that was added
     /// first.
     pub(crate) fn undo(&mut self) {
         self.looked_at = None;
-        for (row, room) in self.before.drain(..).rev() {
+        for (row, room) in self.before.drain(..) {
             self.room[row] = room;
+            self.has_changed[row] = false;
         }
     }
 
@@ -154,7 +160,9 @@ impl Known {
                 _ => None,
             };
             let before = std::mem::replace(room, less);
-            self.before.push((mention.row, before));
+            if !std::mem::replace(&mut self.has_changed[mention.row], true) {
+                self.before.push((mention.row, before));
+            }
         }
     }
 }

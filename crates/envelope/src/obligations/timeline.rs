@@ -26,7 +26,8 @@ pub(crate) use fluent::FluentChange;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Timeline {
     facts: BTreeMap<FactId, FactHistory>,
-    fluents: BTreeMap<FluentId, FluentHistory>,
+    /// Boxed, because most timelines are about one of them, and a map has room for eleven.
+    fluents: BTreeMap<FluentId, Box<FluentHistory>>,
     /// Under which conditional effects' outcomes this timeline is the right one.
     pub(crate) assumptions: Vec<Inequality>,
 }
@@ -145,7 +146,7 @@ impl Timeline {
         for fluent in fluents {
             if let Some(history) = self.fluents.get(fluent) {
                 near.fluents
-                    .insert(*fluent, history.near(around, &mut open));
+                    .insert(*fluent, Box::new(history.near(around, &mut open)));
             }
         }
         (near, open)
