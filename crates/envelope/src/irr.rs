@@ -203,6 +203,7 @@ pub fn limits(
     tell: &mut dyn FnMut(BoxEnd, &Limit),
 ) {
     let plan = Arc::clone(oracle.plan());
+    oracle.stand_at(envelope);
     for &end in ends {
         if flow().is_break() {
             break;

@@ -5,7 +5,7 @@
 //! They all hold where each piece, from one window to the next, keeps to a share of the room that there is. That asks
 //! for more than need be, so the box may become a little smaller, and it is found after a few looks.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, NodeId, Origin, ParametrizedPlan, Side};
@@ -22,23 +22,17 @@ pub(super) struct Pieces {
     /// How many parameters looks that come across long conflicts are still to go through before these are divided.
     left: usize,
     /// By their ends: the pieces that are known.
-    known: BTreeSet<Vec<BoxEnd>>,
+    known: BTreeSet<Vec<Vec<BoxEnd>>>,
 }
 
 /// How early and how late points are, as single constraints say.
 struct Bounds {
-    least: BTreeMap<NodeId, Rational>,
-    most: BTreeMap<NodeId, Rational>,
-    /// In both, with the same time.
-    fixed: BTreeSet<NodeId>,
+    least: Times,
+    most: Times,
 }
 
-/// A part of a conflict, from one point to the next.
-struct Piece {
-    length: Ends,
-    from: NodeId,
-    to: NodeId,
-}
+/// By node: a time, if there is one.
+type Times = Vec<Option<Rational>>;
 
 impl Pieces {
     /// Conflicts are divided after looks have gone through so many parameters.
@@ -81,7 +75,7 @@ impl Pieces {
             };
             for row in bounds.divided(plan, &origins, envelope).unwrap_or_default() {
                 let ends: Vec<BoxEnd> = row.factors.keys().copied().collect();
-                if !ends.is_empty() && row.holds_in(envelope) && self.known.insert(ends) {
+                if !ends.is_empty() && row.holds_in(envelope) && self.known.insert(vec![ends]) {
                     rows.push(row);
                 }
             }
@@ -92,52 +86,46 @@ impl Pieces {
 
 impl Bounds {
     fn of(plan: &ParametrizedPlan) -> Self {
-        let mut fixed = BTreeMap::from([(NodeId::ZERO, Rational::ZERO)]);
+        let mut fixed = vec![None; plan.plan.nodes.len()];
+        fixed[NodeId::ZERO.index()] = Some(Rational::ZERO);
         for constraint in &plan.plan.constraints {
             if let (NodeId::ZERO, Bound::Finite(time)) = (constraint.from, &constraint.lower)
                 && constraint.lower == constraint.upper
             {
-                fixed.insert(constraint.to, time.clone());
+                fixed[constraint.to.index()] = Some(time.clone());
             }
         }
         let mut bounds = Self {
             least: fixed.clone(),
             most: fixed.clone(),
-            fixed: fixed.keys().copied().collect(),
         };
         for constraint in &plan.plan.constraints {
             let (from, to) = (constraint.from, constraint.to);
-            if let Some(time) = fixed.get(&from) {
-                if let Bound::Finite(lower) = &constraint.lower {
-                    bounds.at_least(to, time + lower);
+            for (bound, is_least) in [(&constraint.lower, true), (&constraint.upper, false)] {
+                let Bound::Finite(difference) = bound else {
+                    continue;
+                };
+                if let Some(time) = &fixed[from.index()] {
+                    bounds.add(to, is_least, time + difference);
                 }
-                if let Bound::Finite(upper) = &constraint.upper {
-                    bounds.at_most(to, time + upper);
-                }
-            }
-            if let Some(time) = fixed.get(&to) {
-                if let Bound::Finite(lower) = &constraint.lower {
-                    bounds.at_most(from, time - lower);
-                }
-                if let Bound::Finite(upper) = &constraint.upper {
-                    bounds.at_least(from, time - upper);
+                if let Some(time) = &fixed[to.index()] {
+                    bounds.add(from, !is_least, time - difference);
                 }
             }
         }
         bounds
     }
 
-    fn at_least(&mut self, node: NodeId, time: Rational) {
-        let least = self.least.entry(node).or_insert_with(|| time.clone());
-        if time > *least {
-            *least = time;
-        }
-    }
-
-    fn at_most(&mut self, node: NodeId, time: Rational) {
-        let most = self.most.entry(node).or_insert_with(|| time.clone());
-        if time < *most {
-            *most = time;
+    /// The node comes at this time or later (or earlier).
+    fn add(&mut self, node: NodeId, is_least: bool, time: Rational) {
+        let side = if is_least {
+            &mut self.least
+        } else {
+            &mut self.most
+        };
+        let own = &mut side[node.index()];
+        if own.as_ref().is_none_or(|own| (time > *own) == is_least) {
+            *own = Some(time);
         }
     }
 
@@ -153,51 +141,41 @@ impl Bounds {
             .iter()
             .map(|&origin| step(plan, origin))
             .collect::<Option<_>>()?;
-        let first = steps.iter().position(|(_, to)| self.fixed.contains(to))?;
-        let count = |side: &BTreeMap<NodeId, Rational>| {
-            steps.iter().filter(|(_, to)| side.contains_key(to)).count()
+        let is_fixed = |node: NodeId| {
+            let own = &self.least[node.index()];
+            own.is_some() && *own == self.most[node.index()]
+        };
+        let first = steps.iter().position(|(_, to)| is_fixed(*to))?;
+        let time = |side: &'_ Times, node: NodeId| side[node.index()].clone();
+        let count = |side: &Times| {
+            let with_time = steps.iter().filter(|(_, to)| time(side, *to).is_some());
+            with_time.count()
         };
         let is_least = count(&self.least) >= count(&self.most);
         let side = if is_least { &self.least } else { &self.most };
+        // How much longer each piece is than the time between its bounds, but for the sign.
         let mut pieces = Vec::new();
-        let mut piece = Piece {
-            length: Ends::default(),
-            from: steps[first].1,
-            to: steps[first].1,
-        };
+        let mut piece = Ends::constant(time(side, steps[first].1)?);
         for offset in 1..=steps.len() {
             let (length, to) = &steps[(first + offset) % steps.len()];
-            piece.length.add_length(length);
-            if side.contains_key(to) {
-                piece.to = *to;
-                pieces.push(piece);
-                piece = Piece {
-                    length: Ends::default(),
-                    from: *to,
-                    to: *to,
-                };
+            piece.add_length(length);
+            if let Some(time) = time(side, *to) {
+                piece.constant -= &time;
+                pieces.push(std::mem::replace(&mut piece, Ends::constant(time)));
             }
         }
-        // Where a piece is longer than the time between its bounds, the next one begins so much too late (or
-        // the one before has to end so much too early): in the box, and so it may remain.
-        let mut late = Rational::ZERO;
-        let mut rows = Vec::with_capacity(pieces.len());
         if is_least {
             pieces.reverse();
         }
-        for Piece {
-            mut length,
-            from,
-            to,
-        } in pieces
-        {
-            length.constant += &side[&from];
-            length.constant -= &side[&to];
-            length.constant -= &late;
-            let excess = -length.value(envelope)?;
-            late = excess.max(Rational::ZERO);
-            length.constant += &late;
-            rows.push(length.not_negative());
+        // Where a piece is longer, the next one begins so much too late (or the one before has to end so much too early): in
+        // the box, and so it may remain.
+        let mut late = Rational::ZERO;
+        let mut rows = Vec::with_capacity(pieces.len());
+        for mut piece in pieces {
+            piece.constant -= &late;
+            late = (-piece.value(envelope)?).max(Rational::ZERO);
+            piece.constant += &late;
+            rows.push(piece.not_negative());
         }
         Some(rows)
     }

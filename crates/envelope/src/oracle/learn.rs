@@ -155,7 +155,21 @@ impl Oracle {
                 return Ok(Some(objection));
             }
         }
-        self.objection(&end.with_reach(envelope, reach))
+        let candidate = end.with_reach(envelope, reach);
+        let Some(accepted) = self.accepted.take_if(|accepted| accepted == envelope) else {
+            return self.objection(&candidate);
+        };
+        // What is remembered of the accepted box makes it cheap to move one end.
+        let reason = self.check_moved(&accepted, &candidate, end);
+        self.accepted = Some(accepted);
+        self.remembers_accepted &= !matches!(reason, Ok(None));
+        Ok(reason?.map(|reason| self.objection_of(&candidate, reason)))
+    }
+
+    /// Looks at a box that many questions with one end further out will be about.
+    pub(crate) fn stand_at(&mut self, envelope: &DecoupledEnvelope) {
+        self.accepted = Some(envelope.clone());
+        self.remembers_accepted = false;
     }
 
     /// The objection that a row is to a box with one end moved out so far; `None` if it has to be
