@@ -9,7 +9,9 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
 use elbowroom_num::Rational;
-use elbowroom_stn::{ConsistentNetwork, ConstraintId, Network, NodeId, Schedule, Weight};
+use elbowroom_stn::{
+    ConsistentNetwork, Constraint, ConstraintId, Network, NodeId, Schedule, Weight,
+};
 
 /// The flow along each constraint that has any.
 pub(crate) type Flow = BTreeMap<ConstraintId, Rational>;
@@ -66,8 +68,9 @@ pub(crate) struct Workspace<W> {
     reached: Vec<Option<Reached<W>>>,
     /// The nodes of which something is known.
     touched: Vec<NodeId>,
-    /// For nodes that lasting constraints are about: these lead to nodes with the same number or a greater one.
-    components: Vec<usize>,
+    /// For nodes that lasting constraints are about, one for all that these lead to and back from: they lead to nodes with the same one, or
+    /// a greater one.
+    components: Vec<NodeId>,
 }
 
 struct Search<'a, 'b, W> {
@@ -104,11 +107,14 @@ impl<W: Weight> Workspace<W> {
     fn resize(&mut self, network: &Network<W>, lasting: usize) {
         let node_count = network.node_count();
         if self.components.is_empty() {
-            let mut lasting_ones = Network::with_nodes(node_count);
+            // Only where they lead counts.
+            let mut lasting_ones: Network<i128> = Network::with_nodes(node_count);
             for constraint in &network.constraints()[..lasting] {
-                lasting_ones.add(constraint.clone());
+                lasting_ones.add(Constraint::at_most(constraint.from, constraint.to, 0));
             }
-            self.components = lasting_ones.components();
+            let nodes: Vec<NodeId> = network.nodes().collect();
+            let components = lasting_ones.components();
+            self.components = components.into_iter().map(|number| nodes[number]).collect();
         }
         self.potential.resize_with(node_count, || None);
         self.reached.resize_with(node_count, || None);
@@ -142,21 +148,18 @@ impl<W: Weight> Search<'_, '_, W> {
             .iter()
             .filter_map(|constraint| component(constraint.from));
         let left = left.max();
-        let mut inside: Vec<(usize, &Rational)> = demand
-            .iter()
-            .filter_map(|(node, amount)| Some((component(*node)?, amount)))
-            .filter(|(component, _)| Some(*component) > left)
-            .collect();
-        inside.sort_by_key(|(component, _)| Reverse(*component));
+        // By component.
+        let mut inside = Demand::new();
+        for (node, amount) in demand {
+            if let Some(own) = component(*node).filter(|own| Some(own) > left.as_ref()) {
+                *inside.entry(own).or_default() += amount;
+            }
+        }
         let mut sum = Rational::ZERO;
-        inside
-            .chunk_by(|one, other| one.0 == other.0)
-            .any(|component| {
-                for (_, amount) in component {
-                    sum += *amount;
-                }
-                sum.is_negative()
-            })
+        inside.values().rev().any(|amount| {
+            sum += amount;
+            sum.is_negative()
+        })
     }
 
     /// Sends what is demanded, by one cheapest path after the other; whether there are such.
