@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, NodeId, Origin, ParametrizedPlan, Side};
 
-use crate::cut::{Cut, Ends, Ground, Length, ProofPart, ProofWay};
+use crate::cut::{Cut, Ends, Ground, Length};
 use crate::row::Row;
 
 /// A conflict of more ends than these is long.
@@ -64,16 +64,11 @@ impl Pieces {
         let bounds = self.bounds.get_or_insert_with(|| Bounds::of(plan));
         let mut rows = Vec::new();
         for cut in long {
-            let origins = match &cut.ground {
-                Ground::Cycle(origins) => origins.clone(),
-                Ground::Semireducible(ways) => {
-                    let mut origins = Vec::new();
-                    ways.iter().for_each(|way| spell_out(way, &mut origins));
-                    origins
-                }
-                _ => continue,
+            // The others are about waits, and say little.
+            let Ground::Cycle(origins) = &cut.ground else {
+                continue;
             };
-            for row in bounds.divided(plan, &origins, envelope).unwrap_or_default() {
+            for row in bounds.divided(plan, origins, envelope).unwrap_or_default() {
                 let ends: Vec<BoxEnd> = row.factors.keys().copied().collect();
                 if !ends.is_empty() && row.holds_in(envelope) && self.known.insert(vec![ends]) {
                     rows.push(row);
@@ -200,16 +195,4 @@ fn step(plan: &ParametrizedPlan, origin: Origin) -> Option<(Length, NodeId)> {
         (None, Bound::Infinite) => return None,
     };
     Some((length, to))
-}
-
-/// Adds the steps of a way one after the other.
-fn spell_out(way: &ProofWay, origins: &mut Vec<Origin>) {
-    for part in &way.parts {
-        match part {
-            ProofPart::Bound(origin) => origins.push(*origin),
-            ProofPart::Early(index) => origins.push(Origin::AtMost(*index)),
-            ProofPart::Late(index) => origins.push(Origin::AtLeast(*index)),
-            ProofPart::Way(way) => spell_out(way, origins),
-        }
-    }
 }

@@ -5,7 +5,6 @@
 //! the way, and so on. Cut at the points that are bound to the beginning, it falls into short ones, which have fewer ends
 //! and often imply it.
 
-use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use elbowroom_num::Rational;
@@ -28,10 +27,10 @@ struct Chord {
 
 /// The bounds between nodes and the beginning, by way of no other node that the network leaves open.
 pub(super) struct Shortcuts {
-    /// At most so long after the beginning.
-    after: BTreeMap<NodeId, Chord>,
+    /// By node: at most so long after the beginning.
+    after: Vec<Option<Chord>>,
     /// At most minus so long before it.
-    before: BTreeMap<NodeId, Chord>,
+    before: Vec<Option<Chord>>,
 }
 
 /// A step of a cycle: how long it is, and what it says.
@@ -45,17 +44,19 @@ impl Shortcuts {
     pub(super) fn new(reader: &Reader<'_>) -> Self {
         let origin = NodeId(0);
         let network = reader.network.network.requirements();
-        let here = Chord {
-            length: Rational::ZERO,
-            parts: Vec::new(),
-        };
+        let none = vec![None; network.node_count()];
         let mut fixed = Self {
-            after: BTreeMap::from([(origin, here.clone())]),
-            before: BTreeMap::from([(origin, here)]),
+            after: none.clone(),
+            before: none,
         };
-        for (after, before) in fixed_pairs(reader, origin) {
-            let node = after.0;
-            keep_least(&mut fixed.after, node, after.1);
+        for side in [&mut fixed.after, &mut fixed.before] {
+            side[origin.index()] = Some(Chord {
+                length: Rational::ZERO,
+                parts: Vec::new(),
+            });
+        }
+        for (node, after, before) in fixed_pairs(reader, origin) {
+            keep_least(&mut fixed.after, node, after);
             keep_least(&mut fixed.before, node, before);
         }
         let mut all = Self {
@@ -64,13 +65,13 @@ impl Shortcuts {
         };
         for id in network.constraint_ids() {
             let constraint = network.constraint(id);
-            if let Some(chord) = fixed.after.get(&constraint.from) {
+            if let Some(chord) = &fixed.after[constraint.from.index()] {
                 let mut parts = chord.parts.clone();
                 parts.push(Part::Requirement(id));
                 let length = &chord.length + &constraint.bound;
                 keep_least(&mut all.after, constraint.to, Chord { length, parts });
             }
-            if let Some(chord) = fixed.before.get(&constraint.to) {
+            if let Some(chord) = &fixed.before[constraint.to.index()] {
                 let mut parts = vec![Part::Requirement(id)];
                 parts.extend(chord.parts.iter().cloned());
                 let length = &chord.length + &constraint.bound;
@@ -96,14 +97,14 @@ impl Shortcuts {
         // Where the last one that was found begins: what begins there or before includes it.
         let mut beginning = 0;
         for end in 0..steps.len() {
-            let Some(back) = self.before.get(&steps[end].to) else {
+            let Some(back) = &self.before[steps[end].to.index()] else {
                 continue;
             };
             let mut length = back.length.clone();
             for begin in (beginning..=end).rev().take(FARTHEST) {
                 length += &steps[begin].length;
                 let from = node_before(&steps, begin);
-                let Some(first) = self.after.get(&from) else {
+                let Some(first) = &self.after[from.index()] else {
                     continue;
                 };
                 if (&length + &first.length).is_negative() && end + 1 - begin < steps.len() {
@@ -154,8 +155,8 @@ impl Shortcuts {
         range: &RangeInclusive<usize>,
         envelope: &DecoupledEnvelope,
     ) -> Option<Cut> {
-        let first = self.after.get(&node_before(steps, *range.start()))?;
-        let back = self.before.get(&steps[*range.end()].to)?;
+        let first = self.after[node_before(steps, *range.start()).index()].as_ref()?;
+        let back = self.before[steps[*range.end()].to.index()].as_ref()?;
         let own = steps[range.clone()].iter().map(|step| &step.part);
         let parts = first.parts.iter().chain(own).chain(&back.parts);
         whole(reader, parts, envelope)
@@ -167,33 +168,36 @@ fn node_before(steps: &[Step], index: usize) -> NodeId {
     steps[index.checked_sub(1).unwrap_or(steps.len() - 1)].to
 }
 
-fn keep_least(chords: &mut BTreeMap<NodeId, Chord>, node: NodeId, chord: Chord) {
-    let known = chords.get(&node);
-    if known.is_none_or(|known| chord.length < known.length) {
-        chords.insert(node, chord);
+fn keep_least(chords: &mut [Option<Chord>], node: NodeId, chord: Chord) {
+    let known = &mut chords[node.index()];
+    if known
+        .as_ref()
+        .is_none_or(|known| chord.length < known.length)
+    {
+        *known = Some(chord);
     }
 }
 
 /// The nodes whose distance from the beginning is fixed: the bounds that fix it from both sides.
-fn fixed_pairs(reader: &Reader<'_>, origin: NodeId) -> Vec<((NodeId, Chord), Chord)> {
+fn fixed_pairs(reader: &Reader<'_>, origin: NodeId) -> Vec<(NodeId, Chord, Chord)> {
     let network = &reader.network.network;
     let requirements = network.requirements();
     let chord = |length: Rational, part| Chord {
         length,
         parts: vec![part],
     };
-    let mut after: BTreeMap<NodeId, ConstraintId> = BTreeMap::new();
+    let mut after: Vec<Option<ConstraintId>> = vec![None; requirements.node_count()];
     for id in requirements.leaving(origin) {
-        after.insert(requirements.constraint(id).to, id);
+        after[requirements.constraint(id).to.index()] = Some(id);
     }
     let fixed = requirements.entering(origin).filter_map(|back| {
         let node = requirements.constraint(back).from;
-        let there = *after.get(&node)?;
+        let there = after[node.index()]?;
         let bounds = [there, back].map(|id| &requirements.constraint(id).bound);
         (bounds[0] + bounds[1]).is_zero().then(|| {
             let after = chord(bounds[0].clone(), Part::Requirement(there));
             let before = chord(bounds[1].clone(), Part::Requirement(back));
-            ((node, after), before)
+            (node, after, before)
         })
     });
     let links = network.link_ids().filter_map(|id: LinkId| {
@@ -201,7 +205,7 @@ fn fixed_pairs(reader: &Reader<'_>, origin: NodeId) -> Vec<((NodeId, Chord), Cho
         let is_fixed = link.activation == origin && link.upper.as_ref() == Some(&link.lower);
         is_fixed.then(|| {
             let after = chord(link.lower.clone(), Part::Early(id));
-            ((link.end, after), chord(-&link.lower, Part::Late(id)))
+            (link.end, after, chord(-&link.lower, Part::Late(id)))
         })
     });
     fixed.chain(links).collect()

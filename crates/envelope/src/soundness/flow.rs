@@ -107,14 +107,9 @@ impl<W: Weight> Workspace<W> {
     fn resize(&mut self, network: &Network<W>, lasting: usize) {
         let node_count = network.node_count();
         if self.components.is_empty() {
-            // Only where they lead counts.
-            let mut lasting_ones: Network<i128> = Network::with_nodes(node_count);
-            for constraint in &network.constraints()[..lasting] {
-                lasting_ones.add(Constraint::at_most(constraint.from, constraint.to, 0));
-            }
-            let nodes: Vec<NodeId> = network.nodes().collect();
-            let components = lasting_ones.components();
-            self.components = components.into_iter().map(|number| nodes[number]).collect();
+            let lasting = network.constraints()[..lasting].iter();
+            let mut lasting = lasting.map(|constraint| (constraint.from, constraint.to));
+            self.components = components(node_count, &mut lasting);
         }
         self.potential.resize_with(node_count, || None);
         self.reached.resize_with(node_count, || None);
@@ -136,30 +131,11 @@ impl<W: Weight> Workspace<W> {
 }
 
 impl<W: Weight> Search<'_, '_, W> {
-    /// Whether some nodes from which only constraints between themselves lead have more units that leave them than come into
-    /// them. Then there is no flow; the search for a path would go everywhere before it says so.
-    ///
-    /// Such nodes are those of one component, and all of the greater ones, unless what is assumed leads away from them.
+    /// Whether there is [no flow](is_endless) for the demand, as far as that can be told before one is looked for.
     fn is_endless(&self, demand: &Demand) -> bool {
-        let components = &self.workspace.components;
-        let component = |node: NodeId| components.get(node.index()).copied();
         let assumed = &self.network.network().constraints()[self.lasting..];
-        let left = assumed
-            .iter()
-            .filter_map(|constraint| component(constraint.from));
-        let left = left.max();
-        // By component.
-        let mut inside = Demand::new();
-        for (node, amount) in demand {
-            if let Some(own) = component(*node).filter(|own| Some(own) > left.as_ref()) {
-                *inside.entry(own).or_default() += amount;
-            }
-        }
-        let mut sum = Rational::ZERO;
-        inside.values().rev().any(|amount| {
-            sum += amount;
-            sum.is_negative()
-        })
+        let mut left = assumed.iter().map(|constraint| constraint.from);
+        is_endless(demand, &self.workspace.components, &mut left)
     }
 
     /// Sends what is demanded, by one cheapest path after the other; whether there are such.
@@ -297,4 +273,46 @@ impl<W: Weight> Search<'_, '_, W> {
         }
         None
     }
+}
+
+/// For each node one for all that these constraints lead to and back from. They lead to nodes with the same one, or a
+/// greater one.
+fn components(
+    node_count: usize,
+    constraints: &mut dyn Iterator<Item = (NodeId, NodeId)>,
+) -> Vec<NodeId> {
+    // Only where they lead counts.
+    let mut network: Network<i128> = Network::with_nodes(node_count);
+    for (from, to) in constraints {
+        network.add(Constraint::at_most(from, to, 0));
+    }
+    let nodes: Vec<NodeId> = network.nodes().collect();
+    let components = network.components();
+    components.into_iter().map(|number| nodes[number]).collect()
+}
+
+/// Whether some nodes from which only constraints between themselves lead have more units that leave them than come into
+/// them. Then there is no flow; the search for a path would go everywhere before it says so.
+///
+/// Such nodes are those of one component, and all of the greater ones, if `left` has none of them, from which other
+/// constraints lead.
+fn is_endless(
+    demand: &Demand,
+    components: &[NodeId],
+    left: &mut dyn Iterator<Item = NodeId>,
+) -> bool {
+    let component = |node: NodeId| components.get(node.index()).copied();
+    let left = left.filter_map(component).max();
+    // By component.
+    let mut inside = Demand::new();
+    for (node, amount) in demand {
+        if let Some(own) = component(*node).filter(|own| left.is_none_or(|left| *own > left)) {
+            *inside.entry(own).or_default() += amount;
+        }
+    }
+    let mut sum = Rational::ZERO;
+    inside.values().rev().any(|amount| {
+        sum += amount;
+        sum.is_negative()
+    })
 }
