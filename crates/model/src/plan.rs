@@ -26,6 +26,18 @@ pub struct Step {
 }
 
 impl Step {
+    /// The steps in order of start; those that start together stay as they are.
+    pub fn by_start(steps: &[Self]) -> Vec<&Self> {
+        let mut steps: Vec<&Self> = steps.iter().collect();
+        steps.sort_by(|one, other| one.start.cmp(&other.start));
+        steps
+    }
+
+    /// Puts the steps [in order of start](Self::by_start).
+    pub fn sort_by_start(steps: &mut [Self]) {
+        steps.sort_by(|one, other| one.start.cmp(&other.start));
+    }
+
     /// The end time; its start, for an instantaneous action.
     pub fn end(&self) -> Rational {
         match &self.duration {

@@ -205,7 +205,7 @@ impl StnPlan {
                 duration,
             });
         }
-        steps.sort_by(|a, b| a.start.cmp(&b.start));
+        Step::sort_by_start(&mut steps);
         TimeTriggeredPlan { steps }
     }
 }

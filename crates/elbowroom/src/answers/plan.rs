@@ -8,7 +8,7 @@ mod objective;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_pddl::write_plan;
 use elbowroom_planner::{Answer, Counts, Found, Progress, Settings, Stopped};
@@ -337,13 +337,13 @@ impl PlanFinding {
         metric: Option<Rational>,
         repaired: Option<String>,
     ) -> Self {
-        let mut steps: Vec<_> = plan.steps.iter().collect();
-        steps.sort_by(|a, b| a.start.cmp(&b.start));
-        let steps = steps.into_iter().map(|step| PlanStep {
-            start: Exact(step.start.clone()),
-            action: step.action.name.clone(),
-            duration: step.duration.clone().map(Exact),
-        });
+        let steps = Step::by_start(&plan.steps)
+            .into_iter()
+            .map(|step| PlanStep {
+                start: Exact(step.start.clone()),
+                action: step.action.name.clone(),
+                duration: step.duration.clone().map(Exact),
+            });
         Self::Plan {
             makespan,
             metric,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_model::{Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 /// How many digits behind the point are written at least, as planners do.
@@ -16,10 +16,8 @@ const MOST_DIGITS: u32 = 300;
 /// Numbers are written exactly; one without a finite decimal is written as `p/q`, which other
 /// tools may refuse.
 pub fn write_plan(task: &Task, plan: &TimeTriggeredPlan) -> String {
-    let mut steps: Vec<_> = plan.steps.iter().collect();
-    steps.sort_by(|a, b| a.start.cmp(&b.start));
     let mut text = String::new();
-    for step in steps {
+    for step in Step::by_start(&plan.steps) {
         let action = &step.action;
         text.push_str(&decimal(&step.start));
         text.push_str(": ");

@@ -157,7 +157,7 @@ fn written(
             duration,
         });
     }
-    plan.steps[situation.running.len()..].sort_by(|a, b| a.start.cmp(&b.start));
+    PlanStep::sort_by_start(&mut plan.steps[situation.running.len()..]);
     Some(plan)
 }
 

@@ -152,9 +152,7 @@ impl Run<'_> {
             .filter(|(ticket, it)| it.ordered >= search.begun && !done.contains(ticket))
             .map(|(ticket, it)| (ticket, it.action.name.clone()))
             .collect();
-        let mut new: Vec<&Step> = plan.new_steps(&search.situation).iter().collect();
-        new.sort_by(|one, other| one.start.cmp(&other.start));
-        for step in new {
+        for step in Step::by_start(plan.new_steps(&search.situation)) {
             let same = besides.iter().position(|(_, it)| *it == step.action.name);
             match same {
                 Some(index) => drop(besides.remove(index)),

@@ -116,9 +116,7 @@ impl Run<'_> {
         let Some(readying) = readying else {
             return true;
         };
-        let steps = readying.plan.new_steps(&readying.situation).iter();
-        let mut left: Vec<&Step> = steps.collect();
-        left.sort_by(|one, other| one.start.cmp(&other.start));
+        let mut left = Step::by_start(readying.plan.new_steps(&readying.situation));
         let begun = begun_since(readying, self.account.started());
         let begun = begun.filter_map(|it| self.account.get(it));
         let mut take = |name: &str| {
