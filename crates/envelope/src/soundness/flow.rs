@@ -316,3 +316,59 @@ fn is_endless(
         sum.is_negative()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// A network of six nodes, in which 0, 1, 2, … is a schedule.
+    fn network(random: &mut ChaCha8Rng) -> Network<i64> {
+        let mut network = Network::with_nodes(6);
+        for _ in 0..random.random_range(4..12) {
+            let [from, to] = [(); 2].map(|()| NodeId(random.random_range(0..6)));
+            let least = i64::from(to.0) - i64::from(from.0);
+            let bound = least + random.random_range(0..4);
+            network.add(Constraint { from, to, bound });
+        }
+        network
+    }
+
+    #[test]
+    fn where_demand_is_endless_no_search_finds_a_flow() {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let (mut endless, mut unmet) = (0, 0);
+        for _ in 0..20_000 {
+            let own = network(&mut random);
+            let lasting = random.random_range(0..=own.constraint_ids().len());
+            let own = ConsistentNetwork::try_from(own).expect("it has a schedule");
+            let mut demand = Demand::new();
+            for _ in 0..random.random_range(1..4) {
+                let amount = Rational::from(random.random_range(1..3));
+                for sign in [1, -1] {
+                    let node = NodeId(random.random_range(0..6));
+                    *demand.entry(node).or_default() += &(&amount * &Rational::from(sign));
+                }
+            }
+            let mut workspace = Workspace::default();
+            workspace.resize(own.network(), lasting);
+            let mut search = Search {
+                network: &own,
+                lasting,
+                flow: Flow::new(),
+                workspace: &mut workspace,
+            };
+            let is_endless = search.is_endless(&demand);
+            let is_met = search.meet(&mut demand.clone());
+            assert!(!(is_endless && is_met), "{own:?} {lasting} {demand:?}");
+            endless += usize::from(is_endless);
+            unmet += usize::from(!is_met);
+        }
+        assert!(
+            endless > 1_000 && unmet > endless && unmet < 19_000,
+            "{endless} of {unmet}"
+        );
+    }
+}
