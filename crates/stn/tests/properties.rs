@@ -2,7 +2,7 @@
 
 use elbowroom_num::{Delta, Rational};
 use elbowroom_stn::testing::{consistent_networks, consistent_strict_networks, networks};
-use elbowroom_stn::{ConsistentNetwork, Constraint, ConstraintId, Network, Weight};
+use elbowroom_stn::{ConsistentNetwork, Constraint, ConstraintId, Network, NodeId, Weight};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseResult;
 
@@ -35,6 +35,28 @@ proptest! {
     #[test]
     fn the_verdict_and_all_distances_are_those_of_bellman_and_ford(network in networks()) {
         agrees_with_the_oracle(&network)?;
+    }
+
+    #[test]
+    fn components_say_where_constraints_lead(network in networks()) {
+        let components = network.components();
+        let leads = |from: NodeId, to: NodeId| {
+            let mut seen = vec![false; network.node_count()];
+            let mut open = vec![from];
+            while let Some(node) = open.pop() {
+                if !std::mem::replace(&mut seen[node.index()], true) {
+                    open.extend(network.leaving(node).map(|id| network.constraint(id).to));
+                }
+            }
+            seen[to.index()]
+        };
+        for from in network.nodes() {
+            for to in network.nodes() {
+                let [own, other] = [from, to].map(|node: NodeId| components[node.index()]);
+                prop_assert_eq!(own == other, leads(from, to) && leads(to, from));
+                prop_assert!(own <= other || !leads(from, to));
+            }
+        }
     }
 
     #[test]
