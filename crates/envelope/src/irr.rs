@@ -142,6 +142,7 @@ pub struct IrrRun {
 /// The steps, their outcomes and their number are those of one check after the other, but where
 /// something is known about a box beforehand, it is not checked: many boxes are found inside by
 /// checking the last of them, and many are refused for a reason that refused another one before.
+/// Where long conflicts are divided ([`Settings::divide_after`]), some steps are refused that a check would not refuse.
 ///
 /// # Errors
 /// When nothing can be told of the start point.

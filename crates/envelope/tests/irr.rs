@@ -283,12 +283,11 @@ fn the_search_takes_the_steps_of_one_check_after_the_other() {
     let mut dice = Dice(3);
     let (mut long, mut limited, mut cancelled, mut without, mut objected) = (0, 0, 0, 0, 0);
     for round in 0..800 {
-        let text = match round {
-            ..600 => plan_text(&mut dice),
-            _ => {
-                let count = 4 + dice.below(8);
-                plan_in_windows(&mut dice, count)
-            }
+        let text = if round < 600 {
+            plan_text(&mut dice)
+        } else {
+            let count = 4 + dice.below(8);
+            plan_in_windows(&mut dice, count)
         };
         let given = Given {
             domain: DOMAIN,
