@@ -108,7 +108,7 @@ impl<'a> Ahead<'a> {
         let length = std::mem::replace(&mut self.length, usize::MAX);
         self.bounds = Some(OwnBounds::of(&self.plan));
         let leap = self.leap();
-        (self.length, self.bounds) = (length, None);
+        self.length = length;
         if let Confirmed::No(cuts) = self.confirmed(&leap) {
             self.refused(cuts);
             return None;
