@@ -248,7 +248,7 @@ impl Reader<'_> {
     /// What a conflict in the box says about others.
     fn cut(&self, refutation: &Refutation, envelope: &DecoupledEnvelope) -> Option<Cut> {
         let whole = whole(self, steps(&refutation.cycle), envelope);
-        if whole.is_some() {
+        if whole.is_some() || refutation.is_flat {
             return whole;
         }
         let mut rows = Vec::new();

@@ -38,6 +38,7 @@ fn length(way: &Way, network: &UncertainNetwork<i64>) -> (i64, bool) {
 }
 
 fn refutes(refutation: &Refutation, network: &UncertainNetwork<i64>) -> bool {
+    assert!(!refutation.is_flat);
     let lengths = refutation.cycle.iter().map(|way| length(way, network));
     let (total, is_legal) = lengths.fold((0, true), |(sum, all), (own, legal)| {
         (sum + own, all && legal)

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use super::dynamic::{Closed, Search};
 use super::graph::{EdgeId, Graph, Kind, Origin, WayId};
-use super::{LinkId, UncertainNetwork};
+use super::{Ground, LinkId, UncertainNetwork};
 use crate::{ConstraintId, Weight};
 
 /// The limit on the parts of a refutation, or, of a larger network, one for each of its nodes: what is shared is
@@ -15,6 +15,10 @@ const MOST_PARTS: usize = 10_000;
 
 /// The limit on the parts of all refutations of a network, for each of its nodes.
 const MOST_PARTS_A_NODE: usize = 8;
+
+/// The limit on ways that lie in one another: what follows from what along a long plan would lie as deep as the plan is
+/// long.
+const MOST_DEPTH: usize = 200;
 
 /// One part of a way through the graph of a network, from its beginning to its end.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,6 +55,9 @@ pub struct Way {
 pub struct Refutation {
     /// The cycle; each way begins where the one before ends.
     pub cycle: Vec<Way>,
+    /// The ways lie so deep in one another that only their steps are told, as one way; of other networks that says no more
+    /// than any cycle of bounds, of which those of a link at its lower end and at its upper one are not to be added.
+    pub is_flat: bool,
 }
 
 /// Refutations, if there are any that are not too long to be told.
@@ -89,11 +96,21 @@ impl<W: Weight> UncertainNetwork<W> {
             let mut parts = 0;
             let ways = cycle
                 .iter()
-                .map(|&way| told.spelt_out(graph, way, &mut parts));
-            found.extend(
-                ways.collect::<Option<_>>()
-                    .map(|cycle| Refutation { cycle }),
-            );
+                .map(|&way| told.spelt_out(graph, way, &mut parts, 0));
+            match ways.collect::<Result<_, _>>() {
+                Ok(cycle) => found.push(Refutation {
+                    cycle,
+                    is_flat: false,
+                }),
+                Err(TooMuch::Deep) => found.extend(told.flat(graph, cycle).map(|steps| {
+                    parts = steps.parts.len();
+                    Refutation {
+                        cycle: vec![steps],
+                        is_flat: true,
+                    }
+                })),
+                Err(TooMuch::Long) => {}
+            }
             all_parts += parts + cycle.len();
             if found.len() < most && all_parts < most_parts {
                 ControlFlow::Continue(())
@@ -131,34 +148,44 @@ impl Told {
         })
     }
 
-    /// The parts of a way; `None` if there are too many.
+    /// The parts of a way.
     fn spelt_out<W: Weight>(
         &mut self,
         graph: &Graph<W>,
         way: WayId,
         count: &mut usize,
-    ) -> Option<Way> {
+        depth: usize,
+    ) -> Result<Way, TooMuch> {
+        if depth > MOST_DEPTH {
+            return Err(TooMuch::Deep);
+        }
         // There are many of them, most of them short.
         let mut parts = Vec::with_capacity(ways_from(graph, way).count());
         for way in ways_from(graph, way) {
-            parts.push(self.part(graph, graph.ways[way].edge, count)?);
+            parts.push(self.part(graph, graph.ways[way].edge, count, depth)?);
         }
-        Some(Way {
+        Ok(Way {
             parts,
             unlabelled: None,
         })
     }
 
-    fn part<W: Weight>(&mut self, graph: &Graph<W>, id: EdgeId, count: &mut usize) -> Option<Part> {
+    fn part<W: Weight>(
+        &mut self,
+        graph: &Graph<W>,
+        id: EdgeId,
+        count: &mut usize,
+        depth: usize,
+    ) -> Result<Part, TooMuch> {
         *count += 1;
         if *count > self.most {
-            return None;
+            return Err(TooMuch::Long);
         }
         let edge = &graph.edges[id];
         if !matches!(edge.origin, Origin::Requirement(_)) {
             self.edges.insert(id);
         }
-        Some(match (edge.origin, edge.kind) {
+        Ok(match (edge.origin, edge.kind) {
             (Origin::Requirement(id), _) => Part::Requirement(id),
             (Origin::Link(link), Kind::Lower(_)) => Part::Early(link),
             (Origin::Link(link), Kind::Upper(_)) => Part::Late(link),
@@ -168,7 +195,7 @@ impl Told {
                 unlabelled: Some(link),
             }),
             (Origin::Way(way), kind) => {
-                let mut spelt = self.spelt_out(graph, way, count)?;
+                let mut spelt = self.spelt_out(graph, way, count, depth + 1)?;
                 if kind == Kind::Plain {
                     spelt.unlabelled = label(graph, way);
                 }
@@ -176,6 +203,35 @@ impl Told {
             }
         })
     }
+
+    /// The steps of a cycle one after the other; `None` if there are too many.
+    fn flat<W: Weight>(&mut self, graph: &Graph<W>, cycle: &[WayId]) -> Option<Way> {
+        let mut edges = Vec::new();
+        for way in cycle.iter().flat_map(|&way| ways_from(graph, way)) {
+            let edge = graph.ways[way].edge;
+            self.edges.insert(edge);
+            if !graph.spelt_out(edge, self.most, &mut edges) {
+                return None;
+            }
+        }
+        let part = |id| match graph.step(id).ground {
+            Ground::Requirement(id) => Part::Requirement(id),
+            Ground::Early(link) => Part::Early(link),
+            Ground::Late(link) => Part::Late(link),
+        };
+        Some(Way {
+            parts: edges.into_iter().map(part).collect(),
+            unlabelled: None,
+        })
+    }
+}
+
+/// Why a refutation is not told part by part.
+enum TooMuch {
+    /// It has too many.
+    Long,
+    /// They lie too deep in one another.
+    Deep,
 }
 
 /// A way, what is left of it after its first edge, and so on.
