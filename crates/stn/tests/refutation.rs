@@ -9,6 +9,7 @@
 mod game;
 
 use elbowroom_stn::uncertain::{ContingentLink, Part, Refutation, Refuted, UncertainNetwork, Way};
+use elbowroom_stn::{Constraint, Network, NodeId};
 use game::{Board, Random};
 
 /// The length of a way with a network's bounds, and whether it may be taken with them: what follows
@@ -104,4 +105,44 @@ fn a_network_that_a_refutation_still_fits_is_not_controllable() {
         refuted > 1_000 && further > 1_000 && fits > 1_000 && waits > 30,
         "{refuted} {further} {fits} {waits}"
     );
+}
+
+/// Each link may take a little longer than the time until the next one's earliest start, so that the last one ends too late: what
+/// follows from what lies as deep as there are links.
+#[test]
+fn a_conflict_along_many_windows_is_told_flat() {
+    let (period, more, room) = (10_000, 1, 2_000);
+    let mut requirements = Network::with_nodes(6_001);
+    let zero = NodeId(0);
+    let mut links = Vec::new();
+    for index in 0..3_000 {
+        let time = i64::from(index) * period;
+        let [activation, end] = [1, 2].map(|place| NodeId(2 * index + place));
+        requirements.add(Constraint::at_least(zero, activation, time));
+        requirements.add(Constraint::at_most(zero, end, time + period + room));
+        if index > 0 {
+            requirements.add(Constraint::at_least(NodeId(2 * index), activation, 0));
+        }
+        links.push(ContingentLink {
+            activation,
+            end,
+            lower: 1,
+            upper: Some(period + more),
+        });
+    }
+    let network = UncertainNetwork::new(requirements, links).unwrap();
+    let Refuted::Because(refutations) = network.refutations(1) else {
+        panic!("one is not too long to be told");
+    };
+    let [refutation] = &refutations[..] else {
+        panic!("one was wanted");
+    };
+    assert!(refutation.is_flat);
+    let [way] = &refutation.cycle[..] else {
+        panic!("the steps are one way");
+    };
+    let (total, is_legal) = length(way, &network);
+    assert!(total < 0 && is_legal && way.parts.len() > 2_000);
+    let is_early = |part: &Part| matches!(part, Part::Early(_));
+    assert!(!way.parts.iter().any(is_early));
 }
