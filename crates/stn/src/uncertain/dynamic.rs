@@ -323,7 +323,7 @@ impl<'a, W: Weight> Search<'a, W> {
             return false;
         };
         let distance = frame.reached[&node].distance.clone();
-        let is_one_edge = self.graph.ways[way].rest.is_none();
+        let is_one_edge = self.graph.ways[way].rest().is_none();
         let edge = |kind| Edge {
             from: node,
             to: frame.node,
@@ -401,7 +401,7 @@ impl<'a, W: Weight> Search<'a, W> {
             Some(reached) if next != frame.node => reached.way,
             _ => None,
         };
-        self.graph.ways.push(Way { edge, rest });
+        self.graph.ways.push(Way::new(edge, rest));
         self.graph.ways.len() - 1
     }
 
@@ -456,10 +456,10 @@ impl<'a, W: Weight> Search<'a, W> {
             let mut edges = Vec::new();
             let mut next = Some(way);
             while let Some(way) = next {
-                let edge = self.graph.ways[way].edge;
+                let edge = self.graph.ways[way].edge();
                 total = total.plus(&self.graph.edges[edge].bound);
                 is_whole &= self.graph.spelt_out(edge, MOST_STEPS, &mut edges);
-                next = self.graph.ways[way].rest;
+                next = self.graph.ways[way].rest();
             }
             for edge in edges {
                 if steps.len() < MOST_STEPS {

@@ -1,5 +1,7 @@
 //! A network as the graph that dynamic controllability is decided on.
 
+use std::num::NonZero;
+
 use super::conflict::{Ground, Step};
 use super::extended::Extended;
 use super::order::Order;
@@ -50,8 +52,28 @@ pub(super) type WayId = usize;
 /// An edge, and the rest of the way behind it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Way {
-    pub(super) edge: EdgeId,
-    pub(super) rest: Option<WayId>,
+    edge: u32,
+    /// One more than the way's number.
+    rest: Option<NonZero<u32>>,
+}
+
+impl Way {
+    /// An edge, and what is left of a way after it. A network may have millions of them: numbers are kept short.
+    pub(super) fn new(edge: EdgeId, rest: Option<WayId>) -> Self {
+        let short = |number: usize| u32::try_from(number).expect("fewer than 2^32 ways");
+        Self {
+            edge: short(edge),
+            rest: rest.and_then(|way| NonZero::new(short(way + 1))),
+        }
+    }
+
+    pub(super) fn edge(&self) -> EdgeId {
+        self.edge as usize
+    }
+
+    pub(super) fn rest(&self) -> Option<WayId> {
+        self.rest.map(|way| way.get() as usize - 1)
+    }
 }
 
 /// The network as a graph, with the edges found.
@@ -145,8 +167,9 @@ impl<W: Weight> Graph<W> {
         [first, first + 1]
     }
 
-    /// The same graph with other numbers.
+    /// The same graph with other numbers, not to be searched any more.
     pub(super) fn map<V>(self, number: impl Fn(W) -> V) -> Graph<V> {
+        drop([self.positive_into, self.negative_into, self.upper_into]);
         let edges = self.edges.into_iter().map(|edge| Edge {
             from: edge.from,
             to: edge.to,
@@ -157,10 +180,10 @@ impl<W: Weight> Graph<W> {
         Graph {
             edges: edges.collect(),
             ways: self.ways,
-            positive_into: self.positive_into,
-            negative_into: self.negative_into,
-            upper_into: self.upper_into,
-            earlier: self.earlier,
+            positive_into: Vec::new(),
+            negative_into: Vec::new(),
+            upper_into: Vec::new(),
+            earlier: Vec::new(),
             order: None,
             is_full: self.is_full,
             given: self.given,
@@ -206,8 +229,8 @@ impl<W: Weight> Graph<W> {
             let mut along = Vec::new();
             let mut next = Some(way);
             while let Some(way) = next {
-                along.push(self.ways[way].edge);
-                next = self.ways[way].rest;
+                along.push(self.ways[way].edge());
+                next = self.ways[way].rest();
             }
             stack.extend(along.into_iter().rev());
         }

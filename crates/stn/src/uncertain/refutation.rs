@@ -142,7 +142,7 @@ struct Told {
 impl Told {
     /// Whether all edges of a way have been spelt out, but for requirements.
     fn has<W: Weight>(&self, graph: &Graph<W>, way: WayId) -> bool {
-        let mut edges = ways_from(graph, way).map(|way| graph.ways[way].edge);
+        let mut edges = ways_from(graph, way).map(|way| graph.ways[way].edge());
         edges.all(|id| {
             matches!(graph.edges[id].origin, Origin::Requirement(_)) || self.edges.contains(&id)
         })
@@ -162,7 +162,7 @@ impl Told {
         // There are many of them, most of them short.
         let mut parts = Vec::with_capacity(ways_from(graph, way).count());
         for way in ways_from(graph, way) {
-            parts.push(self.part(graph, graph.ways[way].edge, count, depth)?);
+            parts.push(self.part(graph, graph.ways[way].edge(), count, depth)?);
         }
         Ok(Way {
             parts,
@@ -208,7 +208,7 @@ impl Told {
     fn flat<W: Weight>(&mut self, graph: &Graph<W>, cycle: &[WayId]) -> Option<Way> {
         let mut edges = Vec::new();
         for way in cycle.iter().flat_map(|&way| ways_from(graph, way)) {
-            let edge = graph.ways[way].edge;
+            let edge = graph.ways[way].edge();
             self.edges.insert(edge);
             if !graph.spelt_out(edge, self.most, &mut edges) {
                 return None;
@@ -236,13 +236,13 @@ enum TooMuch {
 
 /// A way, what is left of it after its first edge, and so on.
 fn ways_from<W>(graph: &Graph<W>, way: WayId) -> impl Iterator<Item = WayId> + '_ {
-    std::iter::successors(Some(way), |&way| graph.ways[way].rest)
+    std::iter::successors(Some(way), |&way| graph.ways[way].rest())
 }
 
 /// The link for whose end a way waits.
 fn label<W: Weight>(graph: &Graph<W>, way: WayId) -> Option<LinkId> {
     let last = ways_from(graph, way).last()?;
-    match graph.edges[graph.ways[last].edge].kind {
+    match graph.edges[graph.ways[last].edge()].kind {
         Kind::Upper(link) => Some(link),
         Kind::Plain | Kind::Lower(_) => None,
     }
