@@ -67,11 +67,11 @@ impl Way {
         }
     }
 
-    pub(super) fn edge(&self) -> EdgeId {
+    pub(super) fn edge(self) -> EdgeId {
         self.edge as usize
     }
 
-    pub(super) fn rest(&self) -> Option<WayId> {
+    pub(super) fn rest(self) -> Option<WayId> {
         self.rest.map(|way| way.get() as usize - 1)
     }
 }
