@@ -36,7 +36,7 @@ pub(crate) struct Known {
 
 /// Rows of which one has to hold.
 #[derive(Clone, Debug)]
-pub(crate) struct KnownCut {
+struct KnownCut {
     rows: Range<usize>,
     /// Why; `None` if boxes are only wanted to be so.
     ground: Option<Ground>,
