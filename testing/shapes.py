@@ -117,6 +117,22 @@ def windows(count):
     return *texts(actions, facts, predicates="(open)"), [(start + 2000, *rest) for start, *rest in steps]
 
 
+def due(count):
+    """Each turn has to be over by a time of its own, which leaves a tenth more room with each."""
+    work = (
+        "\n (:durative-action work :parameters (?r - robot ?t - turn) :duration (= ?duration 5)"
+        f"\n  :condition (and {IDLE} (over all (open ?t)))\n  :effect (and {BUSY} {FREE} (at end (done ?r))))"
+    )
+    turns = count // len(ROBOTS) + 1
+    facts = [f"(open t{turn}) (at {turn * 5.5 + 8} (not (open t{turn})))" for turn in range(turns)]
+    domain, problem = texts([work], facts, predicates="(open ?t - turn)")
+    domain = domain.replace("(:types robot)", "(:types robot turn)")
+    objects = " ".join(f"t{turn}" for turn in range(turns))
+    problem = problem.replace(" - robot)", f" - robot {objects} - turn)")
+    places = [divmod(number, len(ROBOTS)) for number in range(count)]
+    return domain, problem, [(turn * 5001 + 1, f"(work {ROBOTS[robot]} t{turn})", 5) for turn, robot in places]
+
+
 def battery(count):
     """Charge that falls continuously while a robot drives; each eighth time it is loaded."""
     drive = action(
@@ -128,7 +144,7 @@ def battery(count):
     return domain, problem, in_turns(count, lambda turn: "load" if turn % 8 == 7 else "drive")
 
 
-SHAPES = {it.__name__: it for it in (lock, counter, pool, stock, match, deadline, windows, battery)}
+SHAPES = {it.__name__: it for it in (lock, counter, pool, stock, match, deadline, due, windows, battery)}
 
 
 def files(shape, count):

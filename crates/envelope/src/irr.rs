@@ -195,7 +195,8 @@ pub fn irr(
 
 /// Tells what keeps each of these ends of a box where it is, if something does. An end that can still
 /// move by less than its parameter's `step` is asked what would stop it there. `flow` can end that at
-/// any end; nothing is said of those that come after.
+/// any end; nothing is said of those that come after. If the box is inside the envelope, it is the oracle's accepted one
+/// afterwards.
 pub fn limits(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom::flow::{self, Freed};
-use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::model::{Step, Task, TimeTriggeredPlan};
 use elbowroom::pddl::{self, read_problem};
 use elbowroom::plan::format;
 use elbowroom::plan::{NodeId, Valuation, network_node};
@@ -93,7 +93,7 @@ impl Subject {
     pub(crate) fn turned_round(&self) -> Option<Result<Self, String>> {
         let mut plan = self.plan.clone();
         plan.steps.reverse();
-        plan.steps.sort_by(|one, other| one.start.cmp(&other.start));
+        Step::sort_by_start(&mut plan.steps);
         if plan == self.plan {
             return None;
         }

@@ -23,7 +23,7 @@ use super::vary::is_about_an_absent_action;
 use crate::chances::{ChanceError, chances};
 use crate::flow::{self, FlowError};
 
-/// See [`divide_after`](SearchSettings::divide_after): more than plans of a thousand actions come to.
+/// See [`divide_after`](SearchSettings::divide_after). Looks at a plan of a thousand actions hardly go through so many.
 const DIVIDE_AFTER: usize = 50_000;
 
 impl From<FlowError> for PrepareError {

@@ -141,7 +141,7 @@ impl Bounds {
             own.is_some() && *own == self.most[node.index()]
         };
         let first = steps.iter().position(|(_, to)| is_fixed(*to))?;
-        let time = |side: &'_ Times, node: NodeId| side[node.index()].clone();
+        let time = |side: &Times, node: NodeId| side[node.index()].clone();
         let count = |side: &Times| {
             let with_time = steps.iter().filter(|(_, to)| time(side, *to).is_some());
             with_time.count()

@@ -133,8 +133,8 @@ impl Oracle {
         self.known = known;
     }
 
-    /// Like [`objection`](Self::objection), of a box with one end moved out. Where a search has come across a reason that refuses that box as well, it is not looked for
-    /// again.
+    /// Like [`objection`](Self::objection), of a box with one end moved out. Where a search has come across a reason
+    /// that refuses that box as well, it is not looked for again.
     ///
     /// # Errors
     /// When there are too many cases to tell apart.
@@ -166,10 +166,15 @@ impl Oracle {
         Ok(reason?.map(|reason| self.objection_of(&candidate, reason)))
     }
 
-    /// Looks at a box that many questions with one end further out will be about.
+    /// Takes a box that many questions with one end further out will be about for the accepted one, if it is inside the
+    /// envelope. That is not counted as a check.
     pub(crate) fn stand_at(&mut self, envelope: &DecoupledEnvelope) {
-        self.accepted = Some(envelope.clone());
-        self.remembers_accepted = false;
+        let checks = self.checks;
+        self.remembers_accepted = matches!(self.check_afresh(envelope), Ok(None));
+        self.checks = checks;
+        if self.remembers_accepted {
+            self.accepted = Some(envelope.clone());
+        }
     }
 
     /// The objection that a row is to a box with one end moved out so far; `None` if it has to be

@@ -55,8 +55,9 @@ pub struct Way {
 pub struct Refutation {
     /// The cycle; each way begins where the one before ends.
     pub cycle: Vec<Way>,
-    /// The ways lie so deep in one another that only their steps are told, as one way; of other networks that says no more
-    /// than any cycle of bounds, of which those of a link at its lower end and at its upper one are not to be added.
+    /// Whether the ways lie so deep in one another that only their steps are told, as one way. With other bounds that
+    /// proves something only if no link is in it both as [`Part::Early`] and as [`Part::Late`]: the steps are a cycle of
+    /// bounds then, and if they add up to less than 0, there is no schedule for these durations.
     pub is_flat: bool,
 }
 
