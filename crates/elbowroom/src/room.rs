@@ -165,7 +165,7 @@ fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
                 .products
                 .keys()
                 .filter_map(|(_, factor)| match factor {
-                    Factor::Time(node) => Some(*node),
+                    Factor::Time(node) => Some(node),
                     Factor::Parameter(_) => None,
                 }),
         );

@@ -21,7 +21,7 @@ pub(crate) enum Role {
 }
 
 /// How far out the ends of parameters may lie that are differences of times, by bounds on these
-/// same differences; and the edges that are left then.
+/// same differences; and the positions of the edges that are left then.
 ///
 /// Let `p` be the difference `d - s`: there is an edge `s -> d` with bound `c + p` and one `d -> s`
 /// with `-c - p`. A bound `k` from `d` to `s` closes a cycle of length `c + p + k` with the former,
@@ -31,10 +31,10 @@ pub(crate) enum Role {
 pub(crate) fn own_limits(
     edges: &[Edge],
     coupled: &[ParameterId],
-) -> (BTreeMap<BoxEnd, Rational>, Vec<Edge>) {
+) -> (BTreeMap<BoxEnd, Rational>, Vec<u32>) {
     // For each pair of classes, the end that bounds their difference, and its constant.
     let mut differences: BTreeMap<(ClassId, ClassId), Vec<(BoxEnd, &Rational)>> = BTreeMap::new();
-    let own = own_edges(edges);
+    let own = own_edges(edges.iter());
     for edge in edges {
         if let Some(end) = edge.end
             && coupled.binary_search(&end.parameter).is_err()
@@ -46,10 +46,10 @@ pub(crate) fn own_limits(
     }
     let mut limits: BTreeMap<BoxEnd, Rational> = BTreeMap::new();
     let mut left = Vec::new();
-    for edge in edges {
+    for (index, edge) in (0..).zip(edges) {
         let opposite = differences.get(&(edge.to, edge.from));
         let (None, Some(opposite)) = (edge.end, opposite) else {
-            left.push(edge.clone());
+            left.push(index);
             continue;
         };
         for (end, constant) in opposite {
@@ -69,9 +69,9 @@ pub(crate) fn own_limits(
 }
 
 /// For each parameter, the positions of its edges.
-fn own_edges(edges: &[Edge]) -> BTreeMap<ParameterId, Vec<usize>> {
+fn own_edges<'a>(edges: impl Iterator<Item = &'a Edge>) -> BTreeMap<ParameterId, Vec<usize>> {
     let mut own: BTreeMap<ParameterId, Vec<usize>> = BTreeMap::new();
-    for (index, edge) in edges.iter().enumerate() {
+    for (index, edge) in edges.enumerate() {
         if let Some(end) = edge.end {
             own.entry(end.parameter).or_default().push(index);
         }
@@ -95,7 +95,7 @@ fn is_difference(edges: &[Edge], own: &[usize]) -> bool {
 
 /// On which cycles the parameters are.
 pub(crate) struct Cycles<'a> {
-    edges: &'a [Edge],
+    edges: Vec<&'a Edge>,
     /// For each parameter, the positions of its edges.
     own: BTreeMap<ParameterId, Vec<usize>>,
     /// For each class, those with the same number reach each other.
@@ -105,15 +105,15 @@ pub(crate) struct Cycles<'a> {
 }
 
 impl<'a> Cycles<'a> {
-    pub(crate) fn new(edges: &'a [Edge], class_count: usize) -> Self {
+    pub(crate) fn new(edges: Vec<&'a Edge>, class_count: usize) -> Self {
         let mut graph: Network<i128> = Network::with_nodes(class_count);
-        for edge in edges {
+        for edge in &edges {
             // Only where it leads counts.
             graph.add(Constraint::at_most(edge.from, edge.to, 0));
         }
         Self {
+            own: own_edges(edges.iter().copied()),
             edges,
-            own: own_edges(edges),
             component: graph.components(),
             is_bridge: graph.strong_bridges(),
         }
@@ -139,10 +139,10 @@ impl<'a> Cycles<'a> {
 
     /// Whether edges lead back from the end of this one to its beginning that are not among these.
     fn is_closed(&self, index: usize, own: &[usize]) -> bool {
-        let edge = &self.edges[index];
+        let edge = self.edges[index];
         let (from, to) = (edge.from, edge.to);
         let mut back = own.iter().filter(|&&other| {
-            let other = &self.edges[other];
+            let other = self.edges[other];
             (other.from, other.to) == (to, from)
         });
         from == to
@@ -202,7 +202,7 @@ mod tests {
                     edges.push(edge(b, a, end(Side::Lower)));
                 }
             }
-            let cycles = Cycles::new(&edges, count as usize);
+            let cycles = Cycles::new(edges.iter().collect(), count as usize);
             for parameter in (0..known).map(ParameterId::from) {
                 let on = |side: Side| edges.iter().any(|edge| {
                     edge.end == Some(BoxEnd { parameter, side })

@@ -241,7 +241,7 @@ impl Coordinates {
         if !expression.products.is_empty() {
             return None;
         }
-        let time = |(node, factor): (&NodeId, &Rational)| (node.index(), factor.clone());
+        let time = |(node, factor): &(NodeId, Rational)| (node.index(), factor.clone());
         let times = expression.times.iter().map(time);
         let parameters = expression.parameters.iter();
         let parameters = parameters.map(|(id, factor)| (self.times + id.index(), factor.clone()));

@@ -3,6 +3,7 @@
 mod rules;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::reduction::{Edge, Reduction};
 use elbowroom_num::{Interval, Rational};
@@ -34,13 +35,13 @@ pub(crate) const MOST_BRANCHES: usize = 1 << 14;
 #[derive(Clone, Debug)]
 pub(crate) struct Feasibility {
     /// The reduced network's edges.
-    all_edges: Vec<Edge>,
-    /// The same, less those that are limits of a parameter.
-    edges: Vec<Edge>,
+    all_edges: Arc<Vec<Edge>>,
+    /// The positions of those that are not limits of a parameter.
+    left: Vec<u32>,
     /// How far out single ends may lie ([`BoxEnd::reach`]).
     own_limits: BTreeMap<BoxEnd, Rational>,
-    /// Each parameter's role in the cycles of `edges`.
     class_count: usize,
+    /// Each parameter's role in the cycles of the edges that are left.
     roles: Vec<Role>,
     /// Parameters that bound several differences.
     coupled: Vec<ParameterId>,
@@ -67,10 +68,11 @@ pub(crate) enum Infeasible {
 
 impl Feasibility {
     pub(crate) fn new(plan: &ParametrizedPlan, reduction: &Reduction) -> Self {
-        let all_edges = reduction.edges().to_vec();
+        let all_edges = reduction.shared_edges();
         let class_count = reduction.class_count();
-        let (own_limits, edges) = own_limits(&all_edges, &reduction.coupled);
-        let cycles = Cycles::new(&edges, class_count);
+        let (own_limits, left) = own_limits(&all_edges, &reduction.coupled);
+        let edges = left.iter().map(|&index| &all_edges[index as usize]);
+        let cycles = Cycles::new(edges.collect(), class_count);
         let roles: Vec<Role> = (0..plan.parameters.len())
             .map(ParameterId::from)
             .map(|id| {
@@ -84,7 +86,7 @@ impl Feasibility {
         let both = roles.iter().filter(|&&role| role == Role::Both).count();
         Self {
             all_edges,
-            edges,
+            left,
             own_limits,
             class_count,
             roles,
@@ -92,6 +94,13 @@ impl Feasibility {
             branches: both > MOST_CORNERS.ilog2() as usize,
             corners: Vec::new(),
         }
+    }
+
+    /// The edges that are not limits of a parameter.
+    fn edges(&self) -> impl Iterator<Item = &Edge> + Clone {
+        self.left
+            .iter()
+            .map(|&index| &self.all_edges[index as usize])
     }
 
     /// Values in the box without a schedule, if any.
@@ -143,7 +152,7 @@ impl Feasibility {
         &self,
         envelope: &DecoupledEnvelope,
     ) -> Result<Option<BTreeMap<ParameterId, Side>>, TooManyBranches> {
-        let bounds = self.edges.iter().filter(|edge| self.matters(edge));
+        let bounds = self.edges().filter(|edge| self.matters(edge));
         let bounds = bounds.map(|edge| OpenBound {
             from: edge.from,
             to: edge.to,
@@ -189,7 +198,7 @@ impl Feasibility {
             };
         }
         let mut network = Network::with_nodes(self.class_count);
-        for edge in &self.edges {
+        for edge in self.edges() {
             // An upper bound follows the parameter, a lower bound holds against it.
             let bound = match edge.end {
                 Some(other) if other.parameter == end.parameter && other.side == end.side => 1,
@@ -229,7 +238,7 @@ impl Feasibility {
             };
             let point = DecoupledEnvelope::point(&values);
             if self
-                .network_where(&self.all_edges, |edge| edge.bound(&point))
+                .network_where(self.all_edges.iter(), |edge| edge.bound(&point))
                 .is_none()
             {
                 return values;
@@ -276,13 +285,13 @@ impl Feasibility {
         sides: &BTreeMap<ParameterId, Side>,
         envelope: &DecoupledEnvelope,
     ) -> Option<ConsistentNetwork> {
-        self.network_where(&self.edges, |edge| self.bound(edge, sides, envelope))
+        self.network_where(self.edges(), |edge| self.bound(edge, sides, envelope))
     }
 
     /// The network with these bounds, if it is consistent; `None` is no bound.
-    fn network_where(
+    fn network_where<'a>(
         &self,
-        edges: &[Edge],
+        edges: impl Iterator<Item = &'a Edge>,
         bound: impl Fn(&Edge) -> Option<Rational>,
     ) -> Option<ConsistentNetwork> {
         let mut network = Network::with_nodes(self.class_count);
@@ -330,7 +339,7 @@ impl Feasibility {
             Role::Lower | Role::Upper => {}
         }
         let mut tightened = Vec::new();
-        for edge in &self.edges {
+        for edge in self.edges() {
             if edge
                 .end
                 .is_none_or(|other| other.parameter != end.parameter)

@@ -6,6 +6,10 @@ use elbowroom_num::Rational;
 
 use elbowroom_plan::{NodeId, ParameterId, Schedule, Valuation};
 
+pub use terms::Terms;
+
+mod terms;
+
 /// A factor by which a parameter can be multiplied in a [`Linear`] expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Factor {
@@ -24,12 +28,12 @@ pub struct Linear {
     /// The constant part.
     pub constant: Rational,
     /// Coefficients of times, none zero.
-    pub times: BTreeMap<NodeId, Rational>,
+    pub times: Terms<NodeId>,
     /// Coefficients of parameters, none zero.
-    pub parameters: BTreeMap<ParameterId, Rational>,
+    pub parameters: Terms<ParameterId>,
     /// Coefficients of products, none zero. In a product of two parameters the first is the
     /// smaller id.
-    pub products: BTreeMap<(ParameterId, Factor), Rational>,
+    pub products: Terms<(ParameterId, Factor)>,
 }
 
 impl Linear {
@@ -44,7 +48,7 @@ impl Linear {
     /// A parameter.
     pub fn parameter(id: ParameterId) -> Self {
         Self {
-            parameters: BTreeMap::from([(id, Rational::ONE)]),
+            parameters: Terms::one(id, Rational::ONE),
             ..Self::default()
         }
     }
@@ -67,21 +71,21 @@ impl Linear {
     /// Adds `coefficient` times the time of `node`.
     pub fn add_time(&mut self, node: NodeId, coefficient: &Rational) {
         if node != NodeId::ZERO {
-            add_term(&mut self.times, node, coefficient);
+            self.times.add(node, coefficient);
         }
     }
 
     /// Adds `factor` times `other`.
     pub fn add_scaled(&mut self, other: &Self, factor: &Rational) {
         self.constant += &other.constant * factor;
-        for (&node, coefficient) in &other.times {
-            add_term(&mut self.times, node, &(coefficient * factor));
+        for (node, coefficient) in &other.times {
+            self.times.add(*node, &(coefficient * factor));
         }
-        for (&id, coefficient) in &other.parameters {
-            add_term(&mut self.parameters, id, &(coefficient * factor));
+        for (id, coefficient) in &other.parameters {
+            self.parameters.add(*id, &(coefficient * factor));
         }
-        for (&product, coefficient) in &other.products {
-            add_term(&mut self.products, product, &(coefficient * factor));
+        for (product, coefficient) in &other.products {
+            self.products.add(*product, &(coefficient * factor));
         }
     }
 
@@ -131,24 +135,15 @@ impl Linear {
             return None;
         }
         let mut product = other.scaled(&parametric.constant);
-        for (&id, coefficient) in &parametric.parameters {
-            if !other.constant.is_zero() {
-                add_term(
-                    &mut product.parameters,
-                    id,
-                    &(coefficient * &other.constant),
-                );
+        for &(id, ref coefficient) in &parametric.parameters {
+            product.parameters.add(id, &(coefficient * &other.constant));
+            for &(node, ref time) in &other.times {
+                let key = (id, Factor::Time(node));
+                product.products.add(key, &(coefficient * time));
             }
-            for (&node, time) in &other.times {
-                add_term(
-                    &mut product.products,
-                    (id, Factor::Time(node)),
-                    &(coefficient * time),
-                );
-            }
-            for (&second, factor) in &other.parameters {
+            for &(second, ref factor) in &other.parameters {
                 let key = (id.min(second), Factor::Parameter(id.max(second)));
-                add_term(&mut product.products, key, &(coefficient * factor));
+                product.products.add(key, &(coefficient * factor));
             }
         }
         Some(product)
@@ -162,27 +157,23 @@ impl Linear {
             times: self.times.clone(),
             ..Self::default()
         };
-        for (&id, coefficient) in &self.parameters {
+        for &(id, ref coefficient) in &self.parameters {
             match values.get(&id) {
                 Some(value) => fixed.constant += coefficient * value,
-                None => add_term(&mut fixed.parameters, id, coefficient),
+                None => fixed.parameters.add(id, coefficient),
             }
         }
-        for (&(id, factor), coefficient) in &self.products {
+        for &((id, factor), ref coefficient) in &self.products {
             let first = values.get(&id);
             match (first, factor) {
                 (Some(value), Factor::Time(node)) => fixed.add_time(node, &(coefficient * value)),
                 (first, Factor::Parameter(second)) => match (first, values.get(&second)) {
                     (Some(a), Some(b)) => fixed.constant += &(coefficient * a) * b,
-                    (Some(a), None) => {
-                        add_term(&mut fixed.parameters, second, &(coefficient * a));
-                    }
-                    (None, Some(b)) => add_term(&mut fixed.parameters, id, &(coefficient * b)),
-                    (None, None) => add_term(&mut fixed.products, (id, factor), coefficient),
+                    (Some(a), None) => fixed.parameters.add(second, &(coefficient * a)),
+                    (None, Some(b)) => fixed.parameters.add(id, &(coefficient * b)),
+                    (None, None) => fixed.products.add((id, factor), coefficient),
                 },
-                (None, Factor::Time(_)) => {
-                    add_term(&mut fixed.products, (id, factor), coefficient);
-                }
+                (None, Factor::Time(_)) => fixed.products.add((id, factor), coefficient),
             }
         }
         fixed
@@ -209,39 +200,21 @@ impl Linear {
 
     /// A parameter whose square has a positive coefficient.
     pub fn squared_parameter(&self) -> Option<ParameterId> {
-        let square = self.products.iter().find(|&(&(first, factor), amount)| {
-            factor == Factor::Parameter(first) && amount.is_positive()
+        let square = self.products.iter().find(|((first, factor), amount)| {
+            *factor == Factor::Parameter(*first) && amount.is_positive()
         });
-        square.map(|(&(id, _), _)| id)
+        square.map(|((id, _), _)| *id)
     }
 
     /// The parameters that stand in products.
     pub fn multiplied_parameters(&self) -> impl Iterator<Item = ParameterId> + '_ {
-        self.products.keys().flat_map(|&(first, factor)| {
+        self.products.keys().flat_map(|(first, factor)| {
             let second = match factor {
                 Factor::Parameter(second) => Some(second),
                 Factor::Time(_) => None,
             };
             std::iter::once(first).chain(second)
         })
-    }
-}
-
-/// Adds to a coefficient, dropping it when it becomes zero.
-fn add_term<K: Ord>(terms: &mut BTreeMap<K, Rational>, key: K, coefficient: &Rational) {
-    if coefficient.is_zero() {
-        return;
-    }
-    match terms.entry(key) {
-        std::collections::btree_map::Entry::Vacant(entry) => {
-            entry.insert(coefficient.clone());
-        }
-        std::collections::btree_map::Entry::Occupied(mut entry) => {
-            *entry.get_mut() += coefficient;
-            if entry.get().is_zero() {
-                entry.remove();
-            }
-        }
     }
 }
 

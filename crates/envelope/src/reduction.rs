@@ -2,6 +2,7 @@
 //! box.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use elbowroom_num::{CommonDenominator, Delta, Rational};
 use elbowroom_stn::{
@@ -40,7 +41,7 @@ pub struct Reduction {
     /// For each node its class, and by how much it comes after the class's own time.
     places: Vec<(ClassId, Rational)>,
     class_count: usize,
-    edges: Vec<Edge>,
+    edges: Arc<Vec<Edge>>,
     /// Parameters that are differences of times, by the constraint `[p, p]` that says so.
     pub substitution: Substitution,
     /// Parameters that bound more than the one difference they are.
@@ -69,7 +70,7 @@ impl Reduction {
         let mut reduction = Self {
             places,
             class_count,
-            edges: Vec::new(),
+            edges: Arc::default(),
             substitution: Substitution::new(),
             coupled: Vec::new(),
             mentioned: BTreeSet::new(),
@@ -111,6 +112,7 @@ impl Reduction {
         reduction.coupled.dedup();
         reduction.keep_tightest();
         reduction.drop_implied(plan);
+        Arc::make_mut(&mut reduction.edges).shrink_to_fit();
         reduction
     }
 
@@ -132,7 +134,7 @@ impl Reduction {
         };
         let implied: Vec<usize> = implied.into_iter().map(|id| edges[id.index()]).collect();
         let mut index = 0;
-        self.edges.retain(|_| {
+        Arc::make_mut(&mut self.edges).retain(|_| {
             index += 1;
             implied.binary_search(&(index - 1)).is_err()
         });
@@ -200,7 +202,7 @@ impl Reduction {
         let constant = constant + from_offset - to_offset;
         let is_idle = from_class == to_class && end.is_none() && !constant.is_negative();
         if !is_idle {
-            self.edges.push(Edge {
+            Arc::make_mut(&mut self.edges).push(Edge {
                 from: *from_class,
                 to: *to_class,
                 constant,
@@ -213,14 +215,14 @@ impl Reduction {
 
     /// Of parallel edges that depend on the same end only the tightest says anything.
     fn keep_tightest(&mut self) {
-        self.edges.sort_by(|a, b| {
+        let edges = Arc::make_mut(&mut self.edges);
+        edges.sort_by(|a, b| {
             let place = |edge: &Edge| (edge.from, edge.to, edge.end);
             place(a)
                 .cmp(&place(b))
                 .then_with(|| a.constant.cmp(&b.constant))
         });
-        self.edges
-            .dedup_by(|b, a| (a.from, a.to, a.end) == (b.from, b.to, b.end));
+        edges.dedup_by(|b, a| (a.from, a.to, a.end) == (b.from, b.to, b.end));
     }
 
     /// The node's class, and by how much the node comes after it. One node more than the plan has
@@ -245,6 +247,11 @@ impl Reduction {
     /// The constraints.
     pub fn edges(&self) -> &[Edge] {
         &self.edges
+    }
+
+    /// The constraints, for whoever keeps them.
+    pub(crate) fn shared_edges(&self) -> Arc<Vec<Edge>> {
+        Arc::clone(&self.edges)
     }
 
     /// The number of classes.

@@ -97,7 +97,7 @@ impl Feasibility {
             moving.push((id, side));
         }
         let mut network = Network::with_nodes(self.class_count);
-        for edge in &self.edges {
+        for edge in self.edges() {
             let bound = match edge.end {
                 None => edge.constant.clone(),
                 Some(BoxEnd { parameter, side }) => match side {
@@ -148,7 +148,7 @@ impl Feasibility {
         let mut moves = vec![false; self.class_count];
         let is_own = |edge: &&Edge| edge.end.is_some_and(|end| end.parameter == parameter);
         let own = |wanted: Side| {
-            let mut own = self.edges.iter().filter(is_own);
+            let mut own = self.edges().filter(is_own);
             own.find(|edge| edge.end.is_some_and(|end| end.side == wanted))
         };
         // One that only bounds a difference from one side has nothing to move.
@@ -160,7 +160,7 @@ impl Feasibility {
             if std::mem::replace(&mut moves[class.index()], true) {
                 continue;
             }
-            for edge in self.edges.iter().filter(|edge| !is_own(edge)) {
+            for edge in self.edges().filter(|edge| !is_own(edge)) {
                 match side {
                     Side::Lower if edge.to == class => open.push(edge.from),
                     Side::Upper if edge.from == class => open.push(edge.to),

@@ -109,17 +109,17 @@ fn others(
 /// The expression at a moment that falls together with a node.
 fn read_at(expression: &Linear, moment: NodeId, at: NodeId) -> Linear {
     let mut read = expression.clone();
-    if let Some(factor) = read.times.remove(&moment) {
+    if let Some(factor) = read.times.remove(moment) {
         read.add_time(at, &factor);
     }
-    let products: Vec<_> = read.products.keys().copied().collect();
+    let products: Vec<_> = read.products.keys().collect();
     for (parameter, factor) in products {
         if factor == Factor::Time(moment)
-            && let Some(amount) = read.products.remove(&(parameter, factor))
+            && let Some(amount) = read.products.remove((parameter, factor))
         {
             let mut moved = Linear::default();
             if at != NodeId::ZERO {
-                moved.products.insert((parameter, Factor::Time(at)), amount);
+                moved.products.add((parameter, Factor::Time(at)), &amount);
             }
             read.add_scaled(&moved, &Rational::ONE);
         }

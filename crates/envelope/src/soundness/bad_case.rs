@@ -314,7 +314,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         let is_shared = inequalities
             .iter()
             .flat_map(|inequality| inequality.expression.parameters.keys())
-            .any(|&parameter| self.reduction.is_in_network(parameter));
+            .any(|parameter| self.reduction.is_in_network(parameter));
         if inequalities.len() <= 1 && self.reduction.coupled.is_empty() && !is_shared {
             return None;
         }
@@ -331,7 +331,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         if inequality.is_strict {
             certificate.add_constant(&Delta::just_below(Rational::ZERO), &Rational::ONE);
         }
-        for (&parameter, coefficient) in &negated.parameters {
+        for &(parameter, ref coefficient) in &negated.parameters {
             let side = if coefficient.is_positive() {
                 Side::Upper
             } else {
@@ -424,7 +424,7 @@ pub(crate) fn spread(
     mut add: impl FnMut(ClassId, &Rational),
 ) -> Rational {
     let mut constant = expression.constant.clone();
-    for (&node, coefficient) in &expression.times {
+    for &(node, ref coefficient) in &expression.times {
         let (class, offset) = reduction.place(node);
         constant += coefficient * &offset;
         add(class, coefficient);

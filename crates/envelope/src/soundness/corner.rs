@@ -103,10 +103,10 @@ const MOST_DOUBLINGS: usize = 256;
 /// The factor of a parameter in an expression.
 fn coefficient_of(expression: &Linear, parameter: ParameterId) -> Linear {
     let mut coefficient = Linear::default();
-    if let Some(constant) = expression.parameters.get(&parameter) {
+    if let Some(constant) = expression.parameters.get(parameter) {
         coefficient.constant = constant.clone();
     }
-    for (&(first, factor), amount) in &expression.products {
+    for &((first, factor), ref amount) in &expression.products {
         match factor {
             Factor::Time(node) if first == parameter => coefficient.add_time(node, amount),
             Factor::Parameter(second) if first == parameter => {

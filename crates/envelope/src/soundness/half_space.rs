@@ -192,7 +192,7 @@ fn at(expression: &Linear, moment: NodeId, event: NodeId) -> Option<Linear> {
         return None;
     }
     let mut placed = expression.clone();
-    if let Some(factor) = placed.times.remove(&moment) {
+    if let Some(factor) = placed.times.remove(moment) {
         placed.add_time(event, &factor);
     }
     Some(placed)
@@ -209,7 +209,8 @@ fn half_space(
         return None;
     }
     let mut roots: BTreeMap<usize, Rational> = BTreeMap::new();
-    let mut factors = expression.parameters.clone();
+    let parameters = expression.parameters.iter().cloned();
+    let mut factors: BTreeMap<ParameterId, Rational> = parameters.collect();
     let mut offset = Rational::ZERO;
     let mut is_placed = true;
     let constant = spread(reduction, expression, |class, coefficient| {

@@ -151,7 +151,7 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
             let nodes = differences.flat_map(|difference| [difference.from, difference.to]);
             let inequalities = broken.case.inequalities.iter();
             let others = inequalities.flat_map(|inequality| inequality.expression.times.keys());
-            let all = nodes.chain(others.copied());
+            let all = nodes.chain(others);
             Some(all.filter(|node| node.index() < plan.nodes.len()).collect())
         });
         untold += usize::from(!is_told);

@@ -276,14 +276,14 @@ fn as_difference(inequality: &Inequality) -> Option<Difference> {
     }
     let one = elbowroom_num::Rational::ONE;
     let with = |sign: &elbowroom_num::Rational| {
-        let mut nodes = times.iter().filter(|(_, factor)| *factor == sign);
+        let mut nodes = times.iter().filter(|(_, factor)| factor == sign);
         let node = nodes.next().map_or(NodeId::ZERO, |(node, _)| *node);
         nodes.next().is_none().then_some(node)
     };
     let minus = -&one;
     if times
-        .values()
-        .any(|factor| *factor != one && *factor != minus)
+        .iter()
+        .any(|(_, factor)| *factor != one && *factor != minus)
     {
         return None;
     }

@@ -52,11 +52,17 @@ impl Standing {
                     base.add_scaled(amount, &Rational::ONE);
                 }
             }
-            FluentChange::Drift(rate) => self.drifts.push(Drift {
-                began: node,
-                counted: node,
-                rate: rate.clone(),
-            }),
+            FluentChange::Drift(rate) => {
+                // Nearly always the only one, and how things stand is kept for many moments.
+                if self.drifts.is_empty() {
+                    self.drifts.reserve_exact(1);
+                }
+                self.drifts.push(Drift {
+                    began: node,
+                    counted: node,
+                    rate: rate.clone(),
+                });
+            }
             FluentChange::DriftEnd(since) => {
                 let mut drifts = self.drifts.iter();
                 if let Some(index) = drifts.position(|drift| drift.began == *since) {

@@ -1,0 +1,100 @@
+//! Coefficients by what they are multiplied with.
+
+use elbowroom_num::Rational;
+
+/// Coefficients, none zero, in the order of what they belong to.
+///
+/// Nearly all expressions of a plan have one or two, and a long plan has a hundred thousand
+/// expressions. So they stand in one sorted list, which is no larger than it has to be: a search
+/// tree has room for eleven from the beginning.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Terms<K>(Vec<(K, Rational)>);
+
+impl<K> Default for Terms<K> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<K: Copy + Ord> Terms<K> {
+    /// One coefficient, which is not zero.
+    pub(crate) fn one(key: K, coefficient: Rational) -> Self {
+        debug_assert!(!coefficient.is_zero(), "no coefficient is zero");
+        Self(vec![(key, coefficient)])
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The coefficient, if there is one.
+    pub fn get(&self, key: K) -> Option<&Rational> {
+        self.place(key).ok().map(|place| &self.0[place].1)
+    }
+
+    /// What they belong to, in order.
+    pub fn keys(&self) -> impl Iterator<Item = K> + '_ {
+        self.0.iter().map(|(key, _)| *key)
+    }
+
+    /// All, in order.
+    pub fn iter(&self) -> std::slice::Iter<'_, (K, Rational)> {
+        self.0.iter()
+    }
+
+    /// Adds to a coefficient, dropping it when it becomes zero.
+    pub(crate) fn add(&mut self, key: K, coefficient: &Rational) {
+        if coefficient.is_zero() {
+            return;
+        }
+        match self.place(key) {
+            Ok(place) => {
+                let own = &mut self.0[place].1;
+                *own += coefficient;
+                if own.is_zero() {
+                    self.0.remove(place);
+                }
+            }
+            Err(place) => {
+                if self.0.len() == self.0.capacity() {
+                    self.0.reserve_exact(self.0.len().max(1));
+                }
+                self.0.insert(place, (key, coefficient.clone()));
+            }
+        }
+    }
+
+    /// Takes a coefficient out.
+    pub(crate) fn remove(&mut self, key: K) -> Option<Rational> {
+        let place = self.place(key).ok()?;
+        Some(self.0.remove(place).1)
+    }
+
+    /// Takes all out.
+    pub(crate) fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Where it stands, or would stand. Most are added behind all others.
+    fn place(&self, key: K) -> Result<usize, usize> {
+        if self.0.last().is_none_or(|(last, _)| *last < key) {
+            return Err(self.0.len());
+        }
+        self.0.binary_search_by_key(&key, |(own, _)| *own)
+    }
+}
+
+impl<'a, K: Copy + Ord> IntoIterator for &'a Terms<K> {
+    type Item = &'a (K, Rational);
+    type IntoIter = std::slice::Iter<'a, (K, Rational)>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
