@@ -40,6 +40,10 @@ struct Run {
 struct Counts {
     ended: [usize; 2],
     overdue: [usize; 2],
+    /// How often something that is overdue could not be borne any more, and could until some time, which was not always
+    /// the one asked for.
+    furthest: [usize; 2],
+    shortened: usize,
     /// What only a check from scratch finds to work.
     late: usize,
     finished: usize,
@@ -131,6 +135,19 @@ impl Run {
         }
     }
 
+    /// The latest time by which a link may end is the last one of which that can be said.
+    fn furthest(&self, id: LinkId, most: i64, counts: &mut Counts, told: &str) {
+        let does = |until: i64| {
+            let mut other = self.dispatcher.clone();
+            other.prolong(id, Some(&until), &self.now)
+        };
+        let last = (self.now..=most).rev().find(|until| does(*until));
+        let found = self.dispatcher.prolongable(id, &most, &self.now);
+        assert_eq!(found, last, "{told}: until {most} at {}", self.now);
+        counts.furthest[usize::from(found.is_some())] += 1;
+        counts.shortened += usize::from(found.is_some_and(|found| found < most));
+    }
+
     /// What is overdue by now goes on for ever, or for a while.
     fn overdue(&mut self, random: &mut Random, counts: &mut Counts, told: &str) -> Option<()> {
         for (id, link, begun) in self.active() {
@@ -138,6 +155,7 @@ impl Run {
             if !is_late {
                 continue;
             }
+            self.furthest(id, self.now + random.whole(0, 9), counts, told);
             let until = (random.below(2) == 0).then(|| self.now + random.whole(0, 4));
             let does = self.dispatcher.prolong(id, until.as_ref(), &self.now);
             self.prolonged.insert(id, until);
@@ -261,9 +279,13 @@ fn what_is_borne_is_known_from_the_neighbours() {
         }
     }
     println!("{counts:?}");
+    let furthest = counts.furthest.iter();
+    assert!(furthest.copied().all(|count| count > 500), "{counts:?}");
     let cases = counts.ended.iter().chain(&counts.overdue);
     assert!(
-        cases.chain([&counts.finished]).all(|&count| count > 1_000),
+        cases
+            .chain([&counts.finished, &counts.shortened])
+            .all(|&count| count > 1_000),
         "{counts:?}"
     );
 }

@@ -9,7 +9,6 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
-use std::sync::Arc;
 
 use super::{ActiveWait, Dispatcher};
 use crate::uncertain::graph::EdgeId;
@@ -86,42 +85,11 @@ impl<W: Weight> Dispatcher<W> {
     /// `false`, and nothing is changed, if the executor could not be sure any more to satisfy every requirement, or if the
     /// link is not under way.
     pub fn prolong(&mut self, id: LinkId, until: Option<&W>, now: &W) -> bool {
-        let form = Arc::clone(&self.form);
-        let link = form.network().link(id);
-        if self.happened(link.activation).is_none() || self.happened(link.end).is_some() {
-            return false;
-        }
-        let soonest = Extended::from(now.clone());
-        let mut waiting = Waiting::default();
         let last = until.cloned().map_or_else(Extended::infinity, Into::into);
-        self.reach_before(link.end, &last, link.end, &mut waiting);
-        while let Some((node, time, edge)) = waiting.next() {
-            if let Some(happened) = self.happened(node) {
-                if time > Extended::from(happened.clone()) {
-                    return false;
-                }
-                continue;
-            }
-            if !self.has_room(node, now) {
-                return false;
-            }
-            if time <= soonest {
-                continue;
-            }
-            if let Some(other) = form.network().ending_at(node) {
-                let other = form.network().link(other);
-                let lower = Extended::from(other.lower.clone());
-                if let Some(begun) = self.happened(other.activation) {
-                    let first_end = lower.plus(&begun.clone().into());
-                    if time > first_end.max(soonest.clone()) {
-                        return false;
-                    }
-                } else {
-                    waiting.reach(other.activation, time.minus(&lower), edge);
-                }
-            }
-            self.reach_before(node, &time, link.end, &mut waiting);
-        }
+        let Ok(waiting) = self.waiting(id, &last, now) else {
+            return false;
+        };
+        let soonest = Extended::from(now.clone());
         for (node, time, edge) in waiting.known {
             if time <= soonest || self.happened(node).is_some() {
                 continue;
@@ -138,6 +106,67 @@ impl<W: Weight> Dispatcher<W> {
         self.prolonged.retain(|(other, _)| *other != id);
         self.prolonged.push((id, until.cloned()));
         true
+    }
+
+    /// The latest time, `until` at most, by which a link that is under way may be taken to end
+    /// ([`prolong`](Self::prolong)); `None` if there is none.
+    pub fn prolongable(&self, id: LinkId, until: &W, now: &W) -> Option<W> {
+        let mut last = until.clone();
+        while last >= *now {
+            match self.waiting(id, &last.clone().into(), now) {
+                Ok(_) => return Some(last),
+                // All that it bears on moves with it: by this much it has to be earlier at least.
+                Err(by) => last = last.minus(&by?.into_finite()?),
+            }
+        }
+        None
+    }
+
+    /// What has to wait for the end of a link that ends by `last`; if that is too late, by how much at least, where that
+    /// would help.
+    fn waiting(
+        &self,
+        id: LinkId,
+        last: &Extended<W>,
+        now: &W,
+    ) -> Result<Waiting<W>, Option<Extended<W>>> {
+        let form = &self.form;
+        let link = form.network().link(id);
+        if self.happened(link.activation).is_none() || self.happened(link.end).is_some() {
+            return Err(None);
+        }
+        let soonest = Extended::from(now.clone());
+        let mut waiting = Waiting::default();
+        self.reach_before(link.end, last, link.end, &mut waiting);
+        while let Some((node, time, edge)) = waiting.next() {
+            if let Some(happened) = self.happened(node) {
+                let happened = Extended::from(happened.clone());
+                if time > happened {
+                    return Err(Some(time.minus(&happened)));
+                }
+                continue;
+            }
+            if !self.has_room(node, now) {
+                return Err(None);
+            }
+            if time <= soonest {
+                continue;
+            }
+            if let Some(other) = form.network().ending_at(node) {
+                let other = form.network().link(other);
+                let lower = Extended::from(other.lower.clone());
+                if let Some(begun) = self.happened(other.activation) {
+                    let first_end = lower.plus(&begun.clone().into()).max(soonest.clone());
+                    if time > first_end {
+                        return Err(Some(time.minus(&first_end)));
+                    }
+                } else {
+                    waiting.reach(other.activation, time.minus(&lower), edge);
+                }
+            }
+            self.reach_before(node, &time, link.end, &mut waiting);
+        }
+        Ok(waiting)
     }
 
     /// What may not happen long before a node that may not happen before that time, but for the end of the link itself.
