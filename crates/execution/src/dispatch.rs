@@ -13,7 +13,7 @@ mod projection;
 mod retry;
 mod watch;
 
-pub(crate) use overrun::Overdue;
+pub(crate) use overrun::{Overdue, Until};
 pub(crate) use watch::{in_words, replan, unmet};
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,7 +22,7 @@ use std::sync::Arc;
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body};
 use elbowroom_num::Rational;
-use elbowroom_plan::uncertain::{Impossible, Reading};
+use elbowroom_plan::uncertain::{Impossible, PlanNetwork, Reading};
 use elbowroom_plan::{
     Bound, Constraint, InstanceId, Node, NodeId, Schedule, StnPlan, network_node,
 };
@@ -179,26 +179,8 @@ impl Dispatch {
         now: &Rational,
         reading: &dyn Fn(&Constraint) -> Reading,
     ) -> Result<(), Vec<Behind>> {
-        let has_happened = |node: NodeId| self.happened(node).is_some();
-        // When something ends that is under way is not the executor's to decide.
-        let waits = |what: Node| !matches!(what, Node::End(_));
-        let plan = self.plan.remainder(now, |node| self.happened(node), waits);
         let known = self.plan.constraints.len();
-        let network = plan.uncertain_network(&|constraint| {
-            if constraint.from == NodeId::ZERO && constraint.reason == elbowroom_plan::Reason::Given
-            {
-                // Of these some are the plan's own, which say what they say.
-                let (lower, upper) = given(constraint);
-                return Reading::Requirement { lower, upper };
-            }
-            if has_happened(constraint.from) && has_happened(constraint.to) {
-                return Reading::Requirement {
-                    lower: None,
-                    upper: None,
-                };
-            }
-            reading(constraint)
-        });
+        let network = self.rest(now, reading);
         let named = |index: usize| explain::named(&self.task, &self.plan, index);
         let network = network.map_err(|Impossible(index)| vec![named(index)])?;
         let own = |index: &usize| *index < known;
@@ -238,6 +220,62 @@ impl Dispatch {
         let bounds = |constraint: &Constraint| bounds_of(reading(constraint));
         self.durations = durations(&self.plan, &bounds);
         Ok(())
+    }
+
+    /// The network of what is left: what has happened stays, and nothing else happens before now.
+    fn rest(
+        &self,
+        now: &Rational,
+        reading: &dyn Fn(&Constraint) -> Reading,
+    ) -> Result<PlanNetwork, Impossible> {
+        let has_happened = |node: NodeId| self.happened(node).is_some();
+        // When something ends that is under way is not the executor's to decide.
+        let waits = |what: Node| !matches!(what, Node::End(_));
+        let plan = self.plan.remainder(now, |node| self.happened(node), waits);
+        plan.uncertain_network(&|constraint| {
+            if constraint.from == NodeId::ZERO && constraint.reason == elbowroom_plan::Reason::Given
+            {
+                // Of these some are the plan's own, which say what they say.
+                let (lower, upper) = given(constraint);
+                return Reading::Requirement { lower, upper };
+            }
+            if has_happened(constraint.from) && has_happened(constraint.to) {
+                return Reading::Requirement {
+                    lower: None,
+                    upper: None,
+                };
+            }
+            reading(constraint)
+        })
+    }
+
+    /// The latest time at which an action under way can end so that there are times for all the rest, the world's links
+    /// being as long as somebody likes within these readings; on the world's clock. `None` if there is no limit, or if
+    /// there are no such times. Takes time in proportion to the plan.
+    pub(crate) fn latest_end(
+        &self,
+        id: InstanceId,
+        now: &Rational,
+        reading: &dyn Fn(&Constraint) -> Reading,
+    ) -> Option<Rational> {
+        let rest = self.rest(&self.local(now), reading).ok()?.network;
+        let mut network = rest.requirements().clone();
+        for link in rest.links() {
+            let (from, to) = (link.activation, link.end);
+            network.add(elbowroom_stn::Constraint::at_least(
+                from,
+                to,
+                link.lower.clone(),
+            ));
+            if let Some(upper) = &link.upper {
+                network.add(elbowroom_stn::Constraint::at_most(from, to, upper.clone()));
+            }
+        }
+        let network = ConsistentNetwork::try_from(network).ok()?;
+        let origin = network_node(NodeId::ZERO);
+        let end = network_node(self.ends[id.index()][1]);
+        let latest = network.distance(origin, end)?;
+        Some(self.world(&latest))
     }
 
     fn with_horizon(
@@ -375,7 +413,10 @@ impl Dispatch {
     /// The window of a step's start or end, by the world's clock.
     pub(crate) fn planned(&self, step: StepId, is_end: bool) -> Option<Planned> {
         let node = self.ends.get(step.instance().index())?[usize::from(is_end)];
-        let (earliest, latest) = self.window_of(node);
+        let (earliest, mut latest) = self.window_of(node);
+        if is_end && let Some(last) = self.last_end_of_silent(step.instance()) {
+            latest = latest.into_iter().chain([self.world(&last)]).min();
+        }
         Some(Planned { earliest, latest })
     }
 }

@@ -167,6 +167,22 @@ impl Horizon {
         }
     }
 
+    /// The latest time, `until` at most, by which the link under way that ends at a time point may be taken to end.
+    pub(crate) fn prolongable(
+        &self,
+        end: NodeId,
+        until: &Rational,
+        now: &Rational,
+    ) -> Option<Rational> {
+        match self {
+            Self::Whole(_) | Self::OneHop(_) => None,
+            Self::Dispatchable(dispatcher) => {
+                let link = dispatcher.form().network().ending_at(end)?;
+                dispatcher.prolongable(link, until, now)
+            }
+        }
+    }
+
     /// The grounds of one end of a window, beginning far away from the node.
     pub(crate) fn grounds(&self, node: NodeId, end: WindowEnd) -> Vec<NetworkLimit> {
         match self {

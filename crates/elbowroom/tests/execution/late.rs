@@ -6,7 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use elbowroom::execute::Embedded;
 use elbowroom::execution::run::{Report, RunSettings, Verdict};
 use elbowroom::execution::{
-    Command, Ending, Event, NoPlanner, Passage, Planner, PlannerAnswer, World, WorldError,
+    Command, Ending, Event, NoPlanner, Observation, Passage, Planner, PlannerAnswer, Ticket, World,
+    WorldError,
 };
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
@@ -137,6 +138,146 @@ fn after_a_start_that_is_late_the_envelope_still_counts() {
     };
     assert_eq!(run("12.5").replans, 0);
     assert!(run("15.5").replans > 0);
+}
+
+/// What must end by when, and when a new plan is made: in a world in which walking starts so late and takes so long.
+fn warned(scene: &Scene, executor: &str, delay: &str, duration: &str) -> (Report, Vec<String>) {
+    let model = scene.world(&format!(
+        "[[delay]]\naction = \"walk\"\nconstant = {delay}\n\
+         [[duration]]\naction = \"walk\"\nconstant = {duration}\n"
+    ));
+    let notes = Notes::default();
+    let settings = RunSettings {
+        watches_room: true,
+        ..scene.settings.clone()
+    };
+    let execution = scene.execution(executor).with_settings(settings);
+    let execution = execution.planned_by(NoPlanner).recorded_by(notes.clone());
+    let report = execution.run_in(&mut SimWorld::new(Arc::clone(&scene.task), &model, 1));
+    let notes = notes.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let warnings = notes.iter().filter(|it| it.contains("must end by"));
+    (report, warnings.cloned().collect())
+}
+
+/// On a clock each start is a little late. What that takes from the room is no more than that: the walk may take what is
+/// left of the six seconds, less what the climb has of them.
+#[test]
+fn a_start_that_is_next_to_nothing_late_takes_next_to_nothing_from_the_room() {
+    let (scene, _) = walker(Rational::from(10));
+    for (delay, duration) in [("0.000003", "15.3"), ("0.05", "15.25"), ("1", "14.6")] {
+        for executor in ["guarded", "live"] {
+            let (report, warnings) = warned(&scene, executor, delay, duration);
+            let outcome = (&report.verdict, report.replans);
+            assert_eq!(
+                outcome,
+                (&Verdict::GoalReached, 0),
+                "{executor}, {delay}: {warnings:?} {report:#?}"
+            );
+            assert!(scene.judged(&report).is_valid());
+        }
+    }
+}
+
+/// Of what has used its room it is said until when there need not be a new plan, and that is when one is needed.
+#[test]
+fn a_warning_says_until_when_no_new_plan_is_needed() {
+    let (scene, _) = walker(Rational::from(10));
+    for (executor, delay) in [
+        ("guarded", "0"),
+        ("guarded", "0.000003"),
+        ("guarded", "0.05"),
+        ("live", "0"),
+        ("live", "0.05"),
+        ("live", "3"),
+    ] {
+        let (report, warnings) = warned(&scene, executor, delay, "1000");
+        let [warning] = &warnings[..] else {
+            panic!("{executor}, {delay}: {warnings:?}");
+        };
+        let until: Rational = warning
+            .rsplit(' ')
+            .next()
+            .and_then(|it| it.parse().ok())
+            .expect("a time");
+        let needed = report.reasons[0]
+            .since
+            .clone()
+            .expect("it is told since when");
+        let difference = (&until - &needed).abs();
+        assert!(
+            difference <= Rational::new(1, 10),
+            "{executor}, {delay}: {warning}, and it is needed at {needed}: {report:#?}"
+        );
+    }
+}
+
+/// A performer that is never heard, and says so when it is told to stop.
+struct Mute<'a> {
+    inner: SimWorld<'a>,
+    name: &'static str,
+    mute: Option<Ticket>,
+    coming: Vec<Observation>,
+}
+
+impl World for Mute<'_> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        match command {
+            Command::Start { ticket, action, .. } if action.name == self.name => {
+                self.mute = Some(*ticket);
+                Ok(())
+            }
+            Command::Cancel { ticket } if Some(*ticket) == self.mute => {
+                let event = Event::Ended {
+                    ticket: *ticket,
+                    ending: Ending::Cancelled,
+                    measured: Vec::new(),
+                };
+                let time = now.clone();
+                self.coming.push(Observation { time, event });
+                Ok(())
+            }
+            _ => self.inner.command(now, command),
+        }
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        if self.coming.is_empty() {
+            return self.inner.wait(until);
+        }
+        let observations = std::mem::take(&mut self.coming);
+        let now = observations[0].time.clone();
+        Ok(Passage { now, observations })
+    }
+}
+
+/// Who never says that he has started is taken to have done so when he was told to: his action outlives its room then as
+/// any other does, and the goal is still reached in time without it.
+#[test]
+fn what_was_never_heard_to_start_is_waited_for_as_long_as_the_plan_can_bear_it() {
+    let (scene, _) = walker(Rational::from(10));
+    for executor in ["guarded", "live", "stn", "esterel"] {
+        let mut world = Mute {
+            inner: SimWorld::new(Arc::clone(&scene.task), &scene.world(""), 1),
+            name: "(walk)",
+            mute: None,
+            coming: Vec::new(),
+        };
+        let settings = RunSettings {
+            watches_room: true,
+            ..scene.settings.clone()
+        };
+        let notes = Notes::default();
+        let execution = scene.execution(executor).with_settings(settings);
+        let report = execution.recorded_by(notes.clone()).run_in(&mut world);
+        let notes = notes.0.lock().unwrap_or_else(PoisonError::into_inner);
+        assert_eq!(
+            report.verdict,
+            Verdict::GoalReached,
+            "{executor}: {notes:#?}"
+        );
+        assert_eq!(done(&report), ["(slide)"], "{executor}: {notes:#?}");
+        assert!(report.time < Rational::from(26), "{executor}: {notes:#?}");
+    }
 }
 
 /// A world that tells what has happened only now and then.

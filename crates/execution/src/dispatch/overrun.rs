@@ -35,18 +35,24 @@ pub(crate) struct Overdue {
     pub(crate) planned: Rational,
 }
 
+/// A time by which an action that is overdue may be taken to end, on the plan's clock.
+#[derive(Clone, Debug)]
+pub(crate) enum Until {
+    /// Whenever it likes.
+    ForEver,
+    /// By then.
+    At(Rational),
+    /// By then, or as much earlier as it takes.
+    AtMost(Rational),
+}
+
 impl Dispatch {
     /// Goes on by the network as it is, if that works: with what has happened outside its bounds, and with each action
-    /// that is overdue taken for one that ends at the first of these times that does, on the plan's clock, `None` being
-    /// at any time.
+    /// that is overdue taken for one that ends by the first of these times that does.
     ///
     /// The time it takes does not depend on the length of the plan, but on what is next to what has happened. Where it
     /// says no, a look at the whole rest may still find that it works.
-    pub(crate) fn bear(
-        &mut self,
-        now: &Rational,
-        until: &dyn Fn(&Overdue) -> Vec<Option<Rational>>,
-    ) -> bool {
+    pub(crate) fn bear(&mut self, now: &Rational, until: &dyn Fn(&Overdue) -> Vec<Until>) -> bool {
         if self.strain.is_broken {
             return false;
         }
@@ -66,8 +72,16 @@ impl Dispatch {
                 planned: self.nominal_duration(id),
             };
             let end = network_node(end);
-            let mut times = until(&overdue).into_iter();
-            let found = times.find(|time| self.horizon.prolong(end, time.as_ref(), now));
+            let times = until(&overdue);
+            let found = times.iter().find_map(|time| {
+                let time = match time {
+                    Until::ForEver => None,
+                    Until::At(time) => Some(time.clone()),
+                    Until::AtMost(time) => Some(self.horizon.prolongable(end, time, now)?),
+                };
+                let does = self.horizon.prolong(end, time.as_ref(), now);
+                does.then_some(time)
+            });
             let Some(found) = found else {
                 return false;
             };
@@ -84,5 +98,22 @@ impl Dispatch {
         }
         self.strain.ends.clear();
         true
+    }
+
+    /// The latest time, `most` at most, by which an action under way may end so that the network as it is still works; on
+    /// the world's clock.
+    pub(crate) fn prolongable(
+        &self,
+        id: InstanceId,
+        most: &Rational,
+        now: &Rational,
+    ) -> Option<Rational> {
+        if self.strain.is_broken || !self.strain.ends.is_empty() {
+            return None;
+        }
+        let end = network_node(self.ends[id.index()][1]);
+        let now = self.local(now);
+        let last = self.horizon.prolongable(end, most, &now)?;
+        Some(self.world(&last))
     }
 }

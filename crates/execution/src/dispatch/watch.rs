@@ -60,6 +60,9 @@ impl Dispatch {
         for &id in &self.progress.running {
             let node = self.awaited(id);
             if self.was_told_in_time(id) {
+                if let Some(last) = self.last_end_of_silent(id) {
+                    wake_at(last.max(now.clone()) + &self.epsilon, node);
+                }
                 continue;
             }
             if let Some(latest) = self.horizon.window(network_node(node)).1 {
@@ -171,9 +174,34 @@ impl Dispatch {
             })
     }
 
+    /// Until when an instance that was told to start in time, and of which nobody has said that it did, may go on if it
+    /// started when it was told to, on the plan's clock; `None` if there is no such time.
+    pub(super) fn last_end_of_silent(&self, id: InstanceId) -> Option<Rational> {
+        if !self.was_told_in_time(id) {
+            return None;
+        }
+        let told = self.told.get(&id)?;
+        let most = self.durations[id.index()].1.as_ref()?;
+        Some(told + most)
+    }
+
+    /// What was told to start, was never said to have started, and would be over by now, has started when it was told to.
+    fn take_the_silent_for_started(&mut self, now: &Rational) {
+        let running = self.progress.running.iter().copied();
+        let is_over = |id: &InstanceId| {
+            let last = self.last_end_of_silent(*id);
+            last.is_some_and(|last| last < *now)
+        };
+        let silent: Vec<InstanceId> = running.filter(is_over).collect();
+        for id in silent {
+            self.start_silently(id);
+        }
+    }
+
     /// What should have happened by now and has not.
-    pub(crate) fn overdue(&self, moment: &Moment<'_>) -> Option<Reason> {
+    pub(crate) fn overdue(&mut self, moment: &Moment<'_>) -> Option<Reason> {
         let now = self.local(moment.now);
+        self.take_the_silent_for_started(&now);
         let (node, latest) = self.missing(&now)?;
         let awaited = match self.plan.nodes[node.index()] {
             Node::Start(id) | Node::End(id) | Node::Instant(id) => Some(id),

@@ -1,7 +1,7 @@
 //! `guarded`: paper 1's executor DREEX.
 
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::{Constraint, DecoupledEnvelope, Valuation};
+use elbowroom_plan::{Constraint, DecoupledEnvelope, InstanceId, Valuation};
 
 use super::{Registered, promise};
 use crate::dispatch::{Dispatch, replan};
@@ -116,12 +116,36 @@ impl Executor for Guarded {
         self.state.as_ref()?.dispatch.planned(step, is_end)
     }
 
+    fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
+        let window = self.window(step, true)?.latest;
+        let guard = self.state.as_ref()?;
+        let later = guard.bears_until(step.instance(), now);
+        window.map(|window| later.map_or(window.clone(), |later| later.max(window)))
+    }
+
     fn fork(&self) -> Option<Box<dyn Executor>> {
         Some(Box::new(self.clone()))
     }
 }
 
 impl Guard {
+    /// Until when an action under way may go on beyond what dispatching reckons with now: within its interval, if the
+    /// plan was taken up with all of its envelope.
+    fn bears_until(&self, instance: InstanceId, now: &Rational) -> Option<Rational> {
+        let [start, _] = self.dispatch.nodes_of(instance);
+        let begun = self.dispatch.happened(start)?;
+        let mut durations = duration_parameters(&self.mission.plan);
+        let own = durations.find(|(_, own)| *own == instance);
+        let most = own.and_then(|(own, _)| self.envelope.interval(own).upper.value());
+        let most = begun + most?;
+        if self.least == Promise::PartOfEnvelope {
+            return self.dispatch.prolongable(instance, &most, now);
+        }
+        let plan = (&self.mission, &self.values);
+        let latest = promise::bears_until(&self.dispatch, plan, instance, now)?;
+        Some(latest.min(self.dispatch.world(&most)))
+    }
+
     /// Why the plan is to be given up, if something happened at another time than dispatching
     /// reckoned with. It may go on with the rest where every quantity is still inside the envelope: if
     /// dispatching never reckoned with all of that, or if a start is late, as on any clock, which takes

@@ -142,6 +142,13 @@ impl Executor for Live {
         self.state.as_ref()?.dispatch.planned(step, is_end)
     }
 
+    fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
+        let window = self.window(step, true)?.latest;
+        let rest = self.state.as_ref()?;
+        let later = rest.bears_until(step.instance(), now);
+        window.map(|window| later.map_or(window.clone(), |later| later.max(window)))
+    }
+
     /// Without anybody to compare plans.
     fn fork(&self) -> Option<Box<dyn Executor>> {
         Some(Box::new(Self {
@@ -171,6 +178,21 @@ impl Rest {
         let weaker = promise::weaken(&mut self.dispatch, &rest, now, reason)?;
         self.promise = self.promise.max(weaker);
         Ok(())
+    }
+
+    /// Until when an action under way may go on beyond what dispatching reckons with now, if nothing else deviates any
+    /// more. Where numbers depend on how long it takes, so long as that has been found out.
+    fn bears_until(&self, instance: InstanceId, now: &Rational) -> Option<Rational> {
+        let limit = if self.durations_move_numbers {
+            self.limits.get(&instance)?.as_ref()
+        } else {
+            None
+        };
+        let plan = (&*self.mission, &self.values);
+        let latest = promise::bears_until(&self.dispatch, plan, instance, now);
+        let limit = limit.and_then(|limit| self.limit_of(instance, limit));
+        let limit = limit.map(|limit| self.dispatch.world(&limit));
+        latest.into_iter().chain(limit).min()
     }
 
     /// Takes note of what is new, and asks whether the rest is still guaranteed.

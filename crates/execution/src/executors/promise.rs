@@ -6,13 +6,14 @@ use elbowroom_plan::{
     Bound, Constraint, InstanceId, ParameterId, ParameterKind, ParametrizedPlan, Valuation,
 };
 
-use crate::dispatch::{Dispatch, Overdue};
+use crate::dispatch::{Dispatch, Overdue, Until};
 use crate::executor::{Mission, StepId};
 use crate::quantities::duration_parameters;
 use crate::reason::{About, Cause, Promise, Reason};
 
-/// How much of the room around what is planned is tried, in halves of the share before.
-const HALVINGS: u32 = 4;
+/// How much of the room around what is planned is tried, in sixteenths. On a clock each start is a little late, and where
+/// ends of the room lie on their limits, that takes as little from it.
+const SHARES: [i64; 7] = [16, 15, 12, 8, 4, 2, 1];
 
 /// The assumption about the remaining duration of overdue actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,8 +141,42 @@ pub(super) fn weaken(
     Err(Box::new(lost.since(now.clone())))
 }
 
+/// The last moment, in the world's time, at which an action under way can end so that the rest works if nothing else
+/// deviates any more; `None` if there is none, or no limit. Takes time in proportion to the plan.
+pub(super) fn bears_until(
+    dispatch: &Dispatch,
+    (mission, values): (&Mission, &Valuation),
+    late: InstanceId,
+    now: &Rational,
+) -> Option<Rational> {
+    let local = dispatch.local(now);
+    let elapsed = |instance: InstanceId| {
+        let [start, end] = dispatch.nodes_of(instance);
+        let begun = dispatch.happened(start)?;
+        dispatch.happened(end).is_none().then(|| &local - begun)
+    };
+    let room = Room {
+        mission,
+        values,
+        share: &Rational::ZERO,
+        overrun: Overrun::Suitable,
+        is_inside: false,
+        elapsed: &elapsed,
+    };
+    let reading = |constraint: &Constraint| {
+        if dispatch.plan().duration_of(constraint) != Some(late) {
+            return room.reading(constraint);
+        }
+        Reading::Requirement {
+            lower: elapsed(late),
+            upper: None,
+        }
+    };
+    dispatch.latest_end(late, now, &reading)
+}
+
 /// When an action that is overdue may end, on the plan's clock, the most that is asked for first.
-fn ends(rest: &Rest<'_>, overdue: &Overdue, now: &Rational) -> Vec<Option<Rational>> {
+fn ends(rest: &Rest<'_>, overdue: &Overdue, now: &Rational) -> Vec<Until> {
     let plan = &rest.mission.plan;
     if rest.is_inside
         && let Some(envelope) = &rest.mission.envelope
@@ -153,10 +188,11 @@ fn ends(rest: &Rest<'_>, overdue: &Overdue, now: &Rational) -> Vec<Option<Ration
         if let Some(end) = upper.map(|upper| &overdue.begun + upper)
             && end >= *now
         {
-            return vec![Some(end)];
+            return vec![Until::AtMost(end)];
         }
     }
-    vec![None, Some(now + quarter(rest.mission, &overdue.planned))]
+    let quarter = now + quarter(rest.mission, &overdue.planned);
+    vec![Until::ForEver, Until::At(quarter)]
 }
 
 /// How much longer an action is taken to go on that is overdue.
@@ -171,12 +207,12 @@ fn most<T, E>(
     knows_room: bool,
     attempt: &mut dyn FnMut(&Rational, Overrun) -> Result<T, E>,
 ) -> Result<(T, Promise), E> {
-    let mut share = Rational::ONE;
-    for halving in 0..=HALVINGS {
+    for sixteenths in SHARES {
+        let share = Rational::new(sixteenths, 16);
         for overrun in [Overrun::ForEver, Overrun::Quarter] {
-            let promise = match halving {
+            let promise = match sixteenths {
                 _ if !knows_room => Promise::Planned,
-                0 => Promise::Envelope,
+                16 => Promise::Envelope,
                 _ => Promise::PartOfEnvelope,
             };
             if let Ok(done) = attempt(&share, overrun) {
@@ -186,7 +222,6 @@ fn most<T, E>(
         if reads_more_than_facts {
             break;
         }
-        share = share / Rational::from(2);
     }
     for overrun in [Overrun::ForEver, Overrun::Quarter] {
         if let Ok(done) = attempt(&Rational::ZERO, overrun) {
@@ -232,10 +267,11 @@ impl Room<'_> {
         let Some(elapsed) = (self.elapsed)(instance) else {
             return Reading::Contingent { lower, upper };
         };
-        // Inside the envelope it may still be where it has had its share.
+        // Inside the envelope it may still be where it has had its share: then its share is one of what is left.
         let has_had_it = upper.as_ref().is_some_and(|upper| *upper < elapsed);
         let upper = if self.is_inside && has_had_it {
-            self.interval(parameter, &Rational::ONE).1
+            let all = self.interval(parameter, &Rational::ONE).1;
+            all.map(|all| &elapsed + (all - &elapsed).max(Rational::ZERO) * self.share)
         } else {
             upper
         };

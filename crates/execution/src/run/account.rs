@@ -54,6 +54,8 @@ pub(super) struct Opened {
     cancelled: Option<Rational>,
     /// Until when the plan could bear it when that was warned of.
     pub(super) warned: Option<Rational>,
+    /// The end of its window when that was last looked into, and until when the plan can bear it.
+    pub(super) bearable: Option<(Rational, Rational)>,
     pub(super) measured: [Vec<Measured>; 2],
     /// Whether it had ended long before the present plan: late reports on it count for nothing.
     is_past: bool,
@@ -114,6 +116,7 @@ impl Account {
                 ended: None,
                 cancelled: None,
                 warned: None,
+                bearable: None,
                 measured: [Vec::new(), Vec::new()],
                 is_past: false,
             };
@@ -149,6 +152,7 @@ impl Account {
                 ended: it.ended,
                 cancelled: it.cancelled,
                 warned: it.warned,
+                bearable: None,
                 measured: it.measured,
                 is_past: false,
             };
@@ -257,6 +261,7 @@ impl Account {
             ended: None,
             cancelled: None,
             warned: None,
+            bearable: None,
             measured: [Vec::new(), Vec::new()],
             is_past: false,
         };
@@ -353,6 +358,13 @@ impl Account {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             let latest = entry.heard.take().into_iter().chain([time.clone()]).max();
             entry.heard = latest;
+        }
+    }
+
+    /// Takes note of until when the plan can bear an action, which its window does not show.
+    pub(super) fn note_bearable(&mut self, ticket: Ticket, window: Rational, until: Rational) {
+        if let Some(entry) = self.entries.get_mut(&ticket) {
+            entry.bearable = Some((window, until));
         }
     }
 

@@ -6,12 +6,18 @@ use elbowroom_num::Rational;
 use super::Run;
 use super::here::Guess;
 use crate::event::Ticket;
+use crate::executor::StepId;
 use crate::record::Entry;
 
 /// What is under way and late, and until when the plan can bear it.
 struct Late {
     ticket: Ticket,
+    step: StepId,
     action: String,
+    /// The end of its window at present.
+    window: Rational,
+    /// Whether it has been looked into whether the plan can bear more than that.
+    is_known: bool,
     /// When to warn of it.
     warn: Rational,
     /// From then on a new plan is needed.
@@ -28,8 +34,16 @@ impl Run<'_> {
         }
         let (due, later): (Vec<Late>, Vec<Late>) =
             self.late().partition(|late| late.warn <= self.now);
-        let next = due.iter().map(|late| late.until.clone()).min();
+        let mut again: Vec<Rational> = later.into_iter().map(|late| late.warn).collect();
+        let mut next: Option<Rational> = None;
         for late in due {
+            let Some(late) = self.looked_into(late) else {
+                continue;
+            };
+            if late.warn > self.now {
+                again.push(late.warn);
+                continue;
+            }
             self.account.note_warning(late.ticket, &late.until);
             self.ports.recorder.record(&Entry::Warning {
                 now: &self.now,
@@ -37,11 +51,24 @@ impl Run<'_> {
                 action: &late.action,
                 until: &late.until,
             });
+            next = next.into_iter().chain([late.until]).min();
         }
         if let Some(until) = next {
             self.foresee(&until);
         }
-        later.into_iter().map(|late| late.warn).min()
+        again.into_iter().min()
+    }
+
+    /// The same with the last moment that the plan can bear, which may be later than what dispatching reckons with at
+    /// present; `None` if it has been warned of.
+    fn looked_into(&mut self, late: Late) -> Option<Late> {
+        if late.is_known {
+            return Some(late);
+        }
+        let until = self.ports.executor.bears_until(late.step, &self.now);
+        let until = until.unwrap_or_else(|| late.window.clone());
+        self.account.note_bearable(late.ticket, late.window, until);
+        self.late_at(late.ticket)
     }
 
     /// The time between the moment from which on a new plan is needed and its beginning, if it is
@@ -72,22 +99,32 @@ impl Run<'_> {
 
     /// What may come to use its room, and was not warned of.
     fn late(&self) -> impl Iterator<Item = Late> + '_ {
-        self.account.open_tickets().filter_map(|ticket| {
-            let entry = self.account.get(ticket)?;
-            let window = self.ports.executor.window(entry.step?, true)?;
-            let until = window.latest?;
-            if entry.warned.as_ref() == Some(&until) || until < self.now {
-                return None;
-            }
-            let planned = entry.started.as_ref()? + entry.planned.as_ref()?;
-            let quarter = (&until - &planned) * Rational::new(1, 4);
-            let ahead = quarter.max(&self.allowance * Rational::from(2));
-            Some(Late {
-                ticket,
-                action: entry.action.name.clone(),
-                warn: (&until - ahead).max(planned),
-                until,
-            })
+        let open = self.account.open_tickets();
+        open.filter_map(|ticket| self.late_at(ticket))
+    }
+
+    fn late_at(&self, ticket: Ticket) -> Option<Late> {
+        let entry = self.account.get(ticket)?;
+        let step = entry.step?;
+        let window = self.ports.executor.window(step, true)?.latest?;
+        let bearable = entry.bearable.as_ref();
+        let bearable = bearable.filter(|(known, _)| *known == window);
+        let until = bearable.map_or(&window, |(_, until)| until).clone();
+        if entry.warned.as_ref() == Some(&until) || until < self.now {
+            return None;
+        }
+        let began = entry.started.as_ref().unwrap_or(&entry.ordered);
+        let planned = began + entry.planned.as_ref()?;
+        let quarter = (&until - &planned) * Rational::new(1, 4);
+        let ahead = quarter.max(&self.allowance * Rational::from(2));
+        Some(Late {
+            ticket,
+            step,
+            action: entry.action.name.clone(),
+            is_known: bearable.is_some(),
+            window,
+            warn: (&until - ahead).max(planned),
+            until,
         })
     }
 

@@ -51,7 +51,7 @@ impl Rest {
     }
 
     /// The time at which an action under way reaches its limit, on the plan's clock.
-    fn limit_of(&self, instance: InstanceId, limit: &Rational) -> Option<Rational> {
+    pub(super) fn limit_of(&self, instance: InstanceId, limit: &Rational) -> Option<Rational> {
         let [start, end] = self.dispatch.nodes_of(instance);
         let start = self.dispatch.happened(start)?;
         let has_ended = self.dispatch.happened(end).is_some();
