@@ -36,19 +36,20 @@ pub(crate) fn of_deordered(
 /// to work. If even fixing all of them does not help, the plan as it is: the box check will say
 /// what is wrong with it.
 pub(crate) fn sound(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> ParametrizedPlan {
+    // With too much freedom there are too many cases to tell apart.
+    let is_manageable = most_sides(&plan.plan) <= MOST_SIDES;
+    if is_manageable && let Some(found) = pinned(task, plan, nominal) {
+        return found;
+    }
     let sided = |sided: fn(StnPlan) -> StnPlan| ParametrizedPlan {
         plan: sided(plan.plan.clone()),
         ..plan.clone()
     };
-    let (one_way, all) = (sided(with_sides_one_way), sided(with_all_sides));
-    // With too much freedom there are too many cases to tell apart.
-    let is_manageable = most_sides(&plan.plan) <= MOST_SIDES;
-    let free = is_manageable.then(|| plan.clone());
-    let found = free
-        .iter()
-        .chain([&one_way, &all])
-        .find_map(|plan| pinned(task, plan, nominal));
-    found.unwrap_or(all)
+    if let Some(found) = pinned(task, &sided(with_sides_one_way), nominal) {
+        return found;
+    }
+    let all = sided(with_all_sides);
+    pinned(task, &all, nominal).unwrap_or(all)
 }
 
 /// The plan of a problem with processes and events, all its happenings in their order, and each as

@@ -43,6 +43,8 @@ pub fn without_implied(mut plan: StnPlan, times: &Schedule) -> StnPlan {
         (&constraint.lower, &constraint.upper) != (&Bound::Infinite, &Bound::Infinite)
             || matches!(constraint.reason, Reason::Duration(_))
     });
+    // Most are implied.
+    plan.constraints.shrink_to_fit();
     plan
 }
 
