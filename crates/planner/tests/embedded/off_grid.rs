@@ -229,3 +229,24 @@ fn what_is_under_way_keeps_off_a_bound_that_is_no_possible_duration() {
     let duration = found.plan.steps[0].duration.clone().unwrap();
     assert!(duration > 2.into() && duration < "2.0001".parse().unwrap());
 }
+
+/// By less than a tick, there is no time to pass; so the judge refuses every plan, and there are ever
+/// longer ones.
+#[test]
+fn candidates_that_the_judge_refuses_count_as_states() {
+    let task = task(
+        "(:requirements :durative-actions :numeric-fluents :timed-initial-literals)
+         (:predicates (open) (over)) (:functions (knocks))
+         (:action knock :parameters () :precondition () :effect (increase (knocks) 1))
+         (:durative-action pass :parameters () :duration (= ?duration 1.00000000000001)
+           :condition (over all (open)) :effect (at end (over)))",
+        "(:init (= (knocks) 0) (at 1 (open)) (at 2 (not (open))))
+         (:goal (and (over) (>= (knocks) 3)))",
+    );
+    let answer = answer_within(&task, &Situation::initial(&task), 2000);
+    let Answer::NoneFound { counts, .. } = &answer else {
+        panic!("{}", describe(&answer));
+    };
+    // No state is made without having been generated, but for the first one of each search.
+    assert!(counts.evaluated > 2 * counts.generated, "{counts:?}");
+}
