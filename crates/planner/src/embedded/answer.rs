@@ -91,7 +91,8 @@ pub struct Counts {
     pub expanded: u64,
     /// Successors listed.
     pub generated: u64,
-    /// States made and estimated.
+    /// States made and estimated, and states made again for candidates that came to nothing: that the
+    /// judge refused, or that were no better than the best plan.
     pub evaluated: u64,
     /// About how many bytes the states take.
     pub memory: usize,

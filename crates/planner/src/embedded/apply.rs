@@ -117,9 +117,15 @@ impl<'a> Stepper<'a> {
         }
         self.keeps_conditions(state)?;
         let is_in_time = state.earliest_end() <= self.horizon;
+        (is_in_time && self.has_times(state)).then_some(())
+    }
+
+    /// Whether there are times that meet what has been demanded of them. Where a plan is extracted,
+    /// nobody asks: the search has seen each of these states, and times for the last one do for all.
+    fn has_times(&self, state: &State) -> bool {
         let metric = self.compiled.metric.as_ref();
         let limit = metric.zip(self.limit.as_ref());
-        (is_in_time && symbolic::is_possible(state, self.compiled, limit)).then_some(())
+        self.log.is_some() || symbolic::is_possible(state, self.compiled, limit)
     }
 
     /// Whether happenings may leave the network.
@@ -239,8 +245,8 @@ impl<'a> Stepper<'a> {
             self.note_end(&open, node);
         }
         let moment = moment(state, || {
-            let duration = if open.node == SETTLED {
-                let start = Form::constant(self.compiled.scale.units(open.start));
+            let duration = if open.node == SETTLED && open.duration.is_none() {
+                let start = Form::constant(self.start_of_running(&open));
                 Form::node(node).plus(&Rational::from(-1), &start)
             } else {
                 duration_form(open.duration.as_ref(), open.node, node)
@@ -264,6 +270,17 @@ impl<'a> Stepper<'a> {
             settle(state);
         }
         Some(())
+    }
+
+    /// When an action started that has been under way from the beginning: in ticks, as all times of
+    /// the search are, but exactly where a plan is extracted.
+    fn start_of_running(&self, open: &Open) -> Rational {
+        let running = self.compiled.beginning.running.get(open.action as usize);
+        let exact = running.filter(|_| self.log.is_some());
+        exact.map_or_else(
+            || self.compiled.scale.units(open.start),
+            |running| running.exact_start.clone(),
+        )
     }
 
     /// Notes the exact duration, for the times of the plan.

@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Situation, Step as PlanStep, Task, TimeTriggeredPlan, validate_from};
-use elbowroom_num::Rational;
+use elbowroom_num::{End, Rational};
 
 use super::apply::{Log, Step, Stepper};
 use super::compile::{Compiled, NONE};
 use super::network::{Network, NodeId, SETTLED};
 use super::root::root;
 use super::state::State;
-use super::symbolic;
+use super::symbolic::{self, Exact, KnownEnd, not_before};
+use super::time::{NEVER, Ticks};
 
 /// A step of the plan to be.
 #[derive(Clone, Debug)]
@@ -54,11 +55,17 @@ pub(crate) fn plan_of(
         ..
     } = replay;
     let log = stepper.log.as_ref()?;
+    let exact = Exact {
+        distances: exact_distances(log),
+        ends: known_ends(situation, compiled, &timings),
+    };
     let times = if state.symbolic.is_none() {
-        let known = known_ends(situation, &timings);
-        exact_times(compiled, &state.network, log, (task.epsilon(), &known))?
+        exact_times(compiled, &state.network, log, (task.epsilon(), &exact))?
     } else {
-        let exact = exact_distances(log);
+        // A linear program of all that happens can take longer than all that came before.
+        if !goes_on() {
+            return None;
+        }
         symbolic::solve(&state, compiled, &exact)?
     };
     let plan = written(task, situation, compiled, &timings, &times)?;
@@ -171,17 +178,39 @@ fn exact_distances(log: &Log) -> Vec<(NodeId, NodeId, Rational)> {
     distances
 }
 
-/// The earliest ends of what is under way, exactly: its start need not lie on the grid.
-fn known_ends(situation: &Situation, timings: &[Timing]) -> Vec<(NodeId, Rational)> {
-    let both = situation.running.iter().zip(timings);
-    let end = |(running, timing): (&elbowroom_model::RunningAction, &Timing)| {
-        let end = &running.start + running.duration.lower.value()?;
-        Some((timing.end?, end.max(situation.time.clone())))
-    };
-    both.filter_map(end).collect()
+/// When what is under way may end, exactly: its start need not lie on the grid. Duration bounds that do
+/// not belong to what they bound are kept away from by a tick, as in the search.
+fn known_ends(situation: &Situation, compiled: &Compiled, timings: &[Timing]) -> Vec<KnownEnd> {
+    let tick = compiled.scale.units(1);
+    let each = situation.running.iter().zip(timings);
+    let ends = each.zip(&compiled.beginning.running);
+    ends.filter_map(|((running, timing), rounded)| {
+        let earliest = match &running.duration.lower {
+            End::Closed(least) => &running.start + least,
+            End::Open(least) => &running.start + least + &tick,
+            End::Infinite => situation.time.clone(),
+        };
+        let earliest = earliest.max(situation.time.clone());
+        let latest = match &running.duration.upper {
+            End::Closed(most) => Some(&running.start + most),
+            End::Open(most) => Some(&running.start + most - &tick),
+            End::Infinite => None,
+        };
+        let most = rounded.most.unwrap_or(NEVER);
+        Some(KnownEnd {
+            node: timing.end?,
+            rounded: (
+                rounded.start + rounded.least,
+                rounded.start.saturating_add(most).min(NEVER),
+            ),
+            latest: latest.map(|latest| latest.max(earliest.clone())),
+            earliest,
+        })
+    })
+    .collect()
 }
 
-/// The earliest times of all happenings in exact numbers; those of `known` are no earlier than that.
+/// The earliest times of all happenings in exact numbers, of which some are known exactly.
 ///
 /// Where everything lies on the grid these are the network's own. Elsewhere exact durations take
 /// the place of rounded ones; a bound by a fixed time is moved by a tick, to be safe from its
@@ -191,7 +220,7 @@ fn exact_times(
     compiled: &Compiled,
     network: &Network,
     log: &Log,
-    (epsilon, known): (&Rational, &[(NodeId, Rational)]),
+    (epsilon, exact): (&Rational, &Exact),
 ) -> Option<Vec<Rational>> {
     let scale = compiled.scale;
     let is_on_grid = |number: &Rational| scale.exactly(number).is_some();
@@ -206,20 +235,20 @@ fn exact_times(
             .map(|node| Some(scale.units(network.earliest(NodeId::try_from(node).ok()?))))
             .collect();
     }
-    let slack = i64::from(!compiled.is_exact);
     let mut times: Vec<Rational> = network
         .bounds()
-        .map(|(floor, _)| {
-            let is_free = floor <= compiled.now;
-            compiled.earliest(if is_free { floor } else { floor + slack })
-        })
+        .map(|(floor, _)| not_before(floor, compiled))
         .collect();
-    for (node, end) in known {
-        times[*node as usize] = end.clone();
+    let floors: Vec<Ticks> = network.bounds().map(|(floor, _)| floor).collect();
+    for end in &exact.ends {
+        let node = usize::from(end.node);
+        times[node] = end.after(floors[node], compiled);
     }
-    let exact = exact_distances(log);
     let of_end = |from: NodeId, to: NodeId| {
-        let found = exact.iter().find(|known| (known.0, known.1) == (from, to));
+        let found = exact
+            .distances
+            .iter()
+            .find(|known| (known.0, known.1) == (from, to));
         found.map(|known| known.2.clone())
     };
     let edges: Vec<(usize, usize, Rational)> = network

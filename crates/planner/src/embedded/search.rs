@@ -87,6 +87,8 @@ pub(crate) struct Search<'a> {
     pub(crate) expanded: u64,
     pub(crate) generated: u64,
     pub(crate) evaluated: u64,
+    /// The states that were made again, in vain: see [`waste`](Search::waste).
+    wasted: u64,
     pub(crate) memory: usize,
 }
 
@@ -190,6 +192,7 @@ impl<'a> Search<'a> {
             expanded: 0,
             generated: 0,
             evaluated: 0,
+            wasted: 0,
             memory: 0,
         }
     }
@@ -229,9 +232,15 @@ impl<'a> Search<'a> {
             actions: 0,
             expanded: self.expanded,
             generated: self.generated,
-            evaluated: self.evaluated,
+            evaluated: self.evaluated + self.wasted,
             memory: self.memory,
         }
+    }
+
+    /// Counts a candidate that came to nothing: so many choices were taken again. Any number of such
+    /// candidates may follow each other, each of them longer than the last one.
+    pub(crate) fn waste(&mut self, choices: usize) {
+        self.wasted += choices as u64;
     }
 
     /// How much there is to an estimate: the number of operators.

@@ -16,7 +16,7 @@ use super::compile::{Compiled, Update};
 use super::expressions::{Course, Form, Moment, Symbolic};
 use super::formula::{Formula, Linear, Numeric};
 use super::state::State;
-pub(crate) use program::{is_possible, solve};
+pub(crate) use program::{Exact, KnownEnd, is_possible, not_before, solve};
 
 /// The value of an expression at some moment.
 pub(crate) fn value(state: &State, numeric: &Numeric, moment: &Moment) -> Option<Form> {

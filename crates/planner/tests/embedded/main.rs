@@ -14,6 +14,7 @@ mod course_twin;
 mod features;
 mod memory;
 mod metric;
+mod off_grid;
 mod portfolio;
 mod refinement;
 mod resources;

@@ -15,7 +15,7 @@ impl Stepper<'_> {
     pub(crate) fn reach_goal(&mut self, state: &mut State) -> Option<()> {
         let goal = &self.compiled.goal;
         self.demand(state, goal, None, &Moment::default())?;
-        symbolic::is_possible(state, self.compiled, None).then_some(())
+        self.has_times(state).then_some(())
     }
 
     /// Requires a condition, now or, where numbers depend on times, of the times.

@@ -25,6 +25,8 @@ pub(crate) struct Beginning {
 #[derive(Clone, Debug)]
 pub(crate) struct Running {
     pub(crate) start: Ticks,
+    /// When it started, whether that is on the grid or not.
+    pub(crate) exact_start: Rational,
     pub(crate) least: Ticks,
     pub(crate) most: Option<Ticks>,
     /// The duration, if it leaves no choice.
@@ -68,6 +70,7 @@ fn one(running: &RunningAction, now: &Rational, scale: Scale) -> (Running, bool)
     let most = most.map(|most| if can_end { most.max(least) } else { most });
     let running = Running {
         start,
+        exact_start: running.start.clone(),
         least,
         most,
         duration: known_duration(running).cloned(),

@@ -84,8 +84,10 @@ impl Strand<'_, '_> {
             match self.judge(&steps) {
                 Judged::Stopped => return,
                 // The choices are its own.
-                Judged::Better | Judged::NoBetter => {}
+                Judged::Better => {}
+                Judged::NoBetter => self.counts.evaluated += steps.len() as u64,
                 Judged::Refused => {
+                    self.counts.evaluated += steps.len() as u64;
                     refiner.forget();
                     is_fresh = true;
                 }

@@ -219,8 +219,11 @@ impl<'a, 't> Strand<'a, 't> {
                     spent += steps.len() as u64;
                     is_report_due = true;
                     match self.judge(&steps) {
-                        Judged::Refused => search.has_lost = true,
-                        Judged::NoBetter => {}
+                        Judged::Refused => {
+                            search.has_lost = true;
+                            search.waste(steps.len());
+                        }
+                        Judged::NoBetter => search.waste(steps.len()),
                         Judged::Stopped => break Outcome::Stopped,
                         Judged::Better => break Outcome::Better,
                     }

@@ -1,4 +1,7 @@
 //! The linear program of a state: whether there are times for it, and which ones are the best.
+//!
+//! The search asks in ticks, to which all fixed times are rounded down. The times of a plan are asked
+//! for exactly.
 
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::simplex::{Optimum, Simplex, VariableId};
@@ -10,7 +13,57 @@ use super::super::expressions::Form;
 use super::super::formula::Numeric;
 use super::super::network::{Network, NodeId};
 use super::super::state::State;
-use super::super::time::NEVER;
+use super::super::time::{NEVER, Ticks};
+
+/// What is known exactly of the nodes of a network, which has it in ticks.
+#[derive(Debug, Default)]
+pub(crate) struct Exact {
+    /// How far it is from one node to another at least.
+    pub(crate) distances: Vec<(NodeId, NodeId, Rational)>,
+    /// The ends of what has been under way from the beginning.
+    pub(crate) ends: Vec<KnownEnd>,
+}
+
+/// When something may end that has been under way from the beginning, by its duration alone. Its start
+/// need not lie on the grid.
+#[derive(Debug)]
+pub(crate) struct KnownEnd {
+    pub(crate) node: NodeId,
+    /// The earliest and the latest time as the network has them.
+    pub(crate) rounded: (Ticks, Ticks),
+    pub(crate) earliest: Rational,
+    /// `None`: whenever it likes.
+    pub(crate) latest: Option<Rational>,
+}
+
+impl KnownEnd {
+    /// The earliest time, where the network's is `floor`: that can come from something else.
+    pub(crate) fn after(&self, floor: Ticks, compiled: &Compiled) -> Rational {
+        if floor > self.rounded.0 {
+            let other = not_before(floor, compiled);
+            other.max(self.earliest.clone())
+        } else {
+            self.earliest.clone()
+        }
+    }
+
+    /// The latest time, where the network's is `latest`.
+    fn before(&self, latest: Ticks, compiled: &Compiled) -> Option<Rational> {
+        if latest < self.rounded.1 {
+            Some(compiled.scale.units(latest))
+        } else {
+            self.latest.clone()
+        }
+    }
+}
+
+/// A time that is no earlier than a fixed time, given the tick to which that has been rounded down. What
+/// can happen at once happens at the situation's time.
+pub(crate) fn not_before(floor: Ticks, compiled: &Compiled) -> Rational {
+    let is_free = floor <= compiled.now;
+    let slack = i64::from(!compiled.is_exact && !is_free);
+    compiled.earliest(floor + slack)
+}
 
 /// Whether there are times that meet all demands and the network, and leave what has been spent
 /// within the limit.
@@ -27,7 +80,7 @@ pub(crate) fn is_possible(
     if !symbolic.has_demands() && !is_limited {
         return true;
     }
-    let (mut program, times, end) = program(&state.network, &symbolic.demands, compiled, &[]);
+    let (mut program, times, end) = program(&state.network, &symbolic.demands, compiled, None);
     if is_limited
         && let Some((metric, limit)) = limit
         && let Some((row, constant)) = objective(state, metric, &times, end)
@@ -44,16 +97,12 @@ pub(crate) fn is_possible(
     program.check().is_ok()
 }
 
-/// Times that meet all demands and the network; what `exact` says of distances from one node to
-/// another replaces the network's rounded numbers. The metric is as low as it can be, and then the
-/// last one is as early as possible.
-pub(crate) fn solve(
-    state: &State,
-    compiled: &Compiled,
-    exact: &[(NodeId, NodeId, Rational)],
-) -> Option<Vec<Rational>> {
+/// Times that meet all demands and the network; what is known exactly replaces the network's rounded
+/// numbers. The metric is as low as it can be, and then the last one is as early as possible.
+pub(crate) fn solve(state: &State, compiled: &Compiled, exact: &Exact) -> Option<Vec<Rational>> {
     let symbolic = state.symbolic.as_ref()?;
-    let (mut program, times, end) = program(&state.network, &symbolic.demands, compiled, exact);
+    let (mut program, times, end) =
+        program(&state.network, &symbolic.demands, compiled, Some(exact));
     let objective = compiled
         .metric
         .as_ref()
@@ -113,26 +162,42 @@ fn objective(
     (!row.is_empty()).then_some((row, sum.constant))
 }
 
-/// The linear program, the variables of its nodes, and one that is not before any of them.
+/// The times between which a node lies, by its bounds in the network.
+fn window(
+    (floor, latest): (Ticks, Ticks),
+    compiled: &Compiled,
+    known: Option<(&Exact, NodeId)>,
+) -> (Rational, Option<Rational>) {
+    let scale = compiled.scale;
+    let end = known.and_then(|(exact, node)| exact.ends.iter().find(|end| end.node == node));
+    if let Some(end) = end {
+        return (end.after(floor, compiled), end.before(latest, compiled));
+    }
+    let earliest = match known {
+        _ if latest == floor => scale.units(floor),
+        Some(_) => not_before(floor, compiled),
+        None => compiled.earliest(floor),
+    };
+    (earliest, (latest < NEVER).then(|| scale.units(latest)))
+}
+
+/// The linear program, the variables of its nodes, and one that is not before any of them. `exact`: what
+/// is known exactly, where times are asked for that a plan can have.
 fn program(
     network: &Network,
     demands: &[(Form, Comparison)],
     compiled: &Compiled,
-    exact: &[(NodeId, NodeId, Rational)],
+    exact: Option<&Exact>,
 ) -> (Simplex, Vec<VariableId>, VariableId) {
     let scale = compiled.scale;
     let mut program = Simplex::new();
     let times: Vec<VariableId> = network.bounds().map(|_| program.add_variable()).collect();
     let end = program.add_variable();
-    for (&time, (floor, latest)) in times.iter().zip(network.bounds()) {
-        let earliest = if latest > floor {
-            compiled.earliest(floor)
-        } else {
-            scale.units(floor)
-        };
+    for ((node, &time), bounds) in (0..).zip(&times).zip(network.bounds()) {
+        let (earliest, latest) = window(bounds, compiled, exact.map(|exact| (exact, node)));
         program.assert_lower(time, Delta::from(earliest), 0);
-        if latest < NEVER {
-            program.assert_upper(time, Delta::from(scale.units(latest)), 0);
+        if let Some(latest) = latest {
+            program.assert_upper(time, Delta::from(latest), 0);
         }
         let after = [(end, Rational::ONE), (time, Rational::from(-1))];
         let after = program.define(&after);
@@ -142,7 +207,7 @@ fn program(
         .edges()
         .map(|(from, to, distance)| (from, to, scale.units(distance)))
         .collect();
-    for (from, to, distance) in exact {
+    for (from, to, distance) in exact.iter().flat_map(|exact| &exact.distances) {
         for edge in &mut distances {
             if (edge.0, edge.1) == (*from, *to) {
                 edge.2.clone_from(distance);
