@@ -256,8 +256,9 @@ impl World for Mute<'_> {
 fn what_was_never_heard_to_start_is_waited_for_as_long_as_the_plan_can_bear_it() {
     let (scene, _) = walker(Rational::from(10));
     for executor in ["guarded", "live", "stn", "esterel"] {
+        let model = scene.world("");
         let mut world = Mute {
-            inner: SimWorld::new(Arc::clone(&scene.task), &scene.world(""), 1),
+            inner: SimWorld::new(Arc::clone(&scene.task), &model, 1),
             name: "(walk)",
             mute: None,
             coming: Vec::new(),
