@@ -263,14 +263,14 @@ impl Run<'_> {
         let search = self.search.as_ref()?;
         let next = self.next_whatever_is_asked(search);
         if self.has_given_up_goals() == Some(true) && !self.is_paused() {
-            return next.into_iter().chain([self.end_of_patience(search)]).min();
+            return Some(next.min(self.end_of_patience(search)));
         }
-        next
+        Some(next)
     }
 
-    fn next_whatever_is_asked(&self, search: &Search) -> Option<Rational> {
+    fn next_whatever_is_asked(&self, search: &Search) -> Rational {
         if let Some(readying) = &search.readying {
-            return Some(self.next_of_readying(readying));
+            return self.next_of_readying(readying);
         }
         if let Some((_, since)) = &search.plan {
             let at_least = &self.now + self.task.epsilon();
@@ -279,12 +279,12 @@ impl Run<'_> {
                 .time
                 .clone()
                 .max(since + Rational::from(WORD));
-            return Some(begins.max(at_least));
+            return begins.max(at_least);
         }
         match &search.course {
-            Goes::Plan { until: Some(until) } => Some(until.clone()),
+            Goes::Plan { until: Some(until) } => until.clone(),
             // Whoever makes the plan says when it is there.
-            _ => Some(self.settings.time_limit.clone()),
+            _ => self.settings.time_limit.clone(),
         }
     }
 

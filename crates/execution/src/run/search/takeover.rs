@@ -40,8 +40,8 @@ impl Run<'_> {
             }
         }
         let is_known = |ticket| search.running.contains(&ticket);
-        let goes_on = self.account.open_tickets().all(is_known);
-        if !is_as_expected && !(goes_on && search.expected.is_empty()) {
+        let knows_all = self.account.open_tickets().all(is_known);
+        if !is_as_expected && (!knows_all || !search.expected.is_empty()) {
             // It continues what was never started, or knows nothing of what still goes on.
             return self.search_again(&search.reason);
         }
