@@ -40,7 +40,15 @@
 //! second search in a row the present plan goes on only until that is expected to be over, and during
 //! further ones nothing is started. Each outdated plan counts as a new plan
 //! ([`RunSettings::most_replans`]). Goals that are given during a search wait for its end; one that is
-//! abandoned ends it, at most three times in a row.
+//! abandoned ends it at once, three times in a row. The next search is let go on for a while, which
+//! becomes longer each time that it is over before there is a plan: neither a search without end nor
+//! somebody who keeps changing goals keeps the run from acting.
+//!
+//! Where the present plan leads is reckoned with its network: what is late takes a quarter longer than
+//! it has taken, what waits for that is as late, and what could not be started then is not expected.
+//! When a plan will be needed because something is late ([`RunSettings::watches_room`]), the planner is
+//! told so ahead, from where everything else has started and ended as planned; and anew where things
+//! come otherwise.
 //!
 //! Plans can also be made ready beside the run ([`RunSettings::readies_aside`]). Then a new plan is
 //! made to fit as soon as it is there, with what was committed and has not begun in it, and is made
@@ -68,7 +76,9 @@ mod amid;
 mod beginning;
 mod dead_end;
 mod drive;
+mod expectation;
 mod farewell;
+mod foresight;
 mod goals;
 mod handover;
 pub mod here;
@@ -81,10 +91,11 @@ mod room;
 mod search;
 mod settings;
 mod stand;
+mod waits;
 
 use std::sync::Arc;
 
-use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
+use elbowroom_model::{Footprint, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 pub use account::{Account, ExecutedStep, KnownStart};
@@ -109,6 +120,7 @@ use crate::world::{World, WorldError};
 use agenda::Todo;
 use dead_end::Happened;
 use farewell::Closing;
+use foresight::Foreseen;
 use lasting::Lasting;
 use progress::Progress;
 use search::{Lost, Search};
@@ -148,7 +160,7 @@ pub struct Run<'a> {
     is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
     /// Where a plan will be needed if what is late does not end, as the planner was told.
-    foreseen: Option<(Situation, Vec<Ticket>)>,
+    foreseen: Option<Foreseen>,
     /// What was believed before the first event of the history.
     beginning: Progression,
     /// Told what is believed, whenever something was taken in.
@@ -352,9 +364,10 @@ impl<'a> Run<'a> {
         let breaking =
             (!self.belief.breaking().is_empty()).then(|| &self.now + self.task.epsilon());
         let warning = self.warn();
+        let doubt = self.tend_foresight();
         let until = until.into_iter().chain(silence).chain(breaking);
         let taking_over = self.next_of_search();
-        let until = until.chain(warning).chain(taking_over).min();
+        let until = until.chain(warning).chain(doubt).chain(taking_over).min();
         let Some(until) = until.map(|until| until.max(self.now.clone())) else {
             // Nothing is running, nothing is due, and the plan is not done.
             return self.replan(&Reason::new(Cause::Late).about(About::Nothing));

@@ -39,6 +39,12 @@ pub(crate) struct Desk {
     waited_for: usize,
     /// Whether there is never a plan.
     has_none: bool,
+    /// From where plans were asked for.
+    pub(crate) asked: Vec<Situation>,
+    /// From where plans were begun ahead.
+    pub(crate) ahead: Vec<Situation>,
+    /// When the last one of these is there.
+    ahead_due: Rational,
 }
 
 impl Beside {
@@ -61,18 +67,37 @@ impl Beside {
     }
 }
 
+impl Desk {
+    /// When a plan is there that is begun now.
+    fn next_due(&self) -> Rational {
+        let index = self.begun.min(self.seconds.len() - 1);
+        &self.now + &self.seconds[index]
+    }
+}
+
 impl Planner for Beside {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         self.desk().waited_for += 1;
         self.collect(task, situation)
     }
 
-    fn begin(&mut self, _task: &Task, _situation: &Situation) -> bool {
+    fn expect(&mut self, _task: &Task, situation: &Situation) {
         let mut desk = self.desk();
-        let index = desk.begun.min(desk.seconds.len() - 1);
-        let due = &desk.now + &desk.seconds[index];
+        desk.ahead_due = desk.next_due();
+        desk.ahead.push(situation.clone());
+    }
+
+    fn begin(&mut self, _task: &Task, situation: &Situation) -> bool {
+        let mut desk = self.desk();
+        let is_begun = desk.ahead.last() == Some(situation);
+        let due = if is_begun {
+            desk.ahead_due.clone().max(desk.now.clone())
+        } else {
+            desk.next_due()
+        };
         desk.due = Some(due);
         desk.begun += 1;
+        desk.asked.push(situation.clone());
         true
     }
 
@@ -256,6 +281,18 @@ pub(crate) fn told(
     quarters: &[i64],
 ) -> Told {
     let (mut world, is_to_end) = telling(script, planner, quarters);
+    told_in(execution, task, planner, &mut world, &is_to_end)
+}
+
+/// The run in that world, which says when it is over.
+pub(crate) fn told_in(
+    execution: Execution<'_>,
+    task: &Arc<Task>,
+    planner: &Beside,
+    world: &mut dyn World,
+    is_to_end: &Arc<AtomicBool>,
+) -> Told {
+    let is_to_end = Arc::clone(is_to_end);
     let (notes, lines) = (Notes::default(), Arc::default());
     let report = execution
         .planned_by(planner.clone())
@@ -265,7 +302,7 @@ pub(crate) fn told(
             lines: Arc::clone(&lines),
         })
         .ending_when(move || is_to_end.load(Ordering::SeqCst))
-        .run_in(&mut world);
+        .run_in(world);
     let notes = notes.0.lock().unwrap_or_else(PoisonError::into_inner);
     let lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
     Told {
@@ -467,6 +504,31 @@ fn goals_that_change_faster_than_plans_are_made_do_not_starve_the_run() {
         assert_has(&told, &["rest: goal-reached"]);
         assert!(planner.desk().begun < 30, "{}", planner.desk().begun);
     }
+}
+
+/// A search for goals that were abandoned, which is let go on as goals have changed so often, may have no
+/// end. After five seconds it is ended.
+#[test]
+fn a_search_for_abandoned_goals_is_not_let_go_on_for_ever() {
+    let task = task("", "(have book)");
+    let endless = seconds(1_000_000);
+    let lengths = [&[seconds(0)][..], &vec![endless; 4], &[seconds(1)]].concat();
+    let planner = Beside::taking(&lengths);
+    let goals = ["key", "cup", "key", "cup", "key"].into_iter();
+    let goals = goals.map(|item| pursue("key", &format!("(have {item})")));
+    let told = lasting(&task, 100, (1..).zip(goals).collect(), &planner);
+    assert_has(
+        &told,
+        &[
+            "4: plan",
+            // The fourth search has gone on for five seconds.
+            "9: plan",
+            "10: the plan is there",
+            "rest: goal-reached problem key",
+        ],
+    );
+    let desk = planner.desk();
+    assert_eq!((desk.begun, desk.given_up), (6, 4), "{:#?}", told.notes);
 }
 
 #[test]

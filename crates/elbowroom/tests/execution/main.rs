@@ -5,6 +5,7 @@ mod amounts;
 mod aside;
 mod bad_worlds;
 mod esterel;
+mod foreseen;
 mod guarantee;
 mod handover;
 mod lasting;

@@ -10,6 +10,7 @@ use elbowroom_model::ground::{
 use elbowroom_num::Rational;
 
 use super::Patience;
+use super::waits::{Moment, Wait, waits_of};
 use crate::event::{Ending, Measured, Ticket};
 use crate::executor::{Mission, Order, StepId};
 use crate::progression::Progression;
@@ -35,6 +36,8 @@ pub struct Account {
     steps: BTreeMap<StepId, Ticket>,
     /// What the present plan has, on the world's clock, if that was noted.
     planned: Vec<(StepId, Step)>,
+    /// What the starts of these wait for.
+    waits: BTreeMap<StepId, Vec<Wait>>,
     /// Those that have not ended.
     open: BTreeSet<Ticket>,
 }
@@ -274,6 +277,7 @@ impl Account {
     /// The steps of earlier plans no longer mean anything, but for those that go on.
     pub(super) fn begin_plan(&mut self, running: &BTreeMap<StepId, Ticket>) {
         self.planned.clear();
+        self.waits.clear();
         for ticket in std::mem::take(&mut self.steps).into_values() {
             if let Some(entry) = self.entries.get_mut(&ticket) {
                 entry.step = None;
@@ -284,6 +288,16 @@ impl Account {
                 entry.step = Some(*step);
             }
             self.steps.insert(*step, *ticket);
+        }
+    }
+
+    /// When a start of the present plan was told, or the end of a step came that ended well.
+    pub(super) fn time_of(&self, (step, is_end): Moment) -> Option<&Rational> {
+        let entry = self.get(self.ticket(step)?)?;
+        match &entry.ended {
+            _ if !is_end => Some(entry.started.as_ref().unwrap_or(&entry.ordered)),
+            Some((end, Ending::Succeeded)) => Some(end),
+            _ => None,
         }
     }
 
@@ -301,6 +315,12 @@ impl Account {
             )
         });
         self.planned = on_the_worlds_clock.collect();
+        self.waits = waits_of(mission);
+    }
+
+    /// What the start of a step that was noted waits for.
+    pub(super) fn waits(&self, step: StepId) -> &[Wait] {
+        self.waits.get(&step).map_or(&[], Vec::as_slice)
     }
 
     /// The steps that were noted.

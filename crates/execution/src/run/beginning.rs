@@ -75,10 +75,11 @@ impl Run<'_> {
     /// Begins with a plan that is ready.
     pub(super) fn begin_mission(&mut self, mission: &Mission) -> Result<(), Stop> {
         self.lost = super::Lost::default();
+        self.foreseen = None;
         let mut steps = mission.running.clone();
         steps.extend(&mission.begun);
         self.account.begin_plan(&steps);
-        if self.settings.plans_aside {
+        if self.settings.plans_aside || self.settings.watches_room {
             self.account.note_steps(mission);
         }
         self.steps = mission.time_triggered.steps.len();

@@ -125,6 +125,7 @@ impl Run<'_> {
     /// Asks the planner once.
     fn attempt(&mut self, reason: &Reason, guess: Guess) -> Result<Attempt, Stop> {
         let foreseen = self.as_foreseen(guess);
+        let foreseen = foreseen.map(|it| (it.prospect.situation, it.prospect.running));
         let (situation, running) =
             foreseen.unwrap_or_else(|| self.situation(&self.allowance, guess));
         self.ports.recorder.record(&Entry::Planning {

@@ -1,10 +1,8 @@
 //! How much longer what is under way may take, and what is done when that is used up.
 
-use elbowroom_model::Situation;
 use elbowroom_num::Rational;
 
 use super::Run;
-use super::here::Guess;
 use crate::event::Ticket;
 use crate::executor::StepId;
 use crate::record::Entry;
@@ -73,28 +71,8 @@ impl Run<'_> {
 
     /// The time between the moment from which on a new plan is needed and its beginning, if it is
     /// made ahead.
-    fn margin(&self) -> Rational {
+    pub(super) fn margin(&self) -> Rational {
         self.allowance.clone().max(Rational::new(1, 4))
-    }
-
-    /// Tells the planner from where a plan will be needed if nothing happens until then.
-    fn foresee(&mut self, until: &Rational) {
-        let time = until + self.margin() + self.task.epsilon();
-        let foreseen = self.situation_at(time, Guess::AQuarterLonger);
-        self.ports.planner.expect(&self.task, &foreseen.0);
-        self.foreseen = Some(foreseen);
-    }
-
-    /// The situation that was foreseen, if things have come as they were foreseen, and it is near.
-    pub(super) fn as_foreseen(&mut self, guess: Guess) -> Option<(Situation, Vec<Ticket>)> {
-        let foreseen = self.foreseen.take()?;
-        let time = foreseen.0.time.clone();
-        let earliest = &self.now + self.task.epsilon();
-        let is_near = time >= earliest && time <= earliest + self.margin() + &self.allowance;
-        let is_so = is_near
-            && matches!(guess, Guess::AQuarterLonger)
-            && self.situation_at(time, guess) == foreseen;
-        is_so.then_some(foreseen)
     }
 
     /// What may come to use its room, and was not warned of.

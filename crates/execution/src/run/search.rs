@@ -11,6 +11,8 @@ use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use super::agenda::Todo;
+use super::expectation::{Expected, Prospect};
+use super::foresight::Ahead;
 use super::here::Guess;
 use super::intake::Remark;
 use super::lasting::Turn;
@@ -23,12 +25,20 @@ use crate::planning::{PlanAnswer, Planned};
 use crate::progression::Progression;
 use crate::reason::{About, Cause, Reason};
 use crate::record::Entry;
-use fit::{Expected, Fit};
 use ready::Readying;
 
-/// So many searches in a row are ended because goals were abandoned. The next one is not: somebody who
-/// keeps changing goals does not keep the run from acting.
+/// So many searches in a row are ended at once because goals were abandoned. The next one is let go on
+/// for a while ([`Run::end_of_patience`]): somebody who keeps changing goals does not keep the run from
+/// acting.
 const MOST_ENDED: usize = 3;
+
+/// For so many seconds of the world's time a search for goals that were abandoned may go on after that,
+/// or for twice as long as planning is expected to take; and for twice as long again each time that this
+/// is over before there is a plan.
+const PATIENCE: i64 = 5;
+
+/// So many times at most it becomes twice as long.
+const MOST_DOUBLINGS: u32 = 20;
 
 /// For so many seconds of the world's time, at most, a plan that is there waits for the world to say
 /// what was told to start has started.
@@ -50,6 +60,10 @@ pub(super) struct Search {
     /// What the present plan is expected to start until then.
     expected: Vec<Expected>,
     begun: Rational,
+    /// Since when its situation is expected: before it was begun where it was foreseen.
+    since: Rational,
+    /// Whether its situation was foreseen, and things stood otherwise by a little when it was begun.
+    is_guess: bool,
     course: Goes,
     is_made: bool,
     /// Whether something has happened since that nobody expected.
@@ -84,6 +98,8 @@ pub(super) struct Lost {
     outdated: usize,
     /// How many searches in a row were ended because goals were abandoned.
     ended: usize,
+    /// How many of these had been let go on for a while.
+    ended_late: u32,
     /// How many times in a row the plan was to be kept for other goals, and was outdated when it was
     /// ready.
     kept: usize,
@@ -169,42 +185,52 @@ impl Run<'_> {
 
     /// Begins to look for a plan.
     fn search(&mut self, reason: Reason, guess: Guess, course: Goes) {
-        let fit = match &course {
-            Goes::Plan { until } => self.where_the_plan_leads(until.as_ref()),
-            Goes::UnderWay => {
-                let foreseen = self.as_foreseen(guess);
-                let here = || self.situation(&self.allowance, guess);
-                let (situation, running) = foreseen.unwrap_or_else(here);
-                Fit {
-                    situation,
-                    running,
-                    expected: Vec::new(),
-                }
-            }
+        let foreseen = match &course {
+            Goes::Plan { .. } => None,
+            Goes::UnderWay => self.as_foreseen(guess),
         };
+        let ahead = foreseen.unwrap_or_else(|| Ahead {
+            prospect: match &course {
+                Goes::Plan { until } => self.where_the_plan_leads(until.as_ref()),
+                Goes::UnderWay => {
+                    let (situation, running) = self.situation(&self.allowance, guess);
+                    Prospect {
+                        situation,
+                        running,
+                        expected: Vec::new(),
+                    }
+                }
+            },
+            since: self.now.clone(),
+            left_behind: BTreeMap::new(),
+            is_guess: false,
+        });
+        let prospect = ahead.prospect;
         self.ports.recorder.record(&Entry::Planning {
             now: &self.now,
             reason: &reason,
-            situation: &fit.situation,
+            situation: &prospect.situation,
         });
         // Who cannot plan beside the run is waited for.
-        let is_made = !self.ports.planner.begin(&self.task, &fit.situation);
+        let is_made = !self.ports.planner.begin(&self.task, &prospect.situation);
         self.search = Some(Search {
             reason,
             guess,
             task: Arc::clone(&self.task),
             goals: self.goals(),
-            situation: fit.situation,
-            running: fit.running,
-            expected: fit.expected,
+            situation: prospect.situation,
+            running: prospect.running,
+            expected: prospect.expected,
             begun: self.now.clone(),
+            since: ahead.since,
+            is_guess: ahead.is_guess,
             course,
             is_made,
             is_overtaken: false,
             plan: None,
             readying: None,
             tries: 0,
-            left_behind: BTreeMap::new(),
+            left_behind: ahead.left_behind,
             kept_for: None,
         });
     }
@@ -222,6 +248,7 @@ impl Run<'_> {
     /// What the present plan would start is not started any more.
     pub(super) fn let_go_of_plan(&mut self) {
         self.lost.plan = true;
+        self.keep_foreseen();
         if let Some(search) = &mut self.search {
             if search.course != Goes::UnderWay {
                 search.left_behind = self.account.steps().clone();
@@ -234,8 +261,16 @@ impl Run<'_> {
     /// When something about a search is to be decided, whatever happens.
     pub(super) fn next_of_search(&self) -> Option<Rational> {
         let search = self.search.as_ref()?;
+        let next = self.next_whatever_is_asked(search);
+        if self.has_given_up_goals() == Some(true) && !self.is_paused() {
+            return Some(next.min(self.end_of_patience(search)));
+        }
+        Some(next)
+    }
+
+    fn next_whatever_is_asked(&self, search: &Search) -> Rational {
         if let Some(readying) = &search.readying {
-            return Some(self.next_of_readying(readying));
+            return self.next_of_readying(readying);
         }
         if let Some((_, since)) = &search.plan {
             let at_least = &self.now + self.task.epsilon();
@@ -244,13 +279,24 @@ impl Run<'_> {
                 .time
                 .clone()
                 .max(since + Rational::from(WORD));
-            return Some(begins.max(at_least));
+            return begins.max(at_least);
         }
         match &search.course {
-            Goes::Plan { until: Some(until) } => Some(until.clone()),
+            Goes::Plan { until: Some(until) } => until.clone(),
             // Whoever makes the plan says when it is there.
-            _ => Some(self.settings.time_limit.clone()),
+            _ => self.settings.time_limit.clone(),
         }
+    }
+
+    /// Until when a search goes on though goals that it is for were abandoned.
+    ///
+    /// It may be one that never ends, so that this has to be bounded; and if plans take longer than that,
+    /// one must be let come some time, though goals change all the while. So it becomes longer each time.
+    fn end_of_patience(&self, search: &Search) -> Rational {
+        let expected = &self.allowance * &Rational::from(2);
+        let patience = expected.max(Rational::from(PATIENCE));
+        let doublings = self.lost.ended_late.min(MOST_DOUBLINGS);
+        &search.begun + patience * Rational::from(1_i64 << doublings)
     }
 
     /// Sees to a search, if there is one; whether the executor is not to be asked because of it.
@@ -272,9 +318,12 @@ impl Run<'_> {
             return Ok(true);
         }
         let given_up = self.has_given_up_goals();
-        let is_to_end = given_up == Some(true) && self.lost.ended < MOST_ENDED;
+        let is_let_go_on = self.lost.ended >= MOST_ENDED;
+        let is_to_end =
+            given_up == Some(true) && (!is_let_go_on || self.now >= self.end_of_patience(search));
         if given_up.is_some() && (is_to_end || self.has_no_goals()) {
             self.lost.ended += 1;
+            self.lost.ended_late += u32::from(is_let_go_on);
             self.give_up_search();
             return Ok(false);
         }
@@ -353,7 +402,10 @@ impl Run<'_> {
             // There was none from there; from here, there may be.
             _ if search.is_overtaken => self.search_again(&search.reason),
             // What the present plan leads to was only expected.
-            _ if !search.expected.is_empty() || search.course != Goes::UnderWay => {
+            _ if search.is_guess
+                || !search.expected.is_empty()
+                || search.course != Goes::UnderWay =>
+            {
                 self.search_from_here(&search.reason);
                 Ok(())
             }

@@ -85,6 +85,7 @@ impl Run<'_> {
 
     /// Something has happened with which the plan that is being made ready does not reckon.
     pub(in crate::run) fn note_disagreement(&mut self) {
+        self.note_unforeseen();
         let search = self.search.as_mut();
         if let Some(readying) = search.and_then(|search| search.readying.as_mut()) {
             readying.disagrees = true;
@@ -278,6 +279,8 @@ impl Run<'_> {
             running: rest.2.clone(),
             expected: Vec::new(),
             begun: self.now.clone(),
+            since: self.now.clone(),
+            is_guess: false,
             course: Goes::Plan { until: None },
             is_made: true,
             is_overtaken: false,

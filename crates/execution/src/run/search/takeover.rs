@@ -4,8 +4,9 @@ use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 
 use super::super::beginning::Course;
+use super::super::expectation::Expected;
 use super::super::{Run, Stop};
-use super::fit::{Begun, Expected};
+use super::fit::Begun;
 use super::{Goes, Search, WORD};
 use crate::executor::News;
 
@@ -38,8 +39,10 @@ impl Run<'_> {
                 return self.begin_with(course, &search.goals, &mission);
             }
         }
-        if !is_as_expected && !search.expected.is_empty() {
-            // It continues what was never started.
+        let is_known = |ticket| search.running.contains(&ticket);
+        let knows_all = self.account.open_tickets().all(is_known);
+        if !is_as_expected && (!knows_all || !search.expected.is_empty()) {
+            // It continues what was never started, or knows nothing of what still goes on.
             return self.search_again(&search.reason);
         }
         if self.settings.readies_aside {

@@ -1,0 +1,315 @@
+//! What the present plan is expected to lead to.
+//!
+//! What is under way ends, and steps start, in the order of the plan's network and as soon after each
+//! other as it allows, but not before they are planned: where something is late, so is what waits for
+//! it, and only that. What could not be started where things stand by then is not expected, nor what
+//! waits for it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_model::ground::{Action, Body};
+use elbowroom_model::{Situation, Step};
+use elbowroom_num::{Interval, Rational};
+
+use super::Run;
+use super::here::{Guess, situation_at};
+use super::waits::Moment;
+use crate::event::Ticket;
+use crate::executor::{Need, StepId};
+use crate::progression::{Progression, Underway};
+
+/// A start that the present plan is expected to make.
+#[derive(Clone, Debug)]
+pub(super) struct Expected {
+    /// By which it is known in the situation that is expected.
+    pub(super) ticket: Ticket,
+    pub(super) step: StepId,
+    action: Arc<Action>,
+    pub(super) start: Rational,
+    pub(super) duration: Option<Rational>,
+}
+
+impl Expected {
+    pub(super) fn as_step(&self, duration: Option<Rational>) -> Step {
+        Step {
+            action: Arc::clone(&self.action),
+            start: self.start.clone(),
+            duration,
+        }
+    }
+}
+
+/// Where a plan is to begin.
+#[derive(Clone, Debug)]
+pub(super) struct Prospect {
+    pub(super) situation: Situation,
+    /// What is under way there. Tickets that were not given out yet are those of what is expected to
+    /// be started.
+    pub(super) running: Vec<Ticket>,
+    /// What is expected to be started until then.
+    pub(super) expected: Vec<Expected>,
+}
+
+/// How far ahead to look.
+pub(super) struct Reach {
+    /// Where things will stand then is asked.
+    pub(super) time: Rational,
+    /// What would start then, or later, is not expected.
+    pub(super) starts_before: Rational,
+    /// What would end later is not expected to have ended.
+    pub(super) ends_by: Rational,
+    /// What is made of that which is late.
+    pub(super) late: Late,
+}
+
+/// What is expected of an action under way that should have ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Late {
+    /// It takes a quarter longer than it has taken.
+    AQuarterLonger,
+    /// It goes on, but for what is late by no more than [`Run::slack`] and was not warned of: that
+    /// ends now.
+    GoesOn,
+}
+
+/// What is expected to happen, step by step.
+struct Future {
+    belief: Progression,
+    /// When the moments of the plan are expected to happen that have not happened.
+    times: BTreeMap<Moment, Rational>,
+    /// When what is under way ends.
+    ends: Vec<(Rational, Ticket, Option<StepId>)>,
+    to_come: Vec<Expected>,
+    expected: Vec<Expected>,
+}
+
+impl Run<'_> {
+    /// How late something may happen as if it was on time, in seconds: on a clock nothing is on time to
+    /// the millisecond.
+    pub(super) fn slack() -> Rational {
+        Rational::new(1, 4)
+    }
+
+    /// Where the present plan will have led when planning is expected to be over, or at `until`.
+    pub(super) fn where_the_plan_leads(&self, until: Option<&Rational>) -> Prospect {
+        let epsilon = self.task.epsilon();
+        let expected_to_be_over = &self.now + &self.allowance + epsilon;
+        let time = until.cloned().unwrap_or(expected_to_be_over);
+        let before = &time - epsilon;
+        self.expectation(&Reach {
+            time,
+            starts_before: before.clone(),
+            ends_by: before,
+            late: Late::AQuarterLonger,
+        })
+    }
+
+    /// What the present plan is expected to lead to.
+    pub(super) fn expectation(&self, reach: &Reach) -> Prospect {
+        let mut future = self.beginning_of_the_future(reach);
+        while self.lets_happen_what_is_next(&mut future, reach) {}
+        let time = reach.time.clone();
+        let (mut situation, running) = situation_at(&future.belief, time, Guess::AQuarterLonger);
+        if reach.late == Late::AQuarterLonger {
+            // From now on it takes a quarter longer, not from then on.
+            for (ticket, it) in running.iter().zip(&mut situation.running) {
+                let underway = self.belief.running().get(ticket);
+                let end = underway.filter(|it| self.is_due(it));
+                let end = end.and_then(|it| self.expected_end(*ticket, it, reach.late));
+                if let Some(end) = end.filter(|end| *end > situation.time) {
+                    it.duration = Interval::point(end - &it.start);
+                }
+            }
+        }
+        Prospect {
+            situation,
+            running,
+            expected: future.expected,
+        }
+    }
+
+    fn beginning_of_the_future(&self, reach: &Reach) -> Future {
+        let mut belief = self.belief.clone();
+        let _ = belief.advance(&self.now);
+        let mut ends = Vec::new();
+        for (ticket, underway) in self.belief.running() {
+            if let Some(end) = self.expected_end(*ticket, underway, reach.late) {
+                let entry = self.account.get(*ticket);
+                ends.push((end, *ticket, entry.and_then(|entry| entry.step)));
+            }
+        }
+        // What was told to start and has not said that it has, does now.
+        for ticket in self.account.open_tickets() {
+            let entry = self.account.get(ticket);
+            let Some(entry) = entry.filter(|entry| entry.started.is_none()) else {
+                continue;
+            };
+            let duration = entry.planned.clone().unwrap_or_default();
+            if let Some(begun) = begun(&belief, ticket, &entry.action, &self.now, &duration) {
+                belief = begun;
+                ends.push((&self.now + duration, ticket, entry.step));
+            }
+        }
+        Future {
+            belief,
+            times: BTreeMap::new(),
+            ends,
+            to_come: self.to_come(&reach.starts_before),
+            expected: Vec::new(),
+        }
+    }
+
+    /// Whether it should have ended.
+    fn is_due(&self, underway: &Underway) -> bool {
+        &underway.start + &underway.planned <= self.now
+    }
+
+    /// When something that is under way is expected to end; `None` if it is expected to go on.
+    fn expected_end(&self, ticket: Ticket, underway: &Underway, late: Late) -> Option<Rational> {
+        let planned = &underway.start + &underway.planned;
+        if !self.is_due(underway) {
+            return Some(planned);
+        }
+        let soonest = &self.now + self.task.epsilon();
+        match late {
+            Late::AQuarterLonger => {
+                let elapsed = &self.now - &underway.start;
+                let end = &underway.start + elapsed * Rational::new(5, 4);
+                Some(end.max(soonest))
+            }
+            Late::GoesOn => {
+                let entry = self.account.get(ticket);
+                let was_warned_of = entry.is_some_and(|entry| entry.warned.is_some());
+                let is_on_time = planned + Self::slack() >= self.now;
+                (is_on_time && !was_warned_of).then_some(soonest)
+            }
+        }
+    }
+
+    /// The steps of the present plan that have not been started, and may be before some time, with the times before which
+    /// they are not expected to start. Their tickets are not chosen yet.
+    fn to_come(&self, before: &Rational) -> Vec<Expected> {
+        // Others number what they start as they like.
+        if self.ports.executor.need() == Need::PartialOrder {
+            return Vec::new();
+        }
+        let steps = self.account.plan_steps().iter();
+        let left =
+            steps.filter(|(id, step)| step.start < *before && self.account.ticket(*id).is_none());
+        let soonest = &self.now + self.task.epsilon();
+        let left = left.map(|(id, step)| {
+            let window = self.ports.executor.window(*id, false);
+            let earliest = window.and_then(|window| window.earliest);
+            let start = step.start.clone().max(soonest.clone());
+            Expected {
+                ticket: Ticket(0),
+                step: *id,
+                action: Arc::clone(&step.action),
+                start: earliest.map_or(start.clone(), |earliest| earliest.max(start)),
+                duration: step.duration.clone(),
+            }
+        });
+        let mut left: Vec<Expected> = left.collect();
+        // Of what can start at the same time, what was planned first.
+        left.sort_by(|one, other| one.start.cmp(&other.start));
+        left
+    }
+
+    /// When a step can start, if all that it waits for has happened.
+    fn start_in(&self, future: &Future, it: &Expected) -> Option<Rational> {
+        let mut start = it.start.clone().max(future.belief.time().clone());
+        for wait in self.account.waits(it.step) {
+            let expected = future.times.get(&wait.moment);
+            let happened = expected.or_else(|| self.account.time_of(wait.moment))?;
+            start = start.max(happened + &wait.least);
+        }
+        Some(start)
+    }
+
+    /// Lets the next thing happen; whether there was any.
+    fn lets_happen_what_is_next(&self, future: &mut Future, reach: &Reach) -> bool {
+        let starts = future.to_come.iter();
+        let starts = starts
+            .take_while(|it| it.start < reach.starts_before)
+            .enumerate()
+            .filter_map(|(index, it)| Some((self.start_in(future, it)?, index)))
+            .filter(|(time, _)| *time < reach.starts_before);
+        let starts: Vec<(Rational, usize)> = starts.collect();
+        let start = starts.iter().map(|(time, _)| time).min().cloned();
+        let ends = future.ends.iter().enumerate();
+        let ends = ends.filter(|(_, (time, ..))| *time <= reach.ends_by);
+        let end = ends.min_by(|(_, one), (_, other)| one.cmp(other));
+        // Ends before starts: what starts may need what has ended.
+        let end = end.filter(|(_, (time, ..))| start.as_ref().is_none_or(|start| time <= start));
+        if let Some((index, _)) = end {
+            let (time, ticket, step) = future.ends.swap_remove(index);
+            // What cannot be computed is left as it was: what is expected is no promise.
+            let _ = future.belief.arrive(&time);
+            let _ = future.belief.end(ticket, &[]);
+            if let Some(step) = step {
+                future.times.insert((step, true), time);
+            }
+            return true;
+        }
+        let Some(time) = start else {
+            return false;
+        };
+        let now = starts.iter().filter(|(start, _)| *start == time);
+        let now: Vec<usize> = now.map(|(_, index)| *index).collect();
+        let ticket = Ticket(self.account.started() as u64 + future.expected.len() as u64);
+        for index in &now {
+            let it = &future.to_come[*index];
+            let duration = it.duration.clone().unwrap_or_default();
+            if let Some(begun) = begun(&future.belief, ticket, &it.action, &time, &duration) {
+                future.belief = begun;
+                let it = future.to_come.remove(*index);
+                future.start(it, ticket, time);
+                return true;
+            }
+        }
+        // None of them can start.
+        for index in now.into_iter().rev() {
+            future.to_come.remove(index);
+        }
+        true
+    }
+}
+
+impl Future {
+    /// It is taken to start.
+    fn start(&mut self, it: Expected, ticket: Ticket, time: Rational) {
+        match &it.duration {
+            Some(duration) => self.ends.push((&time + duration, ticket, Some(it.step))),
+            None => drop(self.times.insert((it.step, true), time.clone())),
+        }
+        self.times.insert((it.step, false), time.clone());
+        self.expected.push(Expected {
+            ticket,
+            start: time,
+            ..it
+        });
+    }
+}
+
+/// What is believed once an action has begun; `None` if its conditions do not hold.
+fn begun(
+    belief: &Progression,
+    ticket: Ticket,
+    action: &Arc<Action>,
+    time: &Rational,
+    duration: &Rational,
+) -> Option<Progression> {
+    let mut belief = belief.clone();
+    let _ = belief.arrive(time);
+    let (condition, planned) = match &action.body {
+        Body::Instantaneous(snap) => (&snap.condition, None),
+        Body::Durative(body) => (&body.start.condition, Some(duration)),
+    };
+    if belief.held_on_arrival(condition, planned) != Ok(true) {
+        return None;
+    }
+    let _ = belief.start(ticket, action, duration, &[]);
+    let breaks = belief.breaking().iter().any(|(it, _)| *it == ticket);
+    (!breaks).then_some(belief)
+}

@@ -1,0 +1,207 @@
+//! What is foreseen while something is late: where a new plan will begin when one is needed.
+//!
+//! At the warning, the planner is told where a plan will be needed: what is late still goes on there,
+//! and until then everything else starts and ends as the present plan has it. Whenever things come
+//! otherwise, it is foreseen anew; who comes a moment earlier or later than was foreseen changes
+//! nothing, as the plan is made to fit when it is needed.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_num::Rational;
+
+use super::Run;
+use super::expectation::{Expected, Late, Prospect, Reach};
+use super::here::Guess;
+use crate::event::Ticket;
+use crate::executor::StepId;
+
+/// Where a plan will be needed if what is late does not end, as the planner was told.
+pub(super) struct Foreseen {
+    pub(super) prospect: Prospect,
+    /// Since when.
+    pub(super) since: Rational,
+    /// From then on a plan is needed.
+    until: Rational,
+    /// Whether something has happened since that nobody expected.
+    is_overtaken: bool,
+    /// Once the present plan is let go of.
+    left: Option<Left>,
+}
+
+/// What a plan was when it was let go of.
+struct Left {
+    /// What was started of it.
+    steps: BTreeMap<StepId, Ticket>,
+    /// Whether things had come as they were foreseen.
+    is_as_foreseen: bool,
+}
+
+/// A foreseen situation that a plan can be asked for.
+pub(super) struct Ahead {
+    pub(super) prospect: Prospect,
+    pub(super) since: Rational,
+    /// What was started of the plan that was let go of.
+    pub(super) left_behind: BTreeMap<StepId, Ticket>,
+    /// Whether things stand otherwise by a little.
+    pub(super) is_guess: bool,
+}
+
+/// Something that is foreseen to be under way.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Doing {
+    Started(Ticket),
+    ToCome(StepId),
+}
+
+impl Run<'_> {
+    /// Tells the planner from where a plan will be needed at `until`, or before that where something
+    /// else is late, too.
+    pub(super) fn foresee(&mut self, until: &Rational) {
+        let until = self.next_need().unwrap_or_else(|| until.clone());
+        let time = &until + self.margin() + self.task.epsilon();
+        let prospect = self.what_is_foreseen(&until, &until, time);
+        self.ports.planner.expect(&self.task, &prospect.situation);
+        self.foreseen = Some(Foreseen {
+            prospect,
+            since: self.now.clone(),
+            until,
+            is_overtaken: false,
+            left: None,
+        });
+    }
+
+    fn what_is_foreseen(&self, until: &Rational, ends_by: &Rational, time: Rational) -> Prospect {
+        self.expectation(&Reach {
+            time,
+            starts_before: until.clone(),
+            ends_by: ends_by.clone(),
+            late: Late::GoesOn,
+        })
+    }
+
+    /// When a plan is needed if what was warned of does not end.
+    fn next_need(&self) -> Option<Rational> {
+        let needs = self.account.open_tickets().filter_map(|ticket| {
+            let entry = self.account.get(ticket)?;
+            let window = self.ports.executor.window(entry.step?, true)?.latest?;
+            // Where it has got more room since, there is another warning.
+            let until = entry.warned.clone()?;
+            (until >= window && until >= self.now).then_some(until)
+        });
+        needs.min()
+    }
+
+    /// Foresees anew where things have come otherwise than they were foreseen. Returns when to look
+    /// again.
+    pub(super) fn tend_foresight(&mut self) -> Option<Rational> {
+        if !self.settings.watches_room || self.search.is_some() {
+            return None;
+        }
+        let Some(until) = self.next_need() else {
+            // What was late has ended, unless the plan is needed now.
+            self.foreseen.take_if(|it| it.until > self.now);
+            return None;
+        };
+        let foreseen = self.foreseen.as_ref();
+        let is_right = foreseen.is_some_and(|it| it.until == until && self.has_come_as(it));
+        if !is_right {
+            self.foresee(&until);
+        }
+        self.next_doubt(&until)
+    }
+
+    /// When something is late that was expected to end before then.
+    fn next_doubt(&self, until: &Rational) -> Option<Rational> {
+        let doubts = self.belief.running().values().filter_map(|underway| {
+            let planned = &underway.start + &underway.planned;
+            let doubt = &planned + Self::slack() + self.task.epsilon();
+            (planned <= *until && doubt > self.now).then_some(doubt)
+        });
+        doubts.min()
+    }
+
+    /// Something has happened that was not foreseen.
+    pub(super) fn note_unforeseen(&mut self) {
+        if let Some(foreseen) = &mut self.foreseen {
+            foreseen.is_overtaken = true;
+        }
+    }
+
+    /// The present plan is let go of: what was foreseen is kept with what was started of it.
+    pub(super) fn keep_foreseen(&mut self) {
+        if let Some(mut foreseen) = self.foreseen.take() {
+            if foreseen.left.is_none() {
+                foreseen.left = Some(Left {
+                    steps: self.account.steps().clone(),
+                    is_as_foreseen: self.has_come_as(&foreseen),
+                });
+            }
+            self.foreseen = Some(foreseen);
+        }
+    }
+
+    /// The situation that was foreseen, if it is near and things have come, but for moments, as they
+    /// were foreseen; where plans are waited for, without any difference.
+    pub(super) fn as_foreseen(&mut self, guess: Guess) -> Option<Ahead> {
+        let foreseen = self.foreseen.take()?;
+        let Prospect {
+            situation, running, ..
+        } = &foreseen.prospect;
+        let earliest = &self.now + self.task.epsilon();
+        let latest = &earliest + self.margin() + &self.allowance;
+        let is_near = (&earliest..=&latest).contains(&&situation.time);
+        if !is_near || guess != Guess::AQuarterLonger {
+            return None;
+        }
+        let (exactly, tickets) = self.situation_at(situation.time.clone(), guess);
+        let is_guess = exactly != *situation || tickets != *running;
+        let is_as_foreseen = !is_guess
+            || self.plans_aside()
+                && match &foreseen.left {
+                    Some(left) => left.is_as_foreseen && !foreseen.is_overtaken,
+                    None => self.has_come_as(&foreseen),
+                };
+        is_as_foreseen.then(|| Ahead {
+            left_behind: foreseen.left.map(|left| left.steps).unwrap_or_default(),
+            prospect: foreseen.prospect,
+            since: foreseen.since,
+            is_guess,
+        })
+    }
+
+    /// Whether the same will be under way as was foreseen, by what is expected now.
+    fn has_come_as(&self, foreseen: &Foreseen) -> bool {
+        let until = &foreseen.until;
+        let ends_by = (&self.now + self.task.epsilon()).max(until.clone());
+        let time = foreseen.prospect.situation.time.clone();
+        let anew = || self.what_is_foreseen(until, &ends_by, time);
+        !foreseen.is_overtaken
+            && self.doings(&foreseen.prospect, until) == self.doings(&anew(), until)
+    }
+
+    /// What is foreseen to be under way, but for what is to start or end about then.
+    fn doings(&self, prospect: &Prospect, until: &Rational) -> BTreeSet<Doing> {
+        let slack = Self::slack();
+        let is_about_then = |time: &Rational| *time >= until - &slack && *time <= until + &slack;
+        let first = prospect.expected.first().map(|it| it.ticket);
+        let running = prospect.running.iter().zip(&prospect.situation.running);
+        let running = running.filter(|(_, it)| {
+            let end = it
+                .duration
+                .lower
+                .value()
+                .map(|duration| &it.start + duration);
+            !is_about_then(&it.start) && !end.is_some_and(|end| is_about_then(&end))
+        });
+        let doing = |ticket: Ticket| {
+            if first.is_none_or(|first| ticket < first) {
+                return Some(Doing::Started(ticket));
+            }
+            let is_it = |it: &&Expected| it.ticket == ticket;
+            let step = prospect.expected.iter().find(is_it)?.step;
+            let started = self.account.ticket(step).map(Doing::Started);
+            Some(started.unwrap_or(Doing::ToCome(step)))
+        };
+        running.filter_map(|(ticket, _)| doing(*ticket)).collect()
+    }
+}

@@ -1,0 +1,50 @@
+//! What the starts of a plan wait for.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, Node, NodeId};
+
+use crate::executor::{Mission, StepId};
+
+/// The start of a step of a plan, or, where that is true, its end.
+pub(super) type Moment = (StepId, bool);
+
+/// What a start of the present plan waits for.
+#[derive(Clone, Debug)]
+pub(super) struct Wait {
+    pub(super) moment: Moment,
+    /// How long after that it comes at the soonest.
+    pub(super) least: Rational,
+}
+
+/// What the starts of a plan wait for: starts and ends that its network has before them. Times by the
+/// clock are not among these.
+pub(super) fn waits_of(mission: &Mission) -> BTreeMap<StepId, Vec<Wait>> {
+    let plan = &mission.plan.plan;
+    let moment = |node: NodeId| match plan.nodes[node.index()] {
+        Node::Start(id) | Node::Instant(id) => Some((StepId::from(id), false)),
+        Node::End(id) => Some((StepId::from(id), true)),
+        Node::Zero | Node::Timed(_) => None,
+    };
+    let mut waits: BTreeMap<StepId, Vec<Wait>> = BTreeMap::new();
+    let mut order = |earlier: NodeId, later: NodeId, least: Rational| {
+        let (Some(moment), Some((step, false))) = (moment(earlier), moment(later)) else {
+            return;
+        };
+        // Starts that fall together do not wait for each other.
+        let follows = moment.1 || mission.nominal[earlier] < mission.nominal[later];
+        if moment.0 != step && (least.is_positive() || (least.is_zero() && follows)) {
+            waits.entry(step).or_default().push(Wait { moment, least });
+        }
+    };
+    for constraint in plan.constraints_at(&mission.plan.nominal()) {
+        if let Bound::Finite(lower) = constraint.lower {
+            order(constraint.from, constraint.to, lower);
+        }
+        if let Bound::Finite(upper) = constraint.upper {
+            order(constraint.to, constraint.from, -upper);
+        }
+    }
+    waits
+}
