@@ -100,6 +100,7 @@ fn live_gives_up_what_runs_too_long_for_the_numbers_while_it_runs() {
         let mut scene = Scene::case(case);
         // The world decides how long they take, although the domain leaves it open.
         scene.flow.vary = vec!["durations".parse().expect("a specification")];
+        scene.settings.most_replans = 0;
         let report = scene.run("live", &scene.world(world), 0);
         let reason = &report.reasons[0];
         assert_eq!(reason.cause, Cause::Outlived, "{case}: {report:#?}");

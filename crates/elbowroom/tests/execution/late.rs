@@ -255,7 +255,7 @@ impl World for Mute<'_> {
 #[test]
 fn what_was_never_heard_to_start_is_waited_for_as_long_as_the_plan_can_bear_it() {
     let (scene, _) = walker(Rational::from(10));
-    for executor in ["guarded", "live", "stn", "esterel"] {
+    for executor in ["guarded", "live", "stn"] {
         let model = scene.world("");
         let mut world = Mute {
             inner: SimWorld::new(Arc::clone(&scene.task), &model, 1),
