@@ -400,3 +400,9 @@ pub(super) fn exit(verdict: &Verdict) -> Answer {
         }
     })
 }
+        Verdict::PlannerFailed { why } => {
+            return Err(Failure::new(
+                format!("the planner failed: {}", tame(why)),
+                "`elbowroom plan` with the same planner says more; this does not say that there is no plan",
+            ));
+        }

@@ -88,7 +88,7 @@ fn cut(path: &Path) -> Result<Cut, Failure> {
         stored = read(&journal)?;
     }
     if let Some(Line::Over(report)) = stored.lines.last()
-        && report.verdict != NO_PLAN
+        && !WITHOUT_PLAN.contains(&report.verdict.as_str())
     {
         return Err(Failure::new(
             format!("the run of {name} is over: {}", report.verdict),
@@ -281,8 +281,9 @@ pub(in crate::commands) fn run(
 /// The verdict of a run whose world has died.
 const WORLD_FAILED: &str = "world-failed";
 
-/// The verdict of a run for which no plan was found, which is not to say that there is none.
-const NO_PLAN: &str = "no-plan";
+/// The verdicts of a run for which no plan was found, which is not to say that there is none. Before
+/// the second was told apart, planners that failed ended in the first.
+const WITHOUT_PLAN: [&str; 2] = ["no-plan", "planner-failed"];
 
 /// Whether it is an answer of the world.
 fn is_answer(line: &Line) -> bool {

@@ -54,6 +54,10 @@ pub(super) fn human(answer: &RunAnswer, report: &Report) -> String {
         ),
     };
     if let Some(choice) = &answer.first_plan {
+        Verdict::PlannerFailed { .. } => format!(
+            "{}: the planner failed at {time}, after {replans}\n",
+            styled(BAD, "failed")
+        ),
         let words = wrapped(&tame(choice), width, 2);
         let _ = writeln!(text, "\n{}\n{words}", styled(STRONG, "The first plan"));
     }
