@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use elbowroom::execute::read_goal;
+use elbowroom::execute::{misfit, read_goal};
 use elbowroom::execution::Request;
 use elbowroom::execution::run::FIRST_GOAL;
 use elbowroom::executive::documents::{
@@ -69,7 +69,10 @@ impl Front {
         let (status, task) = self.run()?;
         let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
         let read = read_goal(task, &given.goal);
-        read.map_err(|why| Refused::new(422, why, help))?;
+        let read = read.map_err(|why| Refused::new(422, why, help))?;
+        if let Some(why) = misfit(task.problem(), &read) {
+            return Err(Refused::new(422, why, help));
+        }
         let name = given.name.map(named).transpose()?;
         let name = name.unwrap_or_else(|| self.new_name(&status.goals()));
         let goal = given.goal.trim().to_owned();
