@@ -54,6 +54,13 @@ struct Cut {
 /// Reads the journal of a run that can be gone on with.
 fn cut(path: &Path) -> Result<Cut, Failure> {
     let name = path.display().to_string();
+    // Who opens a named pipe may wait for ever for somebody to write.
+    if std::fs::metadata(path).is_ok_and(|it| !it.is_file()) {
+        return Err(Failure::new(
+            format!("{name} is no file"),
+            "name the file that --journal has written",
+        ));
+    }
     let length = std::fs::metadata(path).map_or(0, |it| it.len());
     let text = input::source(path, "journal")?;
     if !crate::journal::is_journal(text.text()) {
@@ -275,7 +282,8 @@ pub(in crate::commands) fn run(
     if let Some(line) = past.difference() {
         return Err(leads_elsewhere(&name, line));
     }
-    super::conclude(arguments, &outcome, file.trouble().as_deref(), output)
+    let trouble = file.trouble();
+    super::conclude((arguments, &spec), outcome, trouble.as_deref(), output)
 }
 
 /// The verdict of a run whose world has died.
