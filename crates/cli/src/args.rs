@@ -15,7 +15,7 @@ mod world_check;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use elbowroom::num::Rational;
 
@@ -31,13 +31,18 @@ pub(crate) use run::{FirstPlanChoice, RunArgs, RunningChoice};
 pub(crate) use serve::{CtlArgs, CtlCommand, ServeArgs};
 pub(crate) use world_check::WorldCheckArgs;
 
+use crate::look;
+
+/// Wider help is hard to read.
+const MAX_HELP_WIDTH: usize = 100;
+
 /// How much elbow room does a temporal plan have?
 #[derive(Debug, Parser)]
 #[command(
     name = "elbowroom",
     version,
     propagate_version = true,
-    max_term_width = 100
+    max_term_width = MAX_HELP_WIDTH
 )]
 #[command(long_about = "How much elbow room does a temporal plan have?\n\n\
     Elbowroom reads PDDL 2.1 problems with durative actions. It finds plans, itself or with another \
@@ -81,8 +86,20 @@ impl From<Colour> for anstream::ColorChoice {
     }
 }
 
+/// Reads the command line. Where that cannot be done, or help is asked for, this ends the process.
+pub(crate) fn read(line: Vec<OsString>) -> CommandLine {
+    let mut command = CommandLine::command();
+    if let Some(columns) = look::columns() {
+        command = command.term_width(columns.min(MAX_HELP_WIDTH));
+    }
+    let matches = command.try_get_matches_from_mut(spoken(line));
+    let matches = matches.unwrap_or_else(|error| error.exit());
+    let read = CommandLine::from_arg_matches(&matches);
+    read.unwrap_or_else(|error| error.format(&mut command).exit())
+}
+
 /// The command line; a program that is called as VAL is takes VAL's.
-pub(crate) fn spoken(mut line: Vec<OsString>) -> Vec<OsString> {
+fn spoken(mut line: Vec<OsString>) -> Vec<OsString> {
     let program = line.first().map(Path::new).and_then(Path::file_stem);
     if program.is_some_and(|name| name.eq_ignore_ascii_case("validate")) {
         line.insert(1, "val".into());

@@ -37,6 +37,44 @@ pub(crate) fn launch(command: &str) -> Result<(Child, Mouth, Ears), String> {
     }
 }
 
+/// Whether there is such a program, as far as that can be said without starting it.
+///
+/// # Errors
+/// In words, when there is none.
+pub(crate) fn find(command: &str) -> Result<(), String> {
+    let name = command
+        .split_whitespace()
+        .next()
+        .ok_or("the command is empty")?;
+    // Elsewhere, names of programs have endings that are not said.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let look = |path: &Path| {
+            let found = std::fs::metadata(path)?;
+            if found.is_file() && found.permissions().mode() & 0o111 != 0 {
+                return Ok(());
+            }
+            Err(io::Error::from(io::ErrorKind::PermissionDenied))
+        };
+        let found = if name.contains('/') {
+            look(Path::new(name))
+        } else {
+            let none = Err(io::Error::from(io::ErrorKind::NotFound));
+            std::env::var_os("PATH").map_or(Ok(()), |folders| {
+                std::env::split_paths(&folders)
+                    .map(|folder| look(&folder.join(name)))
+                    .find(Result::is_ok)
+                    .unwrap_or(none)
+            })
+        };
+        found.map_err(|error| no_program(name, &error))?;
+    }
+    #[cfg(not(unix))]
+    let _ = name;
+    Ok(())
+}
+
 /// Why this is no program that can be started: of a folder, the system only says that it is forbidden.
 fn no_program(name: &str, error: &io::Error) -> String {
     let path = Path::new(name);

@@ -30,6 +30,19 @@ struct Inner {
     changed: Condvar,
 }
 
+/// What became of a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reception {
+    /// The run has taken it in.
+    Taken,
+    /// The run has not taken it in yet.
+    Waits,
+    /// The journal cannot be written, so that the run takes in nothing more.
+    Lost,
+    /// The run has ended before it took it in.
+    Over,
+}
+
 #[derive(Default)]
 struct State {
     waiting: VecDeque<Ask>,
@@ -38,6 +51,10 @@ struct State {
     fetched: u64,
     recorded: u64,
     taken: u64,
+    /// The journal cannot be written.
+    is_lost: bool,
+    /// The run has ended.
+    is_over: bool,
 }
 
 impl Desk {
@@ -59,13 +76,35 @@ impl Desk {
         Some(state.given)
     }
 
-    /// Waits until the run has taken in that request, but not for long; whether it has.
-    pub(crate) fn await_taken(&self, number: u64, patience: Duration) -> bool {
+    /// Waits until the run has taken in that request, or will not any more, but not for long.
+    pub(crate) fn await_taken(&self, number: u64, patience: Duration) -> Reception {
         let state = self.lock();
-        let waits = |state: &mut State| state.taken < number;
+        let waits = |state: &mut State| state.taken < number && !state.is_lost && !state.is_over;
         let waited = self.0.changed.wait_timeout_while(state, patience, waits);
         let (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        state.taken >= number
+        match () {
+            () if state.taken >= number => Reception::Taken,
+            () if state.is_lost => Reception::Lost,
+            () if state.is_over => Reception::Over,
+            () => Reception::Waits,
+        }
+    }
+
+    /// The journal cannot be written: what is not taken in yet, will not be.
+    pub(crate) fn lose(&self) {
+        self.lock().is_lost = true;
+        self.0.changed.notify_all();
+    }
+
+    /// Whether the run ends because the journal cannot be written.
+    pub(crate) fn is_lost(&self) -> bool {
+        self.lock().is_lost
+    }
+
+    /// The run has ended: what is not taken in yet, will not be.
+    pub(crate) fn close(&self) {
+        self.lock().is_over = true;
+        self.0.changed.notify_all();
     }
 
     /// Whether nothing waits to be fetched.
@@ -129,7 +168,7 @@ impl Desk {
 
 #[cfg(test)]
 mod tests {
-    use super::{Ask, Desk, MOST_WAITING};
+    use super::{Ask, Desk, MOST_WAITING, Reception};
     use elbowroom::execution::Request;
     use std::time::Duration;
 
@@ -141,16 +180,45 @@ mod tests {
             .expect("room");
         let soon = Duration::from_millis(1);
         desk.acknowledge();
-        assert!(!desk.await_taken(number, soon), "it was not fetched");
+        let is_waiting = |desk: &Desk| desk.await_taken(number, soon) == Reception::Waits;
+        assert!(is_waiting(&desk), "it was not fetched");
         desk.lock().fetched = number;
         assert!(desk.has_fetched());
         desk.acknowledge();
-        assert!(!desk.await_taken(number, soon), "it was not recorded");
+        assert!(is_waiting(&desk), "it was not recorded");
         assert!(!desk.is_clear());
         desk.note_recorded();
         assert!(!desk.has_fetched());
         desk.acknowledge();
-        assert!(desk.await_taken(number, soon) && desk.is_clear());
+        assert_eq!(desk.await_taken(number, soon), Reception::Taken);
+        assert!(desk.is_clear());
+    }
+
+    /// Whoever waits is told at once, not when their patience is over.
+    #[test]
+    fn a_request_that_is_never_taken_in_is_not_waited_for() {
+        let long = Duration::from_secs(600);
+        let hand_in = |desk: &Desk| {
+            desk.hand_in(vec![Ask::Request(Request::Pause)])
+                .expect("room")
+        };
+        for (end, reception) in [
+            (Desk::lose as fn(&Desk), Reception::Lost),
+            (Desk::close, Reception::Over),
+        ] {
+            let desk = Desk::default();
+            let taken = hand_in(&desk);
+            desk.lock().fetched = taken;
+            desk.note_recorded();
+            desk.acknowledge();
+            let number = hand_in(&desk);
+            std::thread::scope(|scope| {
+                let waiting = scope.spawn(|| desk.await_taken(number, long));
+                end(&desk);
+                assert_eq!(waiting.join().expect("an answer"), reception);
+            });
+            assert_eq!(desk.await_taken(taken, long), Reception::Taken);
+        }
     }
 
     #[test]

@@ -73,6 +73,24 @@ impl Failure {
         &self.message
     }
 
+    /// What is wrong, in a sentence: of a text, the first mistake in it.
+    pub(crate) fn sentence(&self) -> String {
+        match self.diagnostics.first() {
+            Some(first) => {
+                let (file, line, column) = (&first.file, first.line, first.column);
+                format!("{file}:{line}:{column}: {}", first.message)
+            }
+            None => self.message.clone(),
+        }
+    }
+
+    /// What the user can do about it.
+    pub(crate) fn advice(&self) -> Option<&str> {
+        let first = self.diagnostics.first();
+        let own = first.and_then(|first| first.advice.as_deref());
+        own.or(self.advice.as_deref())
+    }
+
     /// Where texts are wrong.
     pub(crate) fn diagnostics(&self) -> &[Record] {
         &self.diagnostics

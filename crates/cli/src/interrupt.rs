@@ -1,8 +1,8 @@
 //! Ctrl-C, or a request to terminate, ends a search with the best result so far, and a run in
 //! order.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use crate::exit::Exit;
 
@@ -12,17 +12,22 @@ pub(crate) struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
     /// From now on, the first Ctrl-C (SIGINT, SIGTERM or SIGHUP) asks to stop, and the second ends
-    /// the program.
+    /// the program. A process has one handler of signals, so this is the same flag whenever it is
+    /// asked for.
     pub(crate) fn listen() -> Self {
-        let interrupt = Self::default();
-        let flag = interrupt.clone();
-        // Where no handler can be installed, Ctrl-C ends the program, as it does anyway.
-        let _ = ctrlc::set_handler(move || {
-            if flag.0.swap(true, Ordering::SeqCst) {
-                std::process::exit(Exit::Interrupted as i32);
-            }
+        static LISTENED: OnceLock<Interrupt> = OnceLock::new();
+        let listened = LISTENED.get_or_init(|| {
+            let interrupt = Self::default();
+            let flag = interrupt.clone();
+            // Where no handler can be installed, Ctrl-C ends the program, as it does anyway.
+            let _ = ctrlc::set_handler(move || {
+                if flag.0.swap(true, Ordering::SeqCst) {
+                    std::process::exit(Exit::Interrupted as i32);
+                }
+            });
+            interrupt
         });
-        interrupt
+        listened.clone()
     }
 
     /// Asks to stop, as the first Ctrl-C does.
@@ -33,5 +38,17 @@ impl Interrupt {
     /// Whether Ctrl-C was pressed, or a stop was asked for in another way.
     pub(crate) fn is_requested(&self) -> bool {
         self.0.load(Ordering::SeqCst)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Interrupt;
+    use std::sync::Arc;
+
+    #[test]
+    fn whoever_listens_again_hears_the_same() {
+        let (one, other) = (Interrupt::listen(), Interrupt::listen());
+        assert!(Arc::ptr_eq(&one.0, &other.0));
     }
 }

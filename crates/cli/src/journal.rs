@@ -58,8 +58,9 @@ pub(crate) struct Journal {
 }
 
 impl JournalFile {
-    /// An empty journal. One that has something in it is not overwritten.
-    pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
+    /// An empty journal. One that has something in it is not overwritten; `resume` is the command that
+    /// goes on with it.
+    pub(crate) fn create(path: &Path, resume: &str) -> Result<Self, Failure> {
         let name = path.display();
         let open = || {
             let mut options = OpenOptions::new();
@@ -70,8 +71,9 @@ impl JournalFile {
         if file.metadata().is_ok_and(|it| it.is_file() && it.len() > 0) {
             return Err(Failure::new(
                 format!("there is a journal {name} already"),
-                "`elbowroom run --resume` goes on with its run; if that is over, choose another file, or remove \
-                 this one",
+                format!(
+                    "`{resume}` goes on with its run; if that is over, choose another file, or remove this one"
+                ),
             ));
         }
         // A file that nobody finds after a power failure is none. Not every system can do this.
@@ -146,6 +148,11 @@ impl JournalFile {
             };
         }
         self.error.is_none()
+    }
+
+    /// Where it is.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Why not all records were written, if so.

@@ -33,8 +33,6 @@ mod wrap;
 
 use std::ffi::OsString;
 
-use clap::Parser;
-
 use args::{Command, CommandLine};
 use exit::Exit;
 use output::Output;
@@ -45,7 +43,7 @@ use output::Output;
 /// panic and a second Ctrl-C end the process, and what is asked for is printed.
 pub fn run(line: Vec<OsString>) -> u8 {
     bug::install_hook();
-    let CommandLine { color, command } = CommandLine::parse_from(args::spoken(line));
+    let CommandLine { color, command } = args::read(line);
     anstream::ColorChoice::from(color).write_global();
     let as_json = command.is_json();
     let mut output = Output::default();

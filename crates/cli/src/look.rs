@@ -31,13 +31,27 @@ impl Look {
         if !io::stdout().is_terminal() {
             return Self::PLAIN;
         }
-        let width =
-            terminal_size::terminal_size().map_or(DEFAULT_WIDTH, |(width, _)| usize::from(width.0));
+        let width = columns().unwrap_or(DEFAULT_WIDTH);
         Self {
             width: width.clamp(40, MAX_WIDTH),
             unicode: locale_is_utf8(),
         }
     }
+}
+
+/// How wide the terminal is that standard output is shown on, if it is one and says so.
+pub(crate) fn columns() -> Option<usize> {
+    if !io::stdout().is_terminal() {
+        return None;
+    }
+    let known = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
+    // A terminal without a height, as behind a serial line or `script`, can have a width all the same.
+    #[cfg(unix)]
+    let known = known.or_else(|| {
+        let size = rustix::termios::tcgetwinsize(io::stdout()).ok()?;
+        Some(usize::from(size.ws_col)).filter(|width| *width > 0)
+    });
+    known
 }
 
 /// Whether the locale's character encoding is UTF-8, by the variables in POSIX order.

@@ -487,6 +487,28 @@ fn a_planner_that_dies_is_not_taken_for_one_that_says_there_is_no_plan() {
         said.contains("false") && !said.contains("unsolvable"),
         "{said}"
     );
+    // In a run, the same; and that it has no planner is no failure of one.
+    let in_a_run = |planner: &str| {
+        let line = ["--planner", planner, "--json"];
+        let done = elbowroom(&[&["run"], &DELIVERY[..], &line].concat());
+        let answer: serde_json::Value = serde_json::from_slice(&done.stdout).expect("JSON");
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        (done.status.code(), answer["verdict"].clone(), said)
+    };
+    for crash in [
+        "false {domain} {problem}",
+        "sh -c 'kill -SEGV $$' {domain} {problem}",
+    ] {
+        let (code, verdict, said) = in_a_run(crash);
+        assert_eq!(
+            (code, verdict),
+            (Some(2), "planner-failed".into()),
+            "{said}"
+        );
+        assert!(said.contains("the planner failed"), "{said}");
+    }
+    let (code, verdict, said) = in_a_run("none");
+    assert_eq!((code, verdict), (Some(1), "no-plan".into()), "{said}");
     // A goal that is true already is no mistake.
     let task = errands("(here book)");
     let report = run(&task, &mut Toy::default());

@@ -5,6 +5,10 @@
 #[path = "executive/client.rs"]
 mod client;
 mod command;
+#[path = "executive/faults.rs"]
+mod faults;
+#[path = "executive/first.rs"]
+mod first;
 #[path = "executive/killed.rs"]
 mod killed;
 #[path = "executive/meanwhile.rs"]
@@ -309,6 +313,14 @@ fn who_may_not_or_talks_nonsense_gets_one_clear_sentence() {
             json!({"goal": "(done a1)", "name": "a/b"}).to_string(),
             422,
             "no name for a goal",
+        ),
+        (
+            "POST",
+            "/v1/goals",
+            Some(TOKEN),
+            json!({"goal": "(and (done a1) (not (done r)))"}).to_string(),
+            422,
+            "the problem has no fact `(done r)`: `r` is not of type errand",
         ),
         (
             "DELETE",

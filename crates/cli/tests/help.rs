@@ -1,5 +1,9 @@
 //! The help is laid out for a terminal of 80 columns.
 
+#[cfg(target_os = "linux")]
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
+
 use std::process::Command;
 
 /// The help of a subcommand, or of the whole command, on a terminal of so many columns.
@@ -68,4 +72,28 @@ fn tables_in_the_help_look_the_same_in_80_columns() {
         }
     }
     assert!(rows > 20, "{rows} rows");
+}
+
+/// A terminal says how wide it is, also one that does not say how high.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_help_fits_into_a_terminal_of_unknown_height() {
+    let line = format!(
+        "stty cols 70 rows 0; '{}' ctl --help",
+        env!("CARGO_BIN_EXE_elbowroom")
+    );
+    let output = Command::new("script")
+        .args(["-qc", &line, "/dev/null"])
+        .env("NO_COLOR", "1")
+        .stdin(std::process::Stdio::null())
+        .output();
+    let Ok(output) = output else {
+        skipped::skipped("there is no `script`");
+        return;
+    };
+    let help = String::from_utf8(output.stdout).expect("text");
+    assert!(help.contains("Usage:"), "{help}");
+    for line in help.lines() {
+        assert!(line.trim_end().chars().count() <= 70, "{line}");
+    }
 }

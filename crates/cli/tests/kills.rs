@@ -296,8 +296,10 @@ fn a_run_whose_planner_dies_again_and_again_ends_and_goes_on_when_there_is_one()
     for (asked, line) in [(2, &line[..]), (4, &resume)] {
         let output = awaited(started(line), "the run");
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert_eq!(output.status.code(), Some(1), "{output:?}");
-        assert!(text.contains("it crashed (SIGKILL"), "{text}");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{output:?}");
+        assert!(text.contains("failed: the planner failed"), "{text}");
+        assert!(said.contains("it crashed (SIGKILL"), "{said}");
         assert_eq!(lines(&folder, "asked").len(), asked, "{text}");
     }
     assert!(lines(&folder, "begun").is_empty());

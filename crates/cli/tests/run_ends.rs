@@ -217,7 +217,16 @@ fn a_second_ctrl_c_ends_the_run_at_once() {
 /// One action fails while another one runs, and nobody makes another plan.
 #[test]
 fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop() {
-    for (number, planner) in ["none", "false {domain} {problem}"].iter().enumerate() {
+    let planners = [
+        ("none", 1, "no plan to go on with", "no-plan"),
+        (
+            "false {domain} {problem}",
+            2,
+            "the planner failed",
+            "planner-failed",
+        ),
+    ];
+    for (number, (planner, code, words, verdict)) in planners.into_iter().enumerate() {
         let place = Place::new(&format!("planner-{number}"));
         let plan = root()
             .join("cases/delivery/plan.plan")
@@ -233,16 +242,16 @@ fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop()
         ];
         let child = place.run(ROBOT, "1", &options);
         let output = child.wait_with_output().expect("it ends");
-        assert_eq!(output.status.code(), Some(1), "{planner}: {output:?}");
+        assert_eq!(output.status.code(), Some(code), "{planner}: {output:?}");
         let text = String::from_utf8_lossy(&output.stdout);
-        assert!(text.contains("no plan to go on with"), "{planner}: {text}");
+        assert!(text.contains(words), "{planner}: {text}");
         assert!(!text.contains("still running"), "{planner}: {text}");
         let told = place.told();
         // The one that failed has ended by itself.
         assert_eq!(count(&told, "start"), 2, "{planner}: {told:?}");
         assert_eq!(count(&told, "cancel"), 1, "{planner}: {told:?}");
         assert_eq!(told.last().expect("a message")["type"], "stop", "{planner}");
-        assert_eq!(last_entry(&place)["verdict"], "no-plan", "{planner}");
+        assert_eq!(last_entry(&place)["verdict"], verdict, "{planner}");
     }
 }
 

@@ -56,9 +56,9 @@ fn a_plan_that_does_not_fit_the_situation_is_refused() {
     let world_name = world.display().to_string();
     let arguments = ["--planner", &line, "--world", &world_name, "--json"];
     let output = elbowroom(&[&["run", DELIVERY[0], DELIVERY[1]], &arguments[..]].concat());
-    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
     let said = text(&output.stdout);
-    assert!(said.contains("no-plan"), "{said}");
+    assert!(said.contains("planner-failed"), "{said}");
     for file in [script, world] {
         fs::remove_file(file).expect("it is there");
     }

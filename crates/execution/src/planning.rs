@@ -108,6 +108,30 @@ pub enum PlanAnswer {
         /// Why not.
         why: String,
     },
+    /// The planner has failed, which says nothing about plans: it has crashed, for example.
+    Failed {
+        /// How.
+        why: String,
+    },
+}
+
+impl PlanAnswer {
+    /// Why there is no plan, in words.
+    pub fn why_not(&self) -> Option<&str> {
+        match self {
+            Self::Plan(_) => None,
+            Self::Unsolvable => Some("no plan reaches the goal from here"),
+            Self::NotFound { why } | Self::Failed { why } => Some(why),
+        }
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> Option<&TimeTriggeredPlan> {
+        match self {
+            Self::Plan(plan) => Some(plan),
+            Self::Unsolvable | Self::NotFound { .. } | Self::Failed { .. } => None,
+        }
+    }
 }
 
 /// Answers that there is no plan to be had: for runs of a single given plan.

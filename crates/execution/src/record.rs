@@ -111,6 +111,8 @@ pub enum Entry<'a> {
         why_not: Option<&'a str>,
         /// Whether it is certain that there is none.
         is_unsolvable: bool,
+        /// Whether there is none because the planner has failed.
+        has_failed: bool,
         /// What the planner has to say about it.
         remark: Option<&'a str>,
     },

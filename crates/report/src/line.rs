@@ -444,6 +444,13 @@ pub struct PlannedLine {
     /// Whether it is certain that there is none.
     #[serde(rename = "unsolvable")]
     pub is_unsolvable: bool,
+    /// Whether there is none because the planner has failed; left out where it has not.
+    #[serde(
+        rename = "planner_failed",
+        default,
+        skip_serializing_if = "std::ops::Not::not"
+    )]
+    pub has_failed: bool,
     /// What the planner has to say about it: why it is this plan; left out where it is nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,

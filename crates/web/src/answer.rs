@@ -336,7 +336,7 @@ fn ran(
             Verdict::Unsolvable | Verdict::NoPlan { .. } => NO,
             Verdict::ReplanLimit | Verdict::TimeLimit => LIMIT,
             Verdict::Interrupted => INTERRUPTED,
-            Verdict::WorldFailed { .. } => BAD_INPUT,
+            Verdict::PlannerFailed { .. } | Verdict::WorldFailed { .. } => BAD_INPUT,
         },
         document: document(&outcome.answer, &read.warnings)?,
         trace: Some(trace),

@@ -119,15 +119,20 @@ impl Desk<'_> {
         let status = answer.status;
         let text = answer.text().map_err(|error| self.unreachable(&error))?;
         if status >= 300 {
-            return Err(match serde_json::from_str::<Refusal>(&text) {
-                Ok(refusal) => Failure::new(tame(&refusal.error), tame(&refusal.help)),
-                Err(_) => self.unlike(&format!("it answers with status {status}")),
-            });
+            return Err(self.refused(status, &text));
         }
         let unlike = |error: serde_json::Error| self.unlike(&error.to_string());
         let value: Value = serde_json::from_str(&text).map_err(unlike)?;
         let document = T::deserialize(&value).map_err(unlike)?;
         Ok((document, value))
+    }
+
+    /// Why the executive does not do what it is asked, in its own words.
+    fn refused(&self, status: u16, text: &str) -> Failure {
+        match serde_json::from_str::<Refusal>(text) {
+            Ok(refusal) => Failure::new(tame(&refusal.error), tame(&refusal.help)),
+            Err(_) => self.unlike(&format!("it answers with status {status}")),
+        }
     }
 
     fn unlike(&self, why: &str) -> Failure {
@@ -183,8 +188,10 @@ impl Desk<'_> {
             format!("/v1/events?after={after}")
         });
         let answer = self.asked(("GET", &path), None)?;
-        if answer.status != 200 {
-            return Err(self.unlike(&format!("it answers with status {}", answer.status)));
+        let status = answer.status;
+        if status != 200 {
+            let text = answer.text().map_err(|error| self.unreachable(&error))?;
+            return Err(self.refused(status, &text));
         }
         let mut is_over = false;
         for line in answer.lines() {

@@ -15,7 +15,6 @@ mod text;
 pub(super) mod trace_file;
 
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -38,7 +37,7 @@ use crate::desk::Desk;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::journal::{JournalFile, Segments};
+use crate::journal::JournalFile;
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 use crate::words::tame;
@@ -72,15 +71,34 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let attendance = attendance(arguments);
     let interrupt = Interrupt::listen();
     let job = Job {
+        journal: journal(arguments, RESUME)?,
+        begun: &|| (),
         aside: aside(arguments, &interrupt),
         spec: &spec,
         task: &task,
         first,
         interrupt: &interrupt,
         attendance: &attendance,
-        segments: None,
     };
     job.execute(arguments, output)
+}
+
+/// What goes on with the journal of a run that ends with its goal.
+pub(super) const RESUME: &str = "elbowroom run --resume";
+
+/// What goes on with the journal of an executive.
+pub(super) const RESUME_SERVE: &str = "elbowroom serve --resume";
+
+/// The journal that is asked for, which is empty yet. That there is no such program as its world is told
+/// before.
+pub(super) fn journal(arguments: &RunArgs, resume: &str) -> Result<Option<JournalFile>, Failure> {
+    let Some(command) = &arguments.world_process else {
+        return Ok(None);
+    };
+    process::look_for(command)?;
+    let path = arguments.journal.as_deref();
+    path.map(|path| JournalFile::create(path, resume))
+        .transpose()
 }
 
 /// How plans are made in threads of their own.
@@ -130,29 +148,45 @@ pub(super) fn checked(
     Ok((Arc::new(task), first))
 }
 
-fn show(arguments: &RunArgs, outcome: &RunOutcome, output: &mut Output) -> Result<(), Failure> {
+fn show(
+    arguments: &RunArgs,
+    outcome: &RunOutcome,
+    has_lost: bool,
+    output: &mut Output,
+) -> Result<(), Failure> {
     if arguments.json {
         output.document(&outcome.answer)
     } else {
-        output::print(&text::human(&outcome.answer, &outcome.report))
+        output::print(&text::human(&outcome.answer, &outcome.report, has_lost))
     }
 }
 
 /// Shows what came of a run with a journal; `trouble` is why that could not be written.
 pub(super) fn conclude(
-    arguments: &RunArgs,
-    outcome: &RunOutcome,
+    (arguments, spec): (&RunArgs, &RunSpec),
+    mut outcome: RunOutcome,
     trouble: Option<&str>,
     output: &mut Output,
 ) -> Answer {
-    show(arguments, outcome, output)?;
-    match trouble {
-        Some(why) => Err(Failure::new(
-            format!("the journal cannot be written ({why}), so the run was ended in order"),
-            "make room on the disk; `elbowroom run --resume` goes on from what the journal has",
-        )),
-        None => exit(outcome.verdict()),
+    let Some(why) = trouble else {
+        show(arguments, &outcome, false, output)?;
+        return exit(outcome.verdict());
+    };
+    // Nobody has asked it to end.
+    let has_lost = *outcome.verdict() == Verdict::Interrupted;
+    if has_lost {
+        outcome.answer.report.why = Some(format!("the journal cannot be written: {why}"));
     }
+    show(arguments, &outcome, has_lost, output)?;
+    let resume = if spec.is_lasting {
+        RESUME_SERVE
+    } else {
+        RESUME
+    };
+    Err(Failure::new(
+        format!("the journal cannot be written ({why}), so the run was ended in order"),
+        format!("make room on the disk; `{resume}` goes on from what the journal has"),
+    ))
 }
 
 /// The problem of a specification, with its warnings told.
@@ -182,15 +216,17 @@ pub(super) struct Job<'a> {
     pub(super) interrupt: &'a Interrupt,
     pub(super) attendance: &'a Attendance,
     pub(super) aside: Aside,
-    /// When the journal is begun anew, if it is to be.
-    pub(super) segments: Option<Segments>,
+    /// Its journal, which is empty, if it is to have one.
+    pub(super) journal: Option<JournalFile>,
+    /// Told when the run begins, and its first record is on the disk if there is a journal.
+    pub(super) begun: &'a dyn Fn(),
 }
 
 impl Job<'_> {
     /// The run that the arguments ask for, from its beginning to its exit code.
-    pub(super) fn execute(self, arguments: &RunArgs, output: &mut Output) -> Answer {
-        if let (Some(path), Some(command)) = (&arguments.journal, &arguments.world_process) {
-            return self.journaled(path, command, arguments, output);
+    pub(super) fn execute(mut self, arguments: &RunArgs, output: &mut Output) -> Answer {
+        if let (Some(file), Some(command)) = (self.journal.take(), &arguments.world_process) {
+            return self.journaled(file, command, arguments, output);
         }
         let (spec, task, interrupt) = (self.spec, self.task, self.interrupt);
         let mut file = TraceFile::open(arguments.trace.as_deref())?;
@@ -215,6 +251,7 @@ impl Job<'_> {
                     let believed = Believed::default();
                     let world = world.telling(believed.clone());
                     let mut world = self.attended(world, &Rational::ONE);
+                    (self.begun)();
                     let outcome = self.run(&mut world, &mut writer, believed.listener());
                     world.into_inner().stop();
                     outcome.map_err(contradiction)?
@@ -224,7 +261,7 @@ impl Job<'_> {
         };
         views.close();
         let trouble = file.close();
-        let shown = show(arguments, &outcome, output);
+        let shown = show(arguments, &outcome, false, output);
         // The run has been what it was, whatever became of its record.
         if let Some(trouble) = trouble {
             output::warn(&trouble);
@@ -265,21 +302,21 @@ impl Job<'_> {
     /// A run in a world that is a process, with a journal.
     fn journaled(
         self,
-        path: &Path,
+        mut file: JournalFile,
         command: &str,
         arguments: &RunArgs,
         output: &mut Output,
     ) -> Answer {
-        let mut file = JournalFile::create(path)?.in_segments(self.segments);
         let mut is_kept = false;
         let mut sink = |line: &str| is_kept = file.write(line);
         let mut header = trace::TraceWriter::new(Arc::clone(self.task), &mut sink);
         let written = header.header(self.spec);
         written.map_err(|error| Failure::new(format!("cannot write the journal: {error}"), ""))?;
-        if !is_kept {
+        // Whoever has given the problem is told that it is on the disk. A run begins again without that.
+        if !is_kept || (self.spec.is_lasting && !file.sync()) {
             let why = file.trouble().unwrap_or_default();
             return Err(Failure::new(
-                format!("cannot write the journal {}: {why}", path.display()),
+                format!("cannot write the journal {}: {why}", file.path().display()),
                 "nothing was started; make room on the disk, or choose another file",
             ));
         }
@@ -298,6 +335,7 @@ impl Job<'_> {
             refused: Vec::new(),
         };
         let mut world = self.attended(world, &Rational::ONE);
+        (self.begun)();
         let outcome = {
             let writer = JournalWriter {
                 task: Arc::clone(self.task),
@@ -329,7 +367,8 @@ impl Job<'_> {
         world.into_inner().inner.stop();
         views.close();
         let outcome = outcome.map_err(contradiction)?;
-        conclude(arguments, &outcome, file.trouble().as_deref(), output)
+        let trouble = file.trouble();
+        conclude((arguments, self.spec), outcome, trouble.as_deref(), output)
     }
 
     /// A run in the world that the specification describes, on a wall clock if it asks for one.
@@ -338,6 +377,7 @@ impl Job<'_> {
         let model = spec.model(task.problem()).map_err(SpecError::World)?;
         let model = model.unwrap_or_default();
         let mut world = spec.world(&model, task, self.first.as_ref())?;
+        (self.begun)();
         let Some(factor) = &spec.realtime else {
             return self.run(world.as_mut(), recorder, |_: &Progression| {});
         };
@@ -392,6 +432,12 @@ pub(super) fn exit(verdict: &Verdict) -> Answer {
         Verdict::Unsolvable | Verdict::NoPlan { .. } => Exit::No,
         Verdict::ReplanLimit | Verdict::TimeLimit => Exit::Limit,
         Verdict::Interrupted => Exit::Interrupted,
+        Verdict::PlannerFailed { why } => {
+            return Err(Failure::new(
+                format!("the planner failed: {}", tame(why)),
+                "`elbowroom plan` with the same planner says more; this does not say that there is no plan",
+            ));
+        }
         Verdict::WorldFailed { why } => {
             return Err(Failure::new(
                 format!("the world failed: {}", tame(why)),

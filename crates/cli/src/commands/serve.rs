@@ -2,6 +2,7 @@
 
 mod answers;
 mod changes;
+mod first;
 mod front;
 
 use std::cell::OnceCell;
@@ -12,14 +13,14 @@ use std::sync::Arc;
 
 use elbowroom::execute::{NamedText, RunSpec, SpecError};
 use elbowroom::executive::Status;
-use elbowroom::model::Task;
+use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use elbowroom::report::trace::TraceWriter;
 
 use super::run::resume::{self, Host};
 use super::run::spec;
-use super::run::{Job, aside, checked};
+use super::run::{Job, RESUME_SERVE, aside, checked, journal};
 use crate::args::ServeArgs;
 use crate::attendance::Attendance;
 use crate::exit::{Answer, Exit, Failure};
@@ -30,7 +31,8 @@ use crate::journal::Segments;
 use crate::output::{self, Output};
 use crate::serve::Control;
 use crate::words::plain;
-use front::Front;
+use first::Client;
+use front::{Front, Refused};
 
 /// The length of a journal from which on it is begun anew, in bytes.
 const LONG: u64 = 10_000_000;
@@ -59,23 +61,97 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         ));
     };
     let domain_text: NamedText = (&input::source(domain, "domain")?).into();
-    let mut front = None;
-    let problem = || {
-        if let Some(problem) = &arguments.run.problem {
-            return Ok((&input::source(problem, "problem")?).into());
-        }
-        heeded(&domain_text)?;
-        let opened = open(arguments, &interrupt, &domain_text)?;
-        let text = opened.await_problem(&interrupt).unwrap_or_default();
-        front = Some(opened);
-        let name = "the problem that was given".to_owned();
-        Ok(NamedText { name, text })
+    let problem = || match &arguments.run.problem {
+        Some(problem) => Ok((&input::source(problem, "problem")?).into()),
+        None => Ok(NamedText {
+            name: "the problem that was given".to_owned(),
+            text: String::new(),
+        }),
     };
     let (mut spec, world) = spec::of(&arguments.run, domain, problem)?;
-    if front.is_some() && spec.problem.text.is_empty() {
-        // It was asked to end before there was a problem.
-        return Ok(Exit::Yes);
+    lasting(&mut spec, arguments)?;
+    let given = if arguments.run.problem.is_some() {
+        Some(checked(&arguments.run, &spec, world.as_ref(), output)?)
+    } else {
+        heeded(&domain_text)?;
+        spec.check().map_err(spec::contradiction)?;
+        None
+    };
+    let journal = journal(&arguments.run, RESUME_SERVE)?;
+    let journal = journal.map(|file| file.in_segments(Some(segments(arguments))));
+    let front = open(arguments, &interrupt, &domain_text)?;
+    let (task, first, client) = match given {
+        Some((task, first)) => (task, first, None),
+        None => match await_problem(&front, arguments, (&mut spec, world.as_ref()), output) {
+            Some(((task, first), client)) => (task, first, Some(client)),
+            None => {
+                // It was asked to end before there was a problem.
+                front.close();
+                return Ok(Exit::Yes);
+            }
+        },
+    };
+    let begun = || {
+        if let Some(client) = &client {
+            client.accept();
+        }
+    };
+    let answer = begin(&front, &spec, &task).and_then(|attendance| {
+        let job = Job {
+            aside: aside(&arguments.run, &interrupt),
+            spec: &spec,
+            task: &task,
+            first,
+            interrupt: &interrupt,
+            attendance: &attendance,
+            journal,
+            begun: &begun,
+        };
+        job.execute(&arguments.run, output)
+    });
+    if let (Some(client), Err(failure)) = (&client, &answer) {
+        client.refuse(refusal(503, failure));
     }
+    front.close();
+    in_order(answer)
+}
+
+/// A problem, and the plan to begin with.
+type Begun = (Arc<Task>, Option<TimeTriggeredPlan>);
+
+/// Waits for a problem that can be executed; whoever gives another one is told why it cannot. `None` if
+/// the executive is asked to end before.
+fn await_problem(
+    front: &Front,
+    arguments: &ServeArgs,
+    (spec, world): (&mut RunSpec, Option<&Source>),
+    output: &mut Output,
+) -> Option<(Begun, Client)> {
+    let interrupt = Interrupt::listen();
+    loop {
+        let (text, client) = front.first.wait(&interrupt)?.parts();
+        spec.problem.text = text;
+        match checked(&arguments.run, spec, world, output) {
+            Ok(begun) => return Some((begun, client)),
+            Err(failure) => {
+                output::warn(&format!("a problem was refused: {}", failure.sentence()));
+                front.first.reopen();
+                client.refuse(refusal(422, &failure));
+            }
+        }
+    }
+}
+
+/// A failure as it is told to a client.
+fn refusal(status: u16, failure: &Failure) -> Refused {
+    let help = failure
+        .advice()
+        .unwrap_or("look at what the executive says");
+    Refused::new(status, failure.sentence(), help)
+}
+
+/// What a specification is of an executive, which stays.
+fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) -> Result<(), Failure> {
     spec.is_lasting = true;
     // Whoever asks for another first plan is told why there is none.
     if arguments.run.first_plan_by.is_none() {
@@ -99,24 +175,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     }
     spec.plans_aside = spec.can_plan_aside();
     spec.readies_aside = spec.plans_aside;
-    let (task, first) = checked(&arguments.run, &spec, world.as_ref(), output)?;
-    let front = match front {
-        Some(front) => front,
-        None => open(arguments, &interrupt, &domain_text)?,
-    };
-    let attendance = begin(&front, &spec, &task)?;
-    let job = Job {
-        aside: aside(&arguments.run, &interrupt),
-        spec: &spec,
-        task: &task,
-        first,
-        interrupt: &interrupt,
-        attendance: &attendance,
-        segments: Some(segments(arguments)),
-    };
-    let answer = job.execute(&arguments.run, output);
-    front.close();
-    in_order(answer)
+    Ok(())
 }
 
 /// A domain that no problem could be executed of is refused before anybody is asked for one. Whatever

@@ -178,7 +178,7 @@ mod tests {
             let folder = folder(&format!("follow-{kept}"));
             let path = folder.join("run.journal");
             let segments = Some(Segments { size: 60, kept });
-            let Ok(journal) = JournalFile::create(&path) else {
+            let Ok(journal) = JournalFile::create(&path, "elbowroom serve --resume") else {
                 panic!("it can be made");
             };
             let mut journal = journal.in_segments(segments);
@@ -222,7 +222,7 @@ mod tests {
             let folder = folder(&format!("renumbered-{step}"));
             let path = folder.join("run.journal");
             let numbered = |number: usize| folder.join(format!("run.journal.{number}"));
-            let Ok(journal) = JournalFile::create(&path) else {
+            let Ok(journal) = JournalFile::create(&path, "elbowroom serve --resume") else {
                 panic!("it can be made");
             };
             let mut journal = journal.in_segments(segments);
@@ -268,7 +268,7 @@ mod tests {
         let folder = folder("cannot");
         let path = folder.join("run.journal");
         let segments = Some(Segments { size: 1, kept: 1 });
-        let Ok(journal) = JournalFile::create(&path) else {
+        let Ok(journal) = JournalFile::create(&path, "elbowroom serve --resume") else {
             panic!("it can be made");
         };
         let mut journal = journal.in_segments(segments);

@@ -6,6 +6,7 @@ use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -30,6 +31,8 @@ pub(crate) fn folder(name: &str) -> PathBuf {
 /// An executive.
 pub(crate) struct Executive {
     child: Option<Child>,
+    /// What else it has said.
+    errors: Option<JoinHandle<String>>,
     folder: PathBuf,
     port: u16,
 }
@@ -43,25 +46,41 @@ impl Drop for Executive {
 impl Executive {
     /// One whose token, socket and trace are in `folder`.
     pub(crate) fn start(folder: &Path, line: &[&str]) -> Self {
+        Self::with_token(folder, line, None)
+    }
+
+    /// The same, which can write no file that is longer than so many kilobytes.
+    pub(crate) fn confined(folder: &Path, line: &[&str], kilobytes: u32) -> Self {
+        Self::with_token(folder, line, Some(kilobytes))
+    }
+
+    fn with_token(folder: &Path, line: &[&str], most_blocks: Option<u32>) -> Self {
         let token = folder.join("token");
         fs::write(&token, TOKEN).expect("written");
         let token = token.display().to_string();
-        Self::launch(folder, &[line, &["--token", &token]].concat())
+        Self::launch(folder, &[line, &["--token", &token]].concat(), most_blocks)
     }
 
     pub(crate) fn without_token(folder: &Path, line: &[&str]) -> Self {
-        Self::launch(folder, line)
+        Self::launch(folder, line, None)
     }
 
-    fn launch(folder: &Path, line: &[&str]) -> Self {
+    fn launch(folder: &Path, line: &[&str], most_blocks: Option<u32>) -> Self {
         let file = |name: &str| folder.join(name).display().to_string();
         let (socket, trace) = (file("socket"), file("trace.jsonl"));
         let has_journal = line.iter().any(|it| ["--journal", "--resume"].contains(it));
         let kept = ["--trace", &trace];
         let kept: &[&str] = if has_journal { &[] } else { &kept };
-        let mut child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        let mut command = Command::new("env");
+        if let Some(most) = most_blocks {
+            // The signal that would end the program is ignored, and writing fails.
+            let script = format!("trap '' XFSZ; ulimit -f {most}; exec \"$@\"");
+            command.args(["bash", "-c", &script, "bash"]);
+        }
+        let mut child = command
             .current_dir(root())
             .env("NO_COLOR", "1")
+            .arg(env!("CARGO_BIN_EXE_elbowroom"))
             .args(["serve", "--http", "0", "--socket", &socket])
             .args(line)
             .args(kept)
@@ -81,12 +100,14 @@ impl Executive {
             }
         };
         // Whatever else it says must not fill the pipe.
-        std::thread::spawn(move || {
+        let errors = std::thread::spawn(move || {
             let mut rest = String::new();
             let _ = said.read_to_string(&mut rest);
+            rest
         });
         Self {
             child: Some(child),
+            errors: Some(errors),
             folder: folder.to_owned(),
             port,
         }
@@ -127,8 +148,10 @@ impl Executive {
         if !in_time {
             let _ = child.kill();
         }
-        let output = child.wait_with_output().expect("its output");
+        let mut output = child.wait_with_output().expect("its output");
         assert!(in_time, "it does not end: {output:?}");
+        let errors = self.errors.take().map(|it| it.join().expect("its words"));
+        output.stderr = errors.unwrap_or_default().into_bytes();
         output
     }
 

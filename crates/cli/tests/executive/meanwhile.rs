@@ -42,7 +42,9 @@ fn is_planning(state: &Value) -> bool {
 fn requests_are_taken_in_and_answered_while_the_first_plan_is_made() {
     let place = folder("first-search");
     let mut own = with_a_slow_planner(&place);
-    own.await_state(is_planning);
+    let there_is_none = json!("there is no plan yet");
+    let state = own.await_state(is_planning);
+    assert_eq!(state["why"], there_is_none, "{state}");
     for (path, what) in [
         ("/v1/goals", json!({"goal": "(done a2)", "name": "second"})),
         ("/v1/facts", json!({"fact": "(done b3)", "becomes": true})),
@@ -55,7 +57,8 @@ fn requests_are_taken_in_and_answered_while_the_first_plan_is_made() {
             "{path}: {taken}"
         );
     }
-    own.await_state(|state| state["activity"] == "paused");
+    let state = own.await_state(|state| state["activity"] == "paused");
+    assert_eq!(state["why"], there_is_none, "{state}");
     own.post("/v1/resume", &Value::Null);
     own.await_state(is_planning);
     fs::write(place.join("go"), "").expect("written");

@@ -225,7 +225,9 @@ fn finding(
         match planned(request.task) {
             PlanAnswer::Plan(plan) => made = plan,
             PlanAnswer::Unsolvable => return Ok(OddsFinding::NoPlan),
-            PlanAnswer::NotFound { why } => return Ok(OddsFinding::None { reason: why }),
+            PlanAnswer::NotFound { why } | PlanAnswer::Failed { why } => {
+                return Ok(OddsFinding::None { reason: why });
+            }
         }
         &made
     };

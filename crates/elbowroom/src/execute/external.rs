@@ -15,8 +15,8 @@ use crate::flow;
 /// rounded, they are chosen again.
 ///
 /// The program takes as long as it takes, and that is measured. If it crashes, or somebody kills it, it is
-/// asked once more. What goes wrong with it then, is said in the answer: a run has no plan then, and
-/// ends.
+/// asked once more. What goes wrong with it then, is said in the answer
+/// ([`PlanAnswer::Failed`]): a run has no plan then, and ends.
 pub struct External<'a> {
     /// Which program.
     pub planner: external::Planner,
@@ -73,8 +73,15 @@ impl External<'_> {
         let answer = match report.outcome {
             Outcome::Plan(found) => PlanAnswer::Plan(found.plan),
             // "No plan exists" is its claim, not a proof.
-            Outcome::NotStarted { ref help, .. } => PlanAnswer::NotFound {
+            Outcome::NotStarted { ref help, .. } => PlanAnswer::Failed {
                 why: format!("{name}: {}; {help}", report.outcome),
+            },
+            // The same outcomes are failures where somebody asks for a plan alone.
+            other @ (Outcome::Crashed { .. }
+            | Outcome::NotUnderstood { .. }
+            | Outcome::Unsupported { .. }
+            | Outcome::Refused { .. }) => PlanAnswer::Failed {
+                why: format!("{name}: {other}"),
             },
             other => PlanAnswer::NotFound {
                 why: format!("{name}: {other}"),

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::run::{FIRST_GOAL, Verdict};
 use elbowroom_execution::{
-    Command, Decided, Decision, Entry, Event, Mission, Observation, Progression, Promise, Request,
-    StepId, Ticket,
+    Cause, Command, Decided, Decision, Entry, Event, Mission, Observation, Progression, Promise,
+    Request, StepId, Ticket,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Task};
@@ -165,6 +165,8 @@ impl Status {
 
 /// Why a run rests whose record does not say.
 const BEFORE: &str = "why stands in an earlier segment of the journal";
+/// Why a plan is made at the beginning, and where a run that was over goes on.
+const NO_PLAN: &str = "there is no plan yet";
 /// Why a run rests that was asked for nothing.
 const NO_GOAL: &str = "there is no goal";
 const TO_COME: &str = "to-come";
@@ -252,7 +254,11 @@ impl Known {
             Entry::Planning { reason, .. } => {
                 self.is_planning = true;
                 self.rest = None;
-                self.why = Some(reason.to_string());
+                self.why = Some(match reason.cause {
+                    // For the record, a run begins as where a plan has come.
+                    Cause::NewPlan => NO_PLAN.to_owned(),
+                    _ => reason.to_string(),
+                });
             }
             Entry::Planned { .. } => self.is_planning = false,
             Entry::Warning { ticket, until, .. } => {
@@ -468,6 +474,7 @@ fn in_words(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::Unsolvable => "no plan reaches the goals from here",
         Verdict::NoPlan { .. } => "no plan was found",
+        Verdict::PlannerFailed { .. } => "the planner failed",
         Verdict::ReplanLimit => "too many plans were given up",
         other => other.name(),
     }

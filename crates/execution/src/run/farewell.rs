@@ -127,7 +127,7 @@ impl Run<'_> {
 
 impl<'a> Run<'a> {
     /// The same run, which was over so many times, each time without its goal
-    /// ([`Verdict::NoPlan`]), and was then gone on with: another plan is looked for, from where it
+    /// ([`Verdict::NoPlan`], [`Verdict::PlannerFailed`]), and was then gone on with: another plan is looked for, from where it
     /// was over. [`Run::go`] goes on so often by itself.
     #[must_use]
     pub fn reopened(self, times: usize) -> Run<'a> {

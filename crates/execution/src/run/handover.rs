@@ -108,6 +108,7 @@ impl Run<'_> {
         let plan = match attempt.answer {
             PlanAnswer::Unsolvable => return Err(Stop::Over(Verdict::Unsolvable)),
             PlanAnswer::NotFound { why } => return Err(Stop::Over(Verdict::NoPlan { why })),
+            PlanAnswer::Failed { why } => return Err(Stop::Over(Verdict::PlannerFailed { why })),
             PlanAnswer::Plan(plan) => plan,
         };
         // What ends from now on is no step of the plan that was given up, and not yet one of the
@@ -142,17 +143,13 @@ impl Run<'_> {
         };
         self.expect(&took);
         let ready = &self.now + &took;
-        let (plan, why_not) = match &planned.answer {
-            PlanAnswer::Plan(plan) => (Some(plan), None),
-            PlanAnswer::Unsolvable => (None, Some("no plan reaches the goal from here")),
-            PlanAnswer::NotFound { why } => (None, Some(why.as_str())),
-        };
         self.ports.recorder.record(&Entry::Planned {
             now: &ready,
             took: &took,
-            plan,
-            why_not,
+            plan: planned.answer.plan(),
+            why_not: planned.answer.why_not(),
             is_unsolvable: planned.answer == PlanAnswer::Unsolvable,
+            has_failed: matches!(planned.answer, PlanAnswer::Failed { .. }),
             remark: planned.remark.as_deref(),
         });
         self.heed()?;

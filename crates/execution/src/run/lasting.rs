@@ -408,6 +408,7 @@ impl<'a> Run<'a> {
                 Verdict::GoalReached
                 | Verdict::Unsolvable
                 | Verdict::NoPlan { .. }
+                | Verdict::PlannerFailed { .. }
                 | Verdict::ReplanLimit => true,
                 Verdict::TimeLimit | Verdict::Interrupted | Verdict::WorldFailed { .. } => false,
             }

@@ -373,17 +373,13 @@ impl Run<'_> {
             self.ports.planner.collect(&self.task, &search.situation);
         let took = &self.now - &search.begun;
         self.expect(&took);
-        let (plan, why_not) = match &answer {
-            PlanAnswer::Plan(plan) => (Some(plan), None),
-            PlanAnswer::Unsolvable => (None, Some("no plan reaches the goal from here")),
-            PlanAnswer::NotFound { why } => (None, Some(why.as_str())),
-        };
         self.ports.recorder.record(&Entry::Planned {
             now: &self.now,
             took: &took,
-            plan,
-            why_not,
+            plan: answer.plan(),
+            why_not: answer.why_not(),
             is_unsolvable: answer == PlanAnswer::Unsolvable,
+            has_failed: matches!(answer, PlanAnswer::Failed { .. }),
             remark: remark.as_deref(),
         });
         self.heed()?;
@@ -432,6 +428,7 @@ impl Run<'_> {
         }
         Err(Stop::Over(match answer {
             PlanAnswer::NotFound { why } => Verdict::NoPlan { why },
+            PlanAnswer::Failed { why } => Verdict::PlannerFailed { why },
             _ => Verdict::Unsolvable,
         }))
     }

@@ -181,6 +181,11 @@ pub enum Verdict {
         /// The reason.
         why: String,
     },
+    /// The planner has failed, so that nobody knows whether there is a plan.
+    PlannerFailed {
+        /// How.
+        why: String,
+    },
     /// The limit on new plans was reached.
     ReplanLimit,
     /// The time limit was reached.
@@ -201,6 +206,7 @@ impl Verdict {
             Self::GoalReached => "goal-reached",
             Self::Unsolvable => "unsolvable-from-here",
             Self::NoPlan { .. } => "no-plan",
+            Self::PlannerFailed { .. } => "planner-failed",
             Self::ReplanLimit => "replan-limit",
             Self::TimeLimit => "time-limit",
             Self::Interrupted => "interrupted",
@@ -211,7 +217,9 @@ impl Verdict {
     /// Details of the verdict, if there are any.
     pub fn why(&self) -> Option<&str> {
         match self {
-            Self::NoPlan { why } | Self::WorldFailed { why } => Some(why),
+            Self::NoPlan { why } | Self::PlannerFailed { why } | Self::WorldFailed { why } => {
+                Some(why)
+            }
             _ => None,
         }
     }

@@ -100,7 +100,9 @@ impl Setting<'_> {
             PlanAnswer::Unsolvable => {
                 return Err(self.wrong("no plan exists, so there is nothing to execute"));
             }
-            PlanAnswer::NotFound { why } => return Err(self.wrong(&why)),
+            PlanAnswer::NotFound { why } | PlanAnswer::Failed { why } => {
+                return Err(self.wrong(&why));
+            }
         };
         let task = Arc::new(task);
         let columns = 0..self.experiment.columns.len();

@@ -48,7 +48,9 @@ impl EmbeddedPlans {
         };
         let plan = match planner.plan(&task, &situation).answer {
             PlanAnswer::Plan(plan) => Some(Arc::new(plan)),
-            PlanAnswer::Unsolvable | PlanAnswer::NotFound { .. } => None,
+            PlanAnswer::Unsolvable | PlanAnswer::NotFound { .. } | PlanAnswer::Failed { .. } => {
+                None
+            }
         };
         self.known.insert(state.facts.clone(), plan.clone());
         plan

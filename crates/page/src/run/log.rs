@@ -65,6 +65,7 @@ impl Log {
             }
             Line::Planned(planned) => {
                 let what = match (&planned.plan, planned.is_unsolvable) {
+                    (None, _) if planned.has_failed => "the planner failed".to_owned(),
                     (Some(steps), _) => format!(
                         "a plan of {} actions, made in {}",
                         steps.len(),

@@ -417,7 +417,7 @@ class Run(Table):
 
     @property
     def verdict(self) -> str:
-        """``"goal-reached"``, ``"no-plan"``, ``"unsolvable-from-here"``, ``"time-limit"``, …"""
+        """``"goal-reached"``, ``"no-plan"``, ``"planner-failed"``, ``"unsolvable-from-here"``, ``"time-limit"``, …"""
         return str(self.document["verdict"])
 
     @property

@@ -81,6 +81,7 @@ impl Line {
                 plan,
                 why_not,
                 is_unsolvable,
+                has_failed,
                 remark,
             } => Self::Planned(PlannedLine {
                 now: exact(now),
@@ -88,6 +89,7 @@ impl Line {
                 plan: plan.map(steps),
                 why_not: why_not.map(str::to_owned),
                 is_unsolvable,
+                has_failed,
                 remark: remark.map(str::to_owned),
             }),
             Entry::Warning {

@@ -321,9 +321,14 @@ impl Planner for ReplayPlanner {
                 },
             },
             None if planned.is_unsolvable => PlanAnswer::Unsolvable,
-            None => PlanAnswer::NotFound {
-                why: planned.why_not.clone().unwrap_or_default(),
-            },
+            None => {
+                let why = planned.why_not.clone().unwrap_or_default();
+                if planned.has_failed {
+                    PlanAnswer::Failed { why }
+                } else {
+                    PlanAnswer::NotFound { why }
+                }
+            }
         };
         PlannerAnswer {
             answer,

@@ -46,6 +46,9 @@ impl Recorder for JournalWriter<'_> {
         let is_kept = is_written && (!is_to_sync || self.file.sync());
         if !is_kept {
             self.kept.0.store(true, Ordering::SeqCst);
+            if let Some(desk) = &self.desk {
+                desk.lose();
+            }
         } else if let Some(desk) = self.desk.as_ref().filter(|_| has_requests) {
             desk.note_recorded();
         }

@@ -14,8 +14,8 @@ use serde_json::{Value, json};
 use super::believed::Believed;
 use crate::clock::Clock;
 use crate::conversation::{
-    Ability, Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Listener, Mouth, Said, Told, ended, hello,
-    is_time, launch,
+    Ability, Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Listener, Mouth, Said, Told, ended, find,
+    hello, is_time, launch,
 };
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
@@ -107,13 +107,7 @@ impl ProcessWorld {
         interrupt: Interrupt,
         hello: &Value,
     ) -> Result<Self, Failure> {
-        let cannot = |why: String| {
-            Failure::new(
-                format!("cannot start the world `{command}`: {why}"),
-                "give a program and its arguments, separated by spaces; \
-                 docs/formats/world-protocol.md says what it must do",
-            )
-        };
+        let cannot = |why: String| cannot_start(command, &why);
         let (child, mouth, ears) = launch(command).map_err(cannot)?;
         let mut world = Self {
             child,
@@ -300,6 +294,22 @@ impl ProcessWorld {
         };
         WorldError::new(why)
     }
+}
+
+/// Whether there is such a program.
+///
+/// # Errors
+/// When it cannot be started because there is none.
+pub(super) fn look_for(command: &str) -> Result<(), Failure> {
+    find(command).map_err(|why| cannot_start(command, &why))
+}
+
+fn cannot_start(command: &str, why: &str) -> Failure {
+    Failure::new(
+        format!("cannot start the world `{command}`: {why}"),
+        "give a program and its arguments, separated by spaces; \
+         docs/formats/world-protocol.md says what it must do",
+    )
 }
 
 fn endless_line() -> WorldError {

@@ -54,6 +54,13 @@ struct Cut {
 /// Reads the journal of a run that can be gone on with.
 fn cut(path: &Path) -> Result<Cut, Failure> {
     let name = path.display().to_string();
+    // Who opens a named pipe may wait for ever for somebody to write.
+    if std::fs::metadata(path).is_ok_and(|it| !it.is_file()) {
+        return Err(Failure::new(
+            format!("{name} is no file"),
+            "name the file that --journal has written",
+        ));
+    }
     let length = std::fs::metadata(path).map_or(0, |it| it.len());
     let text = input::source(path, "journal")?;
     if !crate::journal::is_journal(text.text()) {
@@ -88,7 +95,7 @@ fn cut(path: &Path) -> Result<Cut, Failure> {
         stored = read(&journal)?;
     }
     if let Some(Line::Over(report)) = stored.lines.last()
-        && report.verdict != NO_PLAN
+        && !WITHOUT_PLAN.contains(&report.verdict.as_str())
     {
         return Err(Failure::new(
             format!("the run of {name} is over: {}", report.verdict),
@@ -275,14 +282,16 @@ pub(in crate::commands) fn run(
     if let Some(line) = past.difference() {
         return Err(leads_elsewhere(&name, line));
     }
-    super::conclude(arguments, &outcome, file.trouble().as_deref(), output)
+    let trouble = file.trouble();
+    super::conclude((arguments, &spec), outcome, trouble.as_deref(), output)
 }
 
 /// The verdict of a run whose world has died.
 const WORLD_FAILED: &str = "world-failed";
 
-/// The verdict of a run for which no plan was found, which is not to say that there is none.
-const NO_PLAN: &str = "no-plan";
+/// The verdicts of a run for which no plan was found, which is not to say that there is none. Before
+/// the second was told apart, planners that failed ended in the first.
+const WITHOUT_PLAN: [&str; 2] = ["no-plan", "planner-failed"];
 
 /// Whether it is an answer of the world.
 fn is_answer(line: &Line) -> bool {

@@ -52,7 +52,6 @@ pub(in crate::commands) fn of(
     // A misspelt planner is told before files are read.
     spec.check_planner().map_err(contradiction)?;
     spec.domain = (&input::source(domain, "domain")?).into();
-    spec.problem = problem()?;
     spec.executor = arguments
         .executor
         .parse()
@@ -79,6 +78,7 @@ pub(in crate::commands) fn of(
         spec.world = Some(source.text().to_owned());
         world = Some(source);
     }
+    spec.problem = problem()?;
     spec.first_plan = match arguments.first_plan_by {
         Some(FirstPlanChoice::Shortest) => FirstPlan::Shortest,
         Some(FirstPlanChoice::Likeliest) => FirstPlan::Likeliest,

@@ -11,7 +11,8 @@ use crate::number::nearest;
 use crate::words::{counted, tame};
 use crate::wrap::wrapped;
 
-pub(super) fn human(answer: &RunAnswer, report: &Report) -> String {
+/// `has_lost` is whether the run was ended because its journal cannot be written.
+pub(super) fn human(answer: &RunAnswer, report: &Report, has_lost: bool) -> String {
     let replans = counted(report.replans, "new plan");
     let time = nearest(&report.time);
     let width = Look::of_stdout().width;
@@ -41,12 +42,22 @@ pub(super) fn human(answer: &RunAnswer, report: &Report) -> String {
                 styled(HINT, "limit")
             )
         }
+        Verdict::Interrupted if has_lost => {
+            format!(
+                "{}: the journal cannot be written, so the run was ended at {time}, after {replans}\n",
+                styled(BAD, "failed")
+            )
+        }
         Verdict::Interrupted => {
             format!(
                 "{}: asked to end at {time}, after {replans}\n",
                 styled(HINT, "interrupted")
             )
         }
+        Verdict::PlannerFailed { .. } => format!(
+            "{}: the planner failed at {time}, after {replans}\n",
+            styled(BAD, "failed")
+        ),
         // Why is the message with which the command ends, and is not said twice.
         Verdict::WorldFailed { .. } => format!(
             "{}: the world failed at {time}, after {replans}\n",

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use elbowroom::execute::read_goal;
+use elbowroom::execute::{misfit, read_goal};
 use elbowroom::execution::Request;
 use elbowroom::execution::run::FIRST_GOAL;
 use elbowroom::executive::documents::{
@@ -17,7 +17,7 @@ use elbowroom::pddl::{self, Source};
 use serde::de::DeserializeOwned;
 
 use super::front::{Front, Refused};
-use crate::desk::Ask;
+use crate::desk::{Ask, Reception};
 
 /// How long a client waits for the run to take its request in; afterwards it is told that it will.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -49,6 +49,9 @@ impl Front {
     /// Hands requests in, in this order, and waits a little for the run to take them in.
     fn hand_in(&self, asks: Vec<Ask>, name: Option<String>) -> Result<Taken, Refused> {
         let (status, _) = self.run()?;
+        if self.desk().is_lost() {
+            return Err(lost());
+        }
         if status.state().activity == Activity::Over {
             return Err(Refused::new(
                 409,
@@ -61,7 +64,15 @@ impl Front {
             Refused::new(503, "too many requests wait for the executive", help)
         };
         let number = self.desk().hand_in(asks).ok_or_else(full)?;
-        let taken = self.desk().await_taken(number, PATIENCE);
+        let taken = match self.desk().await_taken(number, PATIENCE) {
+            Reception::Taken => true,
+            Reception::Waits => false,
+            Reception::Lost => return Err(lost()),
+            Reception::Over => {
+                let error = "the executive has ended before it took this in";
+                return Err(Refused::new(409, error, "start another one"));
+            }
+        };
         Ok(Taken { taken, name })
     }
 
@@ -69,7 +80,10 @@ impl Front {
         let (status, task) = self.run()?;
         let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
         let read = read_goal(task, &given.goal);
-        read.map_err(|why| Refused::new(422, why, help))?;
+        let read = read.map_err(|why| Refused::new(422, why, help))?;
+        if let Some(why) = misfit(task.problem(), &read) {
+            return Err(Refused::new(422, why, help));
+        }
         let name = given.name.map(named).transpose()?;
         let name = name.unwrap_or_else(|| self.new_name(&status.goals()));
         let goal = given.goal.trim().to_owned();
@@ -150,16 +164,20 @@ impl Front {
             Refused::new(422, first.unwrap_or_default(), help)
         })?;
         let Ok((status, task)) = self.run() else {
-            self.set_problem(given.problem)?;
-            return Ok(Taken {
-                taken: true,
-                name: None,
-            });
+            let (taken, name) = (self.first.give(given.problem)?, None);
+            return Ok(Taken { taken, name });
         };
         let state = status.state();
         check_further(&problem, task, &state)?;
         self.hand_in(turned(&Task::new(problem), task, &state), None)
     }
+}
+
+/// What is asked while the journal cannot be written.
+fn lost() -> Refused {
+    let error = "the journal cannot be written, so this is not kept, and the executive ends";
+    let help = "make room on the disk, go on with `elbowroom serve --resume`, and ask again";
+    Refused::new(503, error, help)
 }
 
 /// Whether a running executive can turn to another problem.

@@ -3,7 +3,7 @@
 use std::io;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU64, AtomicUsize};
-use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use elbowroom::execute::NamedText;
@@ -14,8 +14,9 @@ use serde::Serialize;
 
 use crate::desk::Desk;
 use crate::http::{Misunderstood, Request, Stream, respond, respond_with_events};
-use crate::interrupt::Interrupt;
 use crate::serve::{Board, Control, is_local_name};
+
+use super::first::First;
 
 const JSON: &str = "application/json";
 const TEXT: &str = "text/plain; charset=utf-8";
@@ -28,8 +29,8 @@ const WAITING: &str = "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-
     <p>The executive has no problem yet. Give it one with <code>elbowroom ctl problem FILE</code>; \
     this page shows the run as soon as there is one.</p>\n</html>\n";
 
-/// How often it is looked whether the executive was asked to end.
-const GLANCE: Duration = Duration::from_millis(100);
+/// How long the end of the program waits for clients that are told what became of their requests.
+const FAREWELL: Duration = Duration::from_secs(1);
 
 /// Why a request is refused: a status, what is wrong, and what to do.
 pub(super) struct Refused(pub(super) u16, pub(super) String, pub(super) String);
@@ -50,8 +51,10 @@ pub(super) struct Front {
     /// The run, once there is a problem; its task has a table of its own, so that what clients
     /// mention is not what the run does.
     run: OnceLock<(Status, Task)>,
-    problem: Mutex<Option<String>>,
-    has_problem: Condvar,
+    pub(super) first: First,
+    /// How many requests that change something are being answered.
+    changing: Mutex<usize>,
+    answered: Condvar,
     clients: Arc<AtomicUsize>,
     /// How many goals were named here.
     pub(super) named: AtomicU64,
@@ -66,8 +69,9 @@ impl Front {
             desk: Desk::default(),
             board: Board::lasting(),
             run: OnceLock::new(),
-            problem: Mutex::default(),
-            has_problem: Condvar::new(),
+            first: First::default(),
+            changing: Mutex::new(0),
+            answered: Condvar::new(),
             clients: Arc::default(),
             named: AtomicU64::new(0),
         }
@@ -99,35 +103,21 @@ impl Front {
             .ok_or_else(|| Refused::new(409, waiting, help))
     }
 
-    /// The run is over: clients have a moment to hear of it.
+    /// The run is over: clients have a moment to hear of it, and what became of their requests.
     pub(super) fn close(&self) {
+        self.desk.close();
+        self.first.close();
         self.board.close();
+        let waits = |changing: &mut usize| *changing > 0;
+        let waited = self
+            .answered
+            .wait_timeout_while(self.changing(), FAREWELL, waits);
+        drop(waited.unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// Waits for a problem; `None` if the executive is asked to end before.
-    pub(super) fn await_problem(&self, interrupt: &Interrupt) -> Option<String> {
-        let mut problem = self.problem.lock().unwrap_or_else(PoisonError::into_inner);
-        while problem.is_none() && !interrupt.is_requested() {
-            let waited = self.has_problem.wait_timeout(problem, GLANCE);
-            problem = waited.unwrap_or_else(PoisonError::into_inner).0;
-        }
-        problem.clone()
-    }
-
-    /// Takes the first problem.
-    pub(super) fn set_problem(&self, text: String) -> Result<(), Refused> {
-        let mut problem = self.problem.lock().unwrap_or_else(PoisonError::into_inner);
-        if problem.is_some() {
-            let help = "ask again in a moment; `elbowroom ctl state` says how things stand";
-            return Err(Refused::new(
-                409,
-                "another problem has just been given",
-                help,
-            ));
-        }
-        *problem = Some(text);
-        self.has_problem.notify_all();
-        Ok(())
+    fn changing(&self) -> MutexGuard<'_, usize> {
+        // It is counted in one statement.
+        self.changing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Serves a client. `is_local_only` is whether only this machine should reach it.
@@ -149,6 +139,7 @@ impl Front {
             let error = format!("this is not the page of that host; {} is", self.own);
             return refuse(stream, &Refused::new(403, error, "use the address itself"));
         }
+        let _counted = (request.verb != "GET").then(|| Changing::begin(self));
         match self.answer(&request, stream) {
             Ok(told) => told,
             Err(refused) => refuse(stream, &refused),
@@ -254,6 +245,23 @@ impl Front {
         if let Some(control) = &self.control {
             control.stop();
         }
+    }
+}
+
+/// A request that changes something, until it is answered.
+struct Changing<'a>(&'a Front);
+
+impl<'a> Changing<'a> {
+    fn begin(front: &'a Front) -> Self {
+        *front.changing() += 1;
+        Self(front)
+    }
+}
+
+impl Drop for Changing<'_> {
+    fn drop(&mut self) {
+        *self.0.changing() -= 1;
+        self.0.answered.notify_all();
     }
 }
 

@@ -1,0 +1,199 @@
+//! Ends that nobody wants: signals, disks that are full, files that are none.
+
+use std::fs;
+use std::io::{Read as _, Write as _};
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use super::client::{Executive, folder};
+use super::command::root;
+use super::skipped::skipped;
+use super::{DOMAIN, PROBLEM, ctl, with_robot};
+
+fn python_is_there() -> bool {
+    let is_there = Command::new("python3").arg("--version").output().is_ok();
+    if !is_there {
+        skipped("there is no python3");
+    }
+    is_there
+}
+
+/// An executive that goes on after a crash ends in order, as one that has just begun does.
+#[test]
+fn signals_end_an_executive_that_goes_on_after_a_crash() {
+    if !python_is_there() {
+        return;
+    }
+    for signal in ["INT", "TERM", "HUP"] {
+        let place = folder(&format!("resumed-{signal}"));
+        let journal = place.join("journal").display().to_string();
+        let line = with_robot(&place, &journal);
+        let line: Vec<&str> = line.iter().map(String::as_str).collect();
+        let mut own = Executive::start(&place, &line);
+        own.await_state(|state| state["activity"] == "executing");
+        own.kill();
+        let mut again = Executive::start(&place, &["--resume", &journal]);
+        again.await_state(|state| state["activity"] != "beginning");
+        let process = again.process().to_string();
+        let told = Command::new("kill").args(["-s", signal, &process]).status();
+        assert!(told.expect("every Unix has `kill`").success());
+        let output = again.end();
+        assert_eq!(output.status.code(), Some(0), "{signal}: {output:?}");
+        let report = String::from_utf8_lossy(&output.stdout);
+        assert!(report.contains("asked to end"), "{signal}: {report}");
+        let text = fs::read_to_string(&journal).expect("a journal");
+        let last = text.lines().last().expect("a record");
+        assert!(last.contains("\"interrupted\""), "{signal}: {last}");
+        fs::remove_dir_all(&place).expect("the folder is there");
+    }
+}
+
+/// The client whose request meets the full disk is told so, and the report does not say that somebody has
+/// asked for the end.
+#[test]
+fn when_the_disk_is_full_the_client_and_the_report_say_so() {
+    if !python_is_there() || Command::new("bash").arg("--version").output().is_err() {
+        skipped("there is no bash, or no python3");
+        return;
+    }
+    let place = folder("full-disk");
+    let journal = place.join("journal").display().to_string();
+    // It rests at once, so that hardly anything but requests is recorded.
+    let text = fs::read_to_string(root().join(PROBLEM)).expect("a problem");
+    let problem = place.join("problem.pddl");
+    let text = text.replace("(:goal (and (done a3) (done b3)))", "(:goal (and))");
+    fs::write(&problem, text).expect("written");
+    let problem = problem.display().to_string();
+    let mut line = with_robot(&place, &journal);
+    line[1].clone_from(&problem);
+    let line: Vec<&str> = line.iter().map(String::as_str).collect();
+    // The first goal fits, and the first of the second one's two records does not: that is before it is taken in.
+    let mut own = Executive::confined(&place, &line, 30);
+    own.await_state(|state| state["activity"] == "resting");
+    assert_eq!(own.post("/v1/pause", &Value::Null).0, 200);
+    // Each is recorded twice, and longer than everything else.
+    let goal = format!("(and {})", "(done a1) ".repeat(1000));
+    let answers = (0..10).map(|number| {
+        let asked = json!({"goal": goal, "name": format!("goal-{number}")});
+        own.post("/v1/goals", &asked)
+    });
+    let refused = answers.filter(|(status, _)| *status != 200).take(1).last();
+    let (status, refusal) = refused.expect("the disk is full some time");
+    assert_eq!(status, 503, "{refusal}");
+    let error = refusal["error"].as_str().expect("a sentence");
+    assert!(error.contains("the journal cannot be written"), "{error}");
+    let output = own.end();
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    let report = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        report.contains("failed: the journal cannot be written")
+            && !report.contains("asked to end"),
+        "{report}"
+    );
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(errors.contains("`elbowroom serve --resume`"), "{errors}");
+    fs::remove_dir_all(&place).expect("the folder is there");
+}
+
+/// Whoever opens a named pipe waits until somebody writes into it.
+#[test]
+fn what_is_no_file_is_no_journal_and_is_not_waited_for() {
+    let place = folder("no-file");
+    let pipe = place.join("pipe");
+    let made = Command::new("mkfifo").arg(&pipe).status();
+    if !made.is_ok_and(|it| it.success()) {
+        skipped("there is no mkfifo");
+        return;
+    }
+    for command in ["run", "serve"] {
+        for path in [&pipe, &place] {
+            let (code, said) = ended(&[command, "--resume", &path.display().to_string()]);
+            assert_eq!(code, Some(2), "{command}: {said}");
+            assert!(said.contains("is no file"), "{command}: {said}");
+        }
+    }
+    fs::remove_dir_all(&place).expect("the folder is there");
+}
+
+/// How the command ends, in a minute at most, and what it says.
+fn ended(line: &[&str]) -> (Option<i32>, String) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .current_dir(root())
+        .args(line)
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("the command can be started");
+    let mut is_over = || child.try_wait().expect("it can be asked").is_some();
+    let in_time = (0..3000).any(|_| {
+        std::thread::sleep(Duration::from_millis(20));
+        is_over()
+    });
+    if !in_time {
+        let _ = child.kill();
+    }
+    let output = child.wait_with_output().expect("its output");
+    assert!(in_time, "{line:?} does not end");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code(), said)
+}
+
+/// A client is told why it does not get the lines that it asks for, in the executive's own words.
+#[test]
+fn ctl_events_says_why_it_is_refused() {
+    let refusal =
+        json!({"error": "the lines up to 7 are no longer kept here", "help": "ask for later ones"});
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
+    let address = listener.local_addr().expect("it has one").to_string();
+    let body = refusal.to_string();
+    let served = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().expect("a client");
+        let mut request = [0; 4096];
+        let _ = stream.read(&mut request);
+        let length = body.len();
+        let answer = format!("HTTP/1.1 410 Gone\r\nContent-Length: {length}\r\n\r\n{body}");
+        stream.write_all(answer.as_bytes()).expect("it reads");
+    });
+    let done = ctl(&["--to", &address, "events", "--after", "0"]);
+    served.join().expect("it was asked");
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert_eq!(done.status.code(), Some(2), "{said}");
+    for words in [
+        "the lines up to 7 are no longer kept here",
+        "ask for later ones",
+    ] {
+        assert!(said.contains(words), "{said}");
+    }
+    assert!(!said.contains("no executive"), "{said}");
+}
+
+#[test]
+fn a_journal_that_exists_is_gone_on_with_by_the_command_that_has_begun_it() {
+    let place = folder("existing");
+    let journal = place.join("journal");
+    fs::write(&journal, "something").expect("written");
+    let journal = journal.display().to_string();
+    for (command, advice) in [
+        ("run", "`elbowroom run --resume`"),
+        ("serve", "`elbowroom serve --resume`"),
+    ] {
+        let line = [
+            command,
+            DOMAIN,
+            PROBLEM,
+            "--world-process",
+            "cat",
+            "--journal",
+            &journal,
+        ];
+        let (code, said) = ended(&line);
+        assert_eq!(code, Some(2), "{command}: {said}");
+        assert!(said.contains(advice), "{command}: {said}");
+    }
+    assert!(Path::new(&journal).exists());
+    fs::remove_dir_all(&place).expect("the folder is there");
+}

@@ -1,0 +1,142 @@
+//! The first problem of an executive that was started without one.
+
+use std::fs;
+use std::io::{BufRead as _, BufReader};
+use std::os::unix::fs::PermissionsExt as _;
+use std::process::{Command, Stdio};
+
+use serde_json::{Value, json};
+
+use super::client::{Executive, folder};
+use super::command::root;
+use super::skipped::skipped;
+use super::{DOMAIN, PROBLEM, with_robot};
+
+fn problem() -> Value {
+    let text = fs::read_to_string(root().join(PROBLEM)).expect("a problem");
+    json!({ "problem": text })
+}
+
+/// What is wrong with the command line is told as where there is a problem: nobody gives one in vain.
+#[test]
+fn what_is_wrong_is_told_before_it_listens_for_a_problem() {
+    let place = folder("told-early");
+    let existing = place.join("existing").display().to_string();
+    fs::write(&existing, "something").expect("written");
+    let nowhere = place.join("nowhere/journal").display().to_string();
+    let journal = place.join("journal").display().to_string();
+    let no_program = place.join("nobody").display().to_string();
+    let tests: [(&[&str], &str); 6] = [
+        (
+            &["--world-process", "cat", "--journal", &nowhere],
+            "cannot write the journal",
+        ),
+        (
+            &["--world-process", "cat", "--journal", &existing],
+            "`elbowroom serve --resume` goes on with its run",
+        ),
+        (
+            &["--world-process", &no_program, "--journal", &journal],
+            "cannot start the world",
+        ),
+        (
+            &["--world-process", "no-such-world 1"],
+            "cannot start the world",
+        ),
+        (&["--world-process", &existing], "cannot start the world"),
+        (&["--executor", "nobody"], "nobody"),
+    ];
+    for (line, words) in tests {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+            .current_dir(root())
+            .args(["serve", DOMAIN, "--http", "0"])
+            .args(line)
+            .stderr(Stdio::piped())
+            .stdout(Stdio::null())
+            .spawn()
+            .expect("the command can be started");
+        let mut text = String::new();
+        let mut said = BufReader::new(child.stderr.take().expect("it is piped"));
+        while said.read_line(&mut text).expect("UTF-8") > 0 && !text.contains("listening") {}
+        if text.contains("listening") {
+            let _ = child.kill();
+        }
+        let status = child.wait().expect("it ends");
+        assert_eq!(status.code(), Some(2), "{line:?}: {text}");
+        assert!(text.contains(words), "{line:?}: {text}");
+    }
+    assert!(!fs::exists(&journal).expect("a folder"), "nothing is begun");
+    fs::remove_dir_all(&place).expect("the folder is there");
+}
+
+/// Who is told that a problem is taken need not give it again, whatever happens then.
+#[test]
+fn a_first_problem_that_is_taken_survives_kill_9() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped("there is no python3");
+        return;
+    }
+    let place = folder("first-killed");
+    let journal = place.join("journal").display().to_string();
+    let mut line = with_robot(&place, &journal);
+    line.retain(|it| it != PROBLEM);
+    let line: Vec<&str> = line.iter().map(String::as_str).collect();
+    let mut own = Executive::start(&place, &line);
+    let (status, taken) = own.put("/v1/problem", &problem());
+    own.kill();
+    assert_eq!((status, &taken["taken"]), (200, &json!(true)), "{taken}");
+    let text = fs::read_to_string(&journal).expect("a journal");
+    let header = text.lines().next().expect("a first record");
+    assert!(header.contains("(done b3)"), "{header}");
+    let mut again = Executive::start(&place, &["--resume", &journal]);
+    again.await_state(|state| state["why"] == "reached: problem");
+    again.post("/v1/stop", &Value::Null);
+    assert_eq!(again.end().status.code(), Some(0));
+    fs::remove_dir_all(&place).expect("the folder is there");
+}
+
+/// A problem that can be read, and not executed as the command line has it.
+#[test]
+fn a_first_problem_that_cannot_be_executed_is_refused_and_another_one_is_taken() {
+    let vary = ["--vary", "deadline (open nothing)"];
+    let line = [&[DOMAIN, "--realtime", "10"], &vary[..]].concat();
+    let mut own = Executive::start(&folder("first-refused"), &line);
+    let wrong = problem();
+    let text = wrong["problem"].as_str().expect("a text");
+    let until = "(idle r) (open nothing) (at 5000 (not (open nothing)))";
+    let right = json!({ "problem": text.replace("(idle r)", until) });
+    let (status, refusal) = own.put("/v1/problem", &wrong);
+    assert_eq!(status, 422, "{refusal}");
+    let error = refusal["error"].as_str().expect("a sentence");
+    assert!(error.contains("no timed initial makes it false"), "{error}");
+    let (status, taken) = own.put("/v1/problem", &right);
+    assert_eq!((status, &taken["taken"]), (200, &json!(true)), "{taken}");
+    own.await_state(|state| state["why"] == "reached: problem");
+    own.post("/v1/stop", &Value::Null);
+    assert_eq!(own.end().status.code(), Some(0));
+}
+
+/// There is such a program, and it cannot be started: nobody can know that before.
+#[test]
+fn who_gives_a_first_problem_that_is_not_begun_is_told_why() {
+    let place = folder("first-not-begun");
+    let world = place.join("world");
+    fs::write(&world, "#!/nowhere/at/all\n").expect("written");
+    fs::set_permissions(&world, fs::Permissions::from_mode(0o755)).expect("allowed");
+    let world = world.display().to_string();
+    let mut own = Executive::start(&place, &[DOMAIN, "--world-process", &world]);
+    let (status, refusal) = own.put("/v1/problem", &problem());
+    assert_eq!(status, 503, "{refusal}");
+    let error = refusal["error"].as_str().expect("a sentence");
+    assert!(error.contains("cannot start the world"), "{error}");
+    let output = own.end();
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    fs::remove_dir_all(&place).expect("the folder is there");
+}
+
+#[test]
+fn an_executive_without_a_problem_ends_when_it_is_told_to() {
+    let mut own = Executive::start(&folder("first-stopped"), &[DOMAIN, "--realtime", "10"]);
+    assert_eq!(own.post("/v1/stop", &Value::Null).0, 200);
+    assert_eq!(own.end().status.code(), Some(0));
+}
