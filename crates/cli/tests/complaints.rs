@@ -4,13 +4,14 @@
 mod command;
 
 use std::fs;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use command::{elbowroom, root};
 use elbowroom::execute::Execution;
-use elbowroom::execution::run::{Report, RunSettings, Verdict};
+use elbowroom::execution::run::{ExecutedStep, Report, RunSettings, Verdict};
 use elbowroom::execution::{
-    Cause, Command, Ending, Event, Observation, Passage, Request, Ticket, World, WorldError,
+    Cause, Command, Ending, Entry, Event, Observation, Passage, Recorder, Request, Ticket, World,
+    WorldError,
 };
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -60,6 +61,8 @@ enum Fault {
     Silent,
     Fails,
     Lasts(i64),
+    /// It starts so many milliseconds late, and lasts so many seconds.
+    StartsLate(i64, i64),
 }
 
 impl World for Toy {
@@ -73,8 +76,13 @@ impl World for Toy {
                 let ticket = *ticket;
                 self.open.push(ticket);
                 let fault = self.fault.map_or(Fault::None, |fault| fault(ticket.0));
+                let mut begun = now.clone();
                 let (duration, ending) = match fault {
                     Fault::Silent => return Ok(()),
+                    Fault::StartsLate(late, seconds) => {
+                        begun += Rational::new(late, 1000);
+                        (Some(seconds.into()), Ending::Succeeded)
+                    }
                     Fault::None => (duration.clone(), Ending::Succeeded),
                     Fault::Lasts(seconds) => (Some(seconds.into()), Ending::Succeeded),
                     Fault::Fails => {
@@ -86,8 +94,8 @@ impl World for Toy {
                     ticket,
                     measured: measured(),
                 };
-                self.coming.push(at(now.clone(), started));
-                let end = now + duration.unwrap_or_default();
+                let end = &begun + duration.unwrap_or_default();
+                self.coming.push(at(begun, started));
                 let ended = Event::Ended {
                     ticket,
                     ending,
@@ -139,6 +147,19 @@ fn run(task: &Arc<Task>, world: &mut Toy) -> Report {
         .with_settings(settings)
         .explaining()
         .run_in(world)
+}
+
+/// The actions that were warned of, and until when the plan can bear each.
+#[derive(Clone, Default)]
+struct Warnings(Arc<Mutex<Vec<(String, Rational)>>>);
+
+impl Recorder for Warnings {
+    fn record(&mut self, entry: &Entry<'_>) {
+        if let Entry::Warning { action, until, .. } = entry {
+            let mut warnings = self.0.lock().expect("no thread has panicked");
+            warnings.push(((*action).to_owned(), (*until).clone()));
+        }
+    }
 }
 
 fn causes(report: &Report) -> Vec<Cause> {
@@ -211,6 +232,29 @@ fn who_never_answers_is_given_up_and_the_run_ends_with_that_reason() {
             .any(|it| it.to_string().contains("(fetch "))
     );
     assert!(world.open.is_empty(), "nothing is left running");
+    // Where the plan has a limit, that is the end of waiting, and what else there is is done in time.
+    let domain = "(define (domain ways) (:requirements :durative-actions :timed-initial-literals)
+        (:predicates (path) (open) (there))
+        (:durative-action walk :parameters () :duration (= ?duration 2)
+          :condition (over all (path)) :effect (at end (there)))
+        (:durative-action ride :parameters () :duration (= ?duration 30)
+          :condition (over all (open)) :effect (at end (there))))";
+    let problem = "(define (problem p) (:domain ways)
+        (:init (path) (open) (at 20 (not (path))) (at 60 (not (open)))) (:goal (there)))";
+    let mut world = Toy {
+        fault: Some(|ticket| {
+            if ticket == 0 {
+                Fault::Silent
+            } else {
+                Fault::None
+            }
+        }),
+        ..Toy::default()
+    };
+    let report = run(&task(domain, problem), &mut world);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{:?}", report.reasons);
+    assert_eq!(report.starts, 2, "{:?}", report.reasons);
+    assert!(report.time < Rational::from(60), "{}", report.time);
 }
 
 #[test]
@@ -240,6 +284,33 @@ fn what_is_late_is_waited_for_as_long_as_the_plan_can_bear_and_then_given_up() {
     assert_eq!(
         (&report.verdict, report.replans),
         (&Verdict::GoalReached, 0)
+    );
+    // Nor is a start that is late, as on any clock it is. Before a new plan is needed there is a warning.
+    let mut world = Toy {
+        fault: Some(|_| Fault::StartsLate(1, 19)),
+        ..Toy::default()
+    };
+    let warnings = Warnings::default();
+    let settings = RunSettings {
+        watches_room: true,
+        ..RunSettings::default()
+    };
+    let execution = Execution::of(&task).with_settings(settings);
+    let report = execution.recorded_by(warnings.clone()).run_in(&mut world);
+    assert_eq!(
+        (&report.verdict, report.replans),
+        (&Verdict::GoalReached, 0),
+        "{:?}",
+        report.reasons
+    );
+    let warnings = warnings.0.lock().expect("no thread has panicked");
+    let [(action, until)] = &warnings[..] else {
+        panic!("{warnings:?}");
+    };
+    assert_eq!(action, "(walk)");
+    assert!(
+        *until > Rational::from(19) && *until <= Rational::from(20),
+        "{until}"
     );
     // No end at all: it is noticed in time, and not after minutes.
     let mut world = Toy {
@@ -323,7 +394,11 @@ fn a_run_that_cannot_go_on_stops_early_and_says_since_when_and_why() {
 
 #[test]
 fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
-    let task = errands("(and (have book) (have cup))");
+    // One robot, so that it fetches one thing after the other.
+    let problem = "(define (problem day) (:domain errands) (:objects r - robot book cup key - item)
+        (:init (free r) (here book) (here cup) (here key))
+        (:goal (and (have book) (have cup) (have key))))";
+    let task = task(ERRANDS, problem);
     let asked = |time: i64, request: Request| Observation {
         time: time.into(),
         event: Event::Asked(request),
@@ -333,12 +408,14 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
         coming: vec![
             asked(0, Request::Pause),
             asked(100, Request::Resume),
-            asked(105, Request::Pursue { name, goal }),
+            asked(105, Request::Pause),
+            asked(200, Request::Resume),
+            asked(205, Request::Pursue { name, goal }),
         ],
         ..Toy::default()
     };
     let settings = RunSettings {
-        time_limit: Rational::from(107),
+        time_limit: Rational::from(207),
         ..RunSettings::default()
     };
     let report = Execution::of(&task)
@@ -346,9 +423,23 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
         .lasting(true)
         .run_in(&mut world);
     for done in &report.executed {
-        assert!(done.step.start.is_zero() || done.step.start >= Rational::from(100));
-        assert!(done.ending.is_some(), "{done:?}");
+        let start = &done.step.start;
+        let is_in_a_pause = |from: i64, to: i64| *start > from.into() && *start < to.into();
+        assert!(
+            !is_in_a_pause(0, 100) && !is_in_a_pause(105, 200),
+            "{done:?}"
+        );
     }
+    // What runs goes on in a pause; what runs at the end is told to stop, and has stopped.
+    let (last, others) = report.executed.split_last().expect("something was done");
+    assert_eq!(last.ending, Some(Ending::Cancelled), "{report:?}");
+    let has_succeeded = |done: &ExecutedStep| done.ending == Some(Ending::Succeeded);
+    assert!(others.iter().all(has_succeeded), "{report:?}");
+    let runs_on = |done: &ExecutedStep| {
+        let end = &done.step.start + done.step.duration.clone().unwrap_or_default();
+        done.step.start < Rational::from(105) && end > Rational::from(105)
+    };
+    assert!(others.iter().any(runs_on), "{report:?}");
     assert!(world.open.is_empty());
 }
 
