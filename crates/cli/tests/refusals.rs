@@ -361,8 +361,8 @@ fn numbers_below_zero_are_refused_as_numbers() {
 #[test]
 fn nothing_is_to_be_installed_that_has_the_name_of_a_typo() {
     let output = elbowroom(&[&RUN[..], &["--planner", "up:nosuch"]].concat());
-    assert_eq!(output.status.code(), Some(1), "{output:?}");
-    let said = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("up:nosuch"), "{said}");
     assert!(!said.contains("up-nosuch"), "{said}");
 }

@@ -165,7 +165,7 @@ fn show(
 pub(super) fn conclude(
     (arguments, spec): (&RunArgs, &RunSpec),
     mut outcome: RunOutcome,
-    trouble: Option<&str>,
+    trouble: Option<String>,
     output: &mut Output,
 ) -> Answer {
     let Some(why) = trouble else {
@@ -367,8 +367,7 @@ impl Job<'_> {
         world.into_inner().inner.stop();
         views.close();
         let outcome = outcome.map_err(contradiction)?;
-        let trouble = file.trouble();
-        conclude((arguments, self.spec), outcome, trouble.as_deref(), output)
+        conclude((arguments, self.spec), outcome, file.trouble(), output)
     }
 
     /// A run in the world that the specification describes, on a wall clock if it asks for one.

@@ -80,16 +80,16 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     let journal = journal(&arguments.run, RESUME_SERVE)?;
     let journal = journal.map(|file| file.in_segments(Some(segments(arguments))));
     let front = open(arguments, &interrupt, &domain_text)?;
-    let (task, first, client) = match given {
-        Some((task, first)) => (task, first, None),
-        None => match await_problem(&front, arguments, (&mut spec, world.as_ref()), output) {
-            Some(((task, first), client)) => (task, first, Some(client)),
-            None => {
-                // It was asked to end before there was a problem.
-                front.close();
-                return Ok(Exit::Yes);
-            }
-        },
+    let (task, first, client) = if let Some((task, first)) = given {
+        (task, first, None)
+    } else {
+        let of = (&mut spec, world.as_ref());
+        let Some(((task, first), client)) = await_problem(&front, arguments, of, output) else {
+            // It was asked to end before there was a problem.
+            front.close();
+            return Ok(Exit::Yes);
+        };
+        (task, first, Some(client))
     };
     let begun = || {
         if let Some(client) = &client {

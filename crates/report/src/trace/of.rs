@@ -22,10 +22,8 @@ use crate::exact::Exact;
 impl Line {
     /// The line of an entry; `task` names facts and fluents.
     pub fn of(task: &Task, entry: &Entry<'_>) -> Self {
-        let observed = |observations: &[Observation]| {
-            let lines = observations.iter();
-            lines.map(|it| ObservationLine::of(task, it)).collect()
-        };
+        let line = |it: &Observation| ObservationLine::of(task, it);
+        let observed = |observations: &[Observation]| observations.iter().map(line).collect();
         match *entry {
             Entry::Mission(mission) => Self::Plan(mission_line(mission)),
             Entry::Decided { now, decided } => Self::Decided(DecidedLine {

@@ -200,8 +200,8 @@ pub(in crate::commands) fn run(
     let stand = snapshot.as_ref().map(|it| it.stand(&task)).transpose();
     let stand = stand.map_err(|why| unreadable(&name, &format!("line 2: {why}"), OTHER_VERSION))?;
     let now = snapshot.as_ref().map(|it| it.now().clone());
-    let first = spec.has_plan.then(|| stored.first_plan(&task)).transpose();
-    let first = first.map_err(|error| wrong(&error))?.flatten();
+    let first = spec.has_plan.then(|| stored.first_plan(&task));
+    let first = first.transpose().map_err(|error| wrong(&error))?.flatten();
     let mut file = JournalFile::go_on(path, &journal, length)?.in_segments(host.segments());
     let interrupt = Interrupt::listen();
     let attendance = host.attend(&spec, &task, &interrupt)?;
@@ -282,8 +282,7 @@ pub(in crate::commands) fn run(
     if let Some(line) = past.difference() {
         return Err(leads_elsewhere(&name, line));
     }
-    let trouble = file.trouble();
-    super::conclude((arguments, &spec), outcome, trouble.as_deref(), output)
+    super::conclude((arguments, &spec), outcome, file.trouble(), output)
 }
 
 /// The verdict of a run whose world has died.
