@@ -85,6 +85,9 @@ impl Obligations {
                 });
             }
         }
+        // They are kept as long as the plan is.
+        obligations.direct.shrink_to_fit();
+        obligations.over_all.shrink_to_fit();
         Ok(obligations)
     }
 }
