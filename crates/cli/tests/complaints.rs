@@ -251,7 +251,7 @@ fn who_never_answers_is_given_up_and_the_run_ends_with_that_reason() {
         }),
         ..Toy::default()
     };
-    let report = run(&task(domain, problem), &mut world);
+    let report = run(&self::task(domain, problem), &mut world);
     assert_eq!(report.verdict, Verdict::GoalReached, "{:?}", report.reasons);
     assert_eq!(report.starts, 2, "{:?}", report.reasons);
     assert!(report.time < Rational::from(60), "{}", report.time);
