@@ -413,10 +413,7 @@ impl Dispatch {
     /// The window of a step's start or end, by the world's clock.
     pub(crate) fn planned(&self, step: StepId, is_end: bool) -> Option<Planned> {
         let node = self.ends.get(step.instance().index())?[usize::from(is_end)];
-        let (earliest, mut latest) = self.window_of(node);
-        if is_end && let Some(last) = self.last_end_of_silent(step.instance()) {
-            latest = latest.into_iter().chain([self.world(&last)]).min();
-        }
+        let (earliest, latest) = self.window_of(node);
         Some(Planned { earliest, latest })
     }
 }

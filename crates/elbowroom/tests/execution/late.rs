@@ -250,8 +250,8 @@ impl World for Mute<'_> {
     }
 }
 
-/// Who never says that he has started is taken to have done so when he was told to: his action outlives its room then as
-/// any other does, and the goal is still reached in time without it.
+/// Who never says that he has started may have done so when he was told to, until his action would be over: then its start
+/// is late, and there is too little time for it. The goal is still reached in time without it.
 #[test]
 fn what_was_never_heard_to_start_is_waited_for_as_long_as_the_plan_can_bear_it() {
     let (scene, _) = walker(Rational::from(10));

@@ -101,7 +101,15 @@ impl Dispatch {
             }
         }
         let local = self.local(time);
-        self.start_silently(id);
+        if let Some(told) = self.told.remove(&id)
+            && let Horizon::Dispatchable(_) = self.horizon
+        {
+            // Nobody has said when it began, but it was told to.
+            if let Err(missed) = self.horizon.fix(network_node(start), &told) {
+                self.strain.missed(start, &missed);
+            }
+            self.progress.happen(&self.plan, start, &told);
+        }
         let is_own = |end| self.is_limited_by_duration(id, end);
         let (is_own_lower, is_own_upper) = (is_own(WindowEnd::Earliest), is_own(WindowEnd::Latest));
         let fixed = self.horizon.fix(network_node(end), &local);
@@ -115,19 +123,6 @@ impl Dispatch {
             WindowEnd::Latest => is_own_upper,
         };
         Some(self.missed_end(id, time, duration, is_own, missed))
-    }
-
-    /// Nobody has said when an instance began, but it was told to: that is when it did.
-    pub(super) fn start_silently(&mut self, id: InstanceId) {
-        let start = self.ends[id.index()][0];
-        if let Some(told) = self.told.remove(&id)
-            && let Horizon::Dispatchable(_) = self.horizon
-        {
-            if let Err(missed) = self.horizon.fix(network_node(start), &told) {
-                self.strain.missed(start, &missed);
-            }
-            self.progress.happen(&self.plan, start, &told);
-        }
     }
 
     fn missed_end(

@@ -11,6 +11,12 @@ use crate::horizon::Horizon;
 use crate::progression::{Outlook, Progression};
 use crate::reason::{About, Cause, Reason};
 
+/// An instance that may be under way, although nobody has said so.
+struct Silent {
+    /// Until when it may be, on the plan's clock; `None` if there is no such time.
+    until: Option<Rational>,
+}
+
 impl Dispatch {
     /// The decision at this moment, after all news have been taken in.
     pub(crate) fn next(&mut self, moment: &Moment<'_>) -> Decided {
@@ -59,9 +65,9 @@ impl Dispatch {
         }
         for &id in &self.progress.running {
             let node = self.awaited(id);
-            if self.was_told_in_time(id) {
-                if let Some(last) = self.last_end_of_silent(id) {
-                    wake_at(last.max(now.clone()) + &self.epsilon, node);
+            if let Some(silent) = self.silent(id, &now) {
+                if let Some(until) = silent.until {
+                    wake_at(until + &self.epsilon, node);
                 }
                 continue;
             }
@@ -163,45 +169,25 @@ impl Dispatch {
     }
 
     /// Whether an instance was told to start in time, and nobody has said that it did: reports can
-    /// be lost, and when it did start is known from its end at the latest, or from the silence.
-    fn was_told_in_time(&self, id: InstanceId) -> bool {
+    /// be lost, and when it did start is known from its end at the latest, or from the silence. Once it
+    /// would be over by now if it had started, it has not: its start is late.
+    fn silent(&self, id: InstanceId, now: &Rational) -> Option<Silent> {
         let start = network_node(self.ends[id.index()][0]);
-        let is_dispatchable = matches!(self.horizon, Horizon::Dispatchable(_));
-        is_dispatchable
-            && self.told.get(&id).is_some_and(|told| {
-                let latest = self.horizon.window(start).1;
-                latest.is_none_or(|latest| *told <= latest)
-            })
-    }
-
-    /// Until when an instance that was told to start in time, and of which nobody has said that it did, may go on if it
-    /// started when it was told to, on the plan's clock; `None` if there is no such time.
-    pub(super) fn last_end_of_silent(&self, id: InstanceId) -> Option<Rational> {
-        if !self.was_told_in_time(id) {
+        let Horizon::Dispatchable(_) = self.horizon else {
             return None;
-        }
-        let told = self.told.get(&id)?;
-        let most = self.durations[id.index()].1.as_ref()?;
-        Some(told + most)
-    }
-
-    /// What was told to start, was never said to have started, and would be over by now, has started when it was told to.
-    fn take_the_silent_for_started(&mut self, now: &Rational) {
-        let running = self.progress.running.iter().copied();
-        let is_over = |id: &InstanceId| {
-            let last = self.last_end_of_silent(*id);
-            last.is_some_and(|last| last < *now)
         };
-        let silent: Vec<InstanceId> = running.filter(is_over).collect();
-        for id in silent {
-            self.start_silently(id);
-        }
+        let told = self.told.get(&id)?;
+        let latest = self.horizon.window(start).1;
+        let is_in_time = latest.is_none_or(|latest| *told <= latest);
+        let most = self.durations[id.index()].1.as_ref();
+        let until = most.map(|most| told + most);
+        let may_run = until.as_ref().is_none_or(|until| now <= until);
+        (is_in_time && may_run).then_some(Silent { until })
     }
 
     /// What should have happened by now and has not.
-    pub(crate) fn overdue(&mut self, moment: &Moment<'_>) -> Option<Reason> {
+    pub(crate) fn overdue(&self, moment: &Moment<'_>) -> Option<Reason> {
         let now = self.local(moment.now);
-        self.take_the_silent_for_started(&now);
         let (node, latest) = self.missing(&now)?;
         let awaited = match self.plan.nodes[node.index()] {
             Node::Start(id) | Node::End(id) | Node::Instant(id) => Some(id),
@@ -239,7 +225,7 @@ impl Dispatch {
     pub(super) fn missing(&self, now: &Rational) -> Option<(NodeId, Rational)> {
         let running = self.progress.running.iter();
         let awaited = running
-            .filter(|id| !self.was_told_in_time(**id))
+            .filter(|id| self.silent(**id, now).is_none())
             .map(|id| self.awaited(*id));
         let ready = self.progress.ready.iter().copied();
         awaited.chain(ready).find_map(|node| {
