@@ -215,7 +215,7 @@ fn a_warning_says_until_when_no_new_plan_is_needed() {
 struct Mute<'a> {
     inner: SimWorld<'a>,
     name: &'static str,
-    mute: Option<Ticket>,
+    asked: Option<Ticket>,
     coming: Vec<Observation>,
 }
 
@@ -223,10 +223,10 @@ impl World for Mute<'_> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
         match command {
             Command::Start { ticket, action, .. } if action.name == self.name => {
-                self.mute = Some(*ticket);
+                self.asked = Some(*ticket);
                 Ok(())
             }
-            Command::Cancel { ticket } if Some(*ticket) == self.mute => {
+            Command::Cancel { ticket } if Some(*ticket) == self.asked => {
                 let event = Event::Ended {
                     ticket: *ticket,
                     ending: Ending::Cancelled,
@@ -260,7 +260,7 @@ fn what_was_never_heard_to_start_is_waited_for_as_long_as_the_plan_can_bear_it()
         let mut world = Mute {
             inner: SimWorld::new(Arc::clone(&scene.task), &model, 1),
             name: "(walk)",
-            mute: None,
+            asked: None,
             coming: Vec::new(),
         };
         let settings = RunSettings {
