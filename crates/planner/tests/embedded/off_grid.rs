@@ -144,12 +144,16 @@ fn each_report_can_be_the_last_one() {
             }
         });
         match answer {
-            Answer::NoneFound { stopped, .. } => assert_eq!(stopped, Stopped::Interrupted),
-            Answer::Plan { stopped, .. } if stopped == Stopped::FirstPlan => {
+            Answer::Plan {
+                stopped: Stopped::FirstPlan,
+                ..
+            } => {
                 assert!(reports < last);
                 return;
             }
-            Answer::Plan { stopped, .. } => assert_eq!(stopped, Stopped::Interrupted),
+            Answer::NoneFound { stopped, .. } | Answer::Plan { stopped, .. } => {
+                assert_eq!(stopped, Stopped::Interrupted);
+            }
             other => panic!("{}", describe(&other)),
         }
         assert_eq!(reports, last);
