@@ -86,6 +86,10 @@ pub trait Executor: Send {
     }
 }
 
+/// Whether a run can be on a clock: not in the browser's module, which is the smaller for it. There, nobody plans beside
+/// a run, and the room of what is under way is not watched.
+pub(crate) const CAN_HAVE_A_CLOCK: bool = !cfg!(target_family = "wasm");
+
 /// The time window of a happening.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Planned {

@@ -9,6 +9,7 @@ use elbowroom_num::Rational;
 use super::stand::Goals;
 use super::{Run, Stop, Verdict};
 use crate::event::Ticket;
+use crate::executor::CAN_HAVE_A_CLOCK;
 use crate::executor::{Mission, News, StepId};
 use crate::preparation::{PrepareError, Wanted};
 use crate::record::Entry;
@@ -79,7 +80,7 @@ impl Run<'_> {
         let mut steps = mission.running.clone();
         steps.extend(&mission.begun);
         self.account.begin_plan(&steps);
-        if self.settings.plans_aside || self.settings.watches_room {
+        if CAN_HAVE_A_CLOCK && (self.settings.plans_aside || self.settings.watches_room) {
             self.account.note_steps(mission);
         }
         self.steps = mission.time_triggered.steps.len();

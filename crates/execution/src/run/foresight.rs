@@ -13,6 +13,7 @@ use super::Run;
 use super::expectation::{Expected, Late, Prospect, Reach};
 use super::here::Guess;
 use crate::event::Ticket;
+use crate::executor::CAN_HAVE_A_CLOCK;
 use crate::executor::StepId;
 
 /// Where a plan will be needed if what is late does not end, as the planner was told.
@@ -94,7 +95,7 @@ impl Run<'_> {
     /// Foresees anew where things have come otherwise than they were foreseen. Returns when to look
     /// again.
     pub(super) fn tend_foresight(&mut self) -> Option<Rational> {
-        if !self.settings.watches_room || self.search.is_some() {
+        if !CAN_HAVE_A_CLOCK || !self.settings.watches_room || self.search.is_some() {
             return None;
         }
         let Some(until) = self.next_need() else {
@@ -129,7 +130,7 @@ impl Run<'_> {
 
     /// The present plan is let go of: what was foreseen is kept with what was started of it.
     pub(super) fn keep_foreseen(&mut self) {
-        if let Some(mut foreseen) = self.foreseen.take() {
+        if let Some(mut foreseen) = self.foreseen.take().filter(|_| CAN_HAVE_A_CLOCK) {
             if foreseen.left.is_none() {
                 foreseen.left = Some(Left {
                     steps: self.account.steps().clone(),
@@ -143,7 +144,7 @@ impl Run<'_> {
     /// The situation that was foreseen, if it is near and things have come, but for moments, as they
     /// were foreseen; where plans are waited for, without any difference.
     pub(super) fn as_foreseen(&mut self, guess: Guess) -> Option<Ahead> {
-        let foreseen = self.foreseen.take()?;
+        let foreseen = self.foreseen.take().filter(|_| CAN_HAVE_A_CLOCK)?;
         let Prospect {
             situation, running, ..
         } = &foreseen.prospect;

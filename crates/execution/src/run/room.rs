@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 
 use super::Run;
 use crate::event::Ticket;
-use crate::executor::StepId;
+use crate::executor::{CAN_HAVE_A_CLOCK, StepId};
 use crate::record::Entry;
 
 /// What is under way and late, and until when the plan can bear it.
@@ -27,7 +27,7 @@ impl Run<'_> {
     /// the last moment that the plan can bear, or twice as long as planning is expected to take, if
     /// that is longer. Returns when to look again.
     pub(super) fn warn(&mut self) -> Option<Rational> {
-        if !self.settings.watches_room {
+        if !CAN_HAVE_A_CLOCK || !self.settings.watches_room {
             return None;
         }
         let (due, later): (Vec<Late>, Vec<Late>) =

@@ -19,6 +19,7 @@ use super::lasting::Turn;
 use super::stand::Goals;
 use super::{Outlook, Run, Stop, Verdict};
 use crate::event::Ticket;
+use crate::executor::CAN_HAVE_A_CLOCK;
 use crate::executor::Need;
 use crate::executor::StepId;
 use crate::planning::{PlanAnswer, Planned};
@@ -110,7 +111,7 @@ impl Run<'_> {
     pub(super) fn plans_aside(&self) -> bool {
         let has_begun = self.now.is_positive() || self.account.started() > 0;
         let is_waited_for = !has_begun && !self.goes_on_after(&Verdict::GoalReached);
-        self.settings.plans_aside && !is_waited_for
+        CAN_HAVE_A_CLOCK && self.settings.plans_aside && !is_waited_for
     }
 
     /// The planner says that it is done.
@@ -260,7 +261,7 @@ impl Run<'_> {
 
     /// When something about a search is to be decided, whatever happens.
     pub(super) fn next_of_search(&self) -> Option<Rational> {
-        let search = self.search.as_ref()?;
+        let search = self.search.as_ref().filter(|_| CAN_HAVE_A_CLOCK)?;
         let next = self.next_whatever_is_asked(search);
         if self.has_given_up_goals() == Some(true) && !self.is_paused() {
             return Some(next.min(self.end_of_patience(search)));
@@ -301,7 +302,7 @@ impl Run<'_> {
 
     /// Sees to a search, if there is one; whether the executor is not to be asked because of it.
     pub(super) fn tend_search(&mut self) -> Result<bool, Stop> {
-        let Some(search) = &self.search else {
+        let Some(search) = self.search.as_ref().filter(|_| CAN_HAVE_A_CLOCK) else {
             return Ok(false);
         };
         if self.is_given_up() {
