@@ -74,9 +74,9 @@ pub trait Executor: Send {
     }
 
     /// The last moment, in the world's time, at which a step under way can end so that no new plan is needed, if nothing
-    /// else deviates and as far as that can be told; at least what its window says. `None` if there is no such moment.
-    fn bears_until(&self, step: StepId, _now: &Rational) -> Option<Rational> {
-        self.window(step, true)?.latest
+    /// else deviates and as far as that can be told. `None` if nothing is known but its window.
+    fn bears_until(&self, _step: StepId, _now: &Rational) -> Option<Rational> {
+        None
     }
 
     /// One more of it, as it stands, which decides as this one would: to try out what comes of

@@ -6,7 +6,7 @@ use elbowroom::execution::{Command, Event, Passage, Request, World, WorldError};
 use elbowroom::model::{RunningAction, Situation};
 use elbowroom::num::Rational;
 
-use crate::aside::{Beside, Telling, Told, assert_has, seconds, settings, telling, told_in};
+use crate::beside::{Beside, Telling, Told, assert_has, seconds, settings, telling, told_in};
 use crate::lasting::scripted::{fact, pursue, task};
 use crate::scene::Scene;
 

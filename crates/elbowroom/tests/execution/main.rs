@@ -4,6 +4,7 @@ mod adaptable;
 mod amounts;
 mod aside;
 mod bad_worlds;
+mod beside;
 mod esterel;
 mod foreseen;
 mod guarantee;

@@ -11,7 +11,7 @@ use elbowroom::model::{Step, Task, TimeTriggeredPlan, problem};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored};
 
-use crate::aside::{Told, seconds};
+use crate::beside::{Told, seconds};
 use crate::lasting::scripted::{Dice, abandon, fact, pursue};
 
 /// What can be fetched.

@@ -12,7 +12,7 @@ use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::report::trace::ReplayPreparer;
 
-use crate::aside::{Beside, Readier, Told, assert_has, seconds, settings, told};
+use crate::beside::{Beside, Readier, Told, assert_has, seconds, settings, told};
 use crate::lasting::scripted::{Dice, abandon, fact, pursue, task};
 use crate::meanwhile::{Fate, assert_in_order, assert_plays_back, is_start};
 

@@ -10,7 +10,7 @@ use elbowroom::execution::{
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 
-use crate::aside::{Beside, Telling, telling};
+use crate::beside::{Beside, Telling, telling};
 use crate::lasting::scripted::{Notes, fact, pursue, task};
 
 /// That world, which starts nothing before a time.

@@ -143,13 +143,8 @@ impl Executor for Live {
     }
 
     fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
-        let window = self.window(step, true)?.latest;
-        if !CAN_HAVE_A_CLOCK {
-            return window;
-        }
-        let rest = self.state.as_ref()?;
-        let later = rest.bears_until(step.instance(), now);
-        window.map(|window| later.map_or(window.clone(), |later| later.max(window)))
+        let rest = self.state.as_ref().filter(|_| CAN_HAVE_A_CLOCK)?;
+        rest.bears_until(step.instance(), now)
     }
 
     /// Without anybody to compare plans.

@@ -63,8 +63,8 @@ impl Run<'_> {
         if late.is_known {
             return Some(late);
         }
-        let until = self.ports.executor.bears_until(late.step, &self.now);
-        let until = until.unwrap_or_else(|| late.window.clone());
+        let later = self.ports.executor.bears_until(late.step, &self.now);
+        let until = later.into_iter().fold(late.window.clone(), Rational::max);
         self.account.note_bearable(late.ticket, late.window, until);
         self.late_at(late.ticket)
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use elbowroom_model::{RunningAction, Situation, Task};
 use elbowroom_num::{End, Interval};
-use elbowroom_planner::{Answer, Settings, Stopped, plan};
+use elbowroom_planner::{Answer, Found, Settings, Stopped, plan};
 
 use crate::world::{describe, task};
 
@@ -22,6 +22,11 @@ fn answer_within(task: &Task, situation: &Situation, states: u64) -> Answer {
             ControlFlow::Break(())
         }
     })
+}
+
+fn found(answer: &Answer) -> &Found {
+    let found = answer.found();
+    found.unwrap_or_else(|| panic!("{}", describe(answer)))
 }
 
 /// An action that has been under way since `start`.
@@ -187,9 +192,7 @@ fn what_waits_for_a_fixed_time_does_so_though_other_durations_are_chosen() {
         "(at ann mill)",
     );
     let answer = answer_within(&task, &Situation::initial(&task), 100);
-    let found = answer
-        .found()
-        .unwrap_or_else(|| panic!("{}", describe(&answer)));
+    let found = found(&answer);
     let start = &found.plan.steps[0].start;
     assert!(*start >= "5.00000000000001".parse().unwrap() && *start < "5.0011".parse().unwrap());
 }
@@ -209,9 +212,7 @@ fn what_is_under_way_and_has_to_wait_waits() {
     let enter = running(&task, ("enter", &[]), "0.12345678901234", duration);
     situation.running.push(enter);
     let answer = answer_within(&task, &situation, 100);
-    let found = answer
-        .found()
-        .unwrap_or_else(|| panic!("{}", describe(&answer)));
+    let found = found(&answer);
     assert!(found.makespan > 8.into() && found.makespan < "8.0011".parse().unwrap());
 }
 
@@ -227,9 +228,7 @@ fn what_is_under_way_keeps_off_a_bound_that_is_no_possible_duration() {
     let enter = running(&task, ("enter", &[]), "0.12345678901234", duration);
     situation.running.push(enter);
     let answer = answer_within(&task, &situation, 100);
-    let found = answer
-        .found()
-        .unwrap_or_else(|| panic!("{}", describe(&answer)));
+    let found = found(&answer);
     let duration = found.plan.steps[0].duration.clone().unwrap();
     assert!(duration > 2.into() && duration < "2.0001".parse().unwrap());
 }

@@ -16,7 +16,7 @@ use elbowroom::report::trace::{
 };
 
 use super::scripted::{Dice, Slow, abandon, fact, pursue};
-use crate::aside::{Beside, Readier, telling};
+use crate::beside::{Beside, Readier, telling};
 
 const HEADER: &str = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
 

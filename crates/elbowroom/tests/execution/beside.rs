@@ -1,0 +1,318 @@
+//! What tests of plans that are made while the run goes on are made of. No threads and no clock: a planner
+//! that takes as long as it is told to, by the world's time, and a world that says when its plan is there.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use elbowroom::execute::{Analyst, Embedded, Execution};
+use elbowroom::execution::run::{Report, RunSettings};
+use elbowroom::execution::{
+    Command, Entry, Event, Need, Observation, Passage, PlanAnswer, Planner, PlannerAnswer,
+    PrepareError, Prepared, Preparer, Recorder, Wanted, World, WorldError,
+};
+use elbowroom::flow;
+use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::Line;
+
+use crate::lasting::scripted::{Notes, Scripted};
+
+/// A planner that works beside the run.
+#[derive(Clone, Default)]
+pub(crate) struct Beside(Arc<Mutex<Desk>>);
+
+#[derive(Default)]
+pub(crate) struct Desk {
+    pub(crate) now: Rational,
+    /// How long each search takes, one after the other; the last one again and again.
+    pub(crate) seconds: Vec<Rational>,
+    /// When the plan is there, until that was said.
+    due: Option<Rational>,
+    /// How long making it ready takes, likewise.
+    readying: Vec<Rational>,
+    ready: Option<Rational>,
+    pub(crate) readied: usize,
+    pub(crate) begun: usize,
+    pub(crate) given_up: usize,
+    pub(crate) waited_for: usize,
+    /// Whether there is never a plan.
+    pub(crate) has_none: bool,
+    /// From where plans were asked for.
+    pub(crate) asked: Vec<Situation>,
+    /// From where plans were begun ahead.
+    pub(crate) ahead: Vec<Situation>,
+    /// When the last one of these is there.
+    ahead_due: Rational,
+}
+
+impl Beside {
+    pub(crate) fn taking(seconds: &[Rational]) -> Self {
+        let desk = Desk {
+            seconds: seconds.to_vec(),
+            ..Desk::default()
+        };
+        Self(Arc::new(Mutex::new(desk)))
+    }
+
+    /// With plans that take so long to be made ready; without any times, that is done at once.
+    pub(crate) fn readying(self, seconds: &[Rational]) -> Self {
+        self.desk().readying = seconds.to_vec();
+        self
+    }
+
+    pub(crate) fn desk(&self) -> MutexGuard<'_, Desk> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Desk {
+    /// When a plan is there that is begun now.
+    fn next_due(&self) -> Rational {
+        let index = self.begun.min(self.seconds.len() - 1);
+        &self.now + &self.seconds[index]
+    }
+}
+
+impl Planner for Beside {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        self.desk().waited_for += 1;
+        self.collect(task, situation)
+    }
+
+    fn expect(&mut self, _task: &Task, situation: &Situation) {
+        let mut desk = self.desk();
+        desk.ahead_due = desk.next_due();
+        desk.ahead.push(situation.clone());
+    }
+
+    fn begin(&mut self, _task: &Task, situation: &Situation) -> bool {
+        let mut desk = self.desk();
+        let is_begun = desk.ahead.last() == Some(situation);
+        let due = if is_begun {
+            desk.ahead_due.clone().max(desk.now.clone())
+        } else {
+            desk.next_due()
+        };
+        desk.due = Some(due);
+        desk.begun += 1;
+        desk.asked.push(situation.clone());
+        true
+    }
+
+    fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        if self.desk().has_none {
+            return PlannerAnswer::from(PlanAnswer::Unsolvable);
+        }
+        Embedded::default().plan(task, situation)
+    }
+
+    fn give_up(&mut self) {
+        let mut desk = self.desk();
+        desk.due = None;
+        desk.given_up += 1;
+    }
+}
+
+/// A preparer that works beside the run, and takes its time; or, without any time to take, at once.
+pub(crate) struct Readier(pub(crate) Beside);
+
+impl Preparer for Readier {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, PrepareError> {
+        Analyst::new(flow::Settings::default()).prepare(task, plan, need)
+    }
+
+    fn begin(&mut self, _wanted: &Wanted<'_>) -> bool {
+        let mut desk = self.0.desk();
+        desk.readied += 1;
+        let Some(most) = desk.readying.len().checked_sub(1) else {
+            return false;
+        };
+        let ready = &desk.now + &desk.readying[most.min(desk.readied - 1)];
+        desk.ready = Some(ready);
+        true
+    }
+
+    fn give_up(&mut self) {
+        self.0.desk().ready = None;
+    }
+}
+
+/// That world, which says when a plan is there, and in which actions take longer or less long than planned.
+pub(crate) struct Telling {
+    pub(crate) inner: Scripted,
+    planner: Beside,
+    /// By how many quarters of itself the nth start's duration differs.
+    quarters: Vec<i64>,
+    started: usize,
+}
+
+impl World for Telling {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        let mut command = command.clone();
+        if let Command::Start {
+            duration: Some(duration),
+            ..
+        } = &mut command
+        {
+            let quarters = self.quarters.get(self.started % self.quarters.len().max(1));
+            let part = Rational::new(4 + quarters.copied().unwrap_or(0), 4);
+            *duration = &*duration * &part;
+            self.started += 1;
+        }
+        self.inner.command(now, &command)
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let mut desk = self.planner.desk();
+        if desk.ready.as_ref().is_some_and(|ready| *ready <= desk.now) {
+            // Without anything else that happens at that time.
+            desk.ready = None;
+            return Ok(Passage {
+                now: desk.now.clone(),
+                observations: vec![Observation {
+                    time: desk.now.clone(),
+                    event: Event::PlanReady,
+                }],
+            });
+        }
+        let (due, ready) = (desk.due.clone(), desk.ready.clone());
+        drop(desk);
+        let soonest = due.iter().chain(&ready).chain([until]).min();
+        let soonest = soonest.cloned().unwrap_or_default();
+        let mut passage = self.inner.wait(&soonest)?;
+        let mut desk = self.planner.desk();
+        desk.now.clone_from(&passage.now);
+        if due.is_some_and(|due| due <= passage.now) {
+            desk.due = None;
+            passage.observations.push(Observation {
+                time: passage.now.clone(),
+                event: Event::PlanMade,
+            });
+        }
+        if ready.is_some_and(|ready| ready <= passage.now) {
+            desk.ready = None;
+            passage.observations.push(Observation {
+                time: passage.now.clone(),
+                event: Event::PlanReady,
+            });
+        }
+        Ok(passage)
+    }
+}
+
+/// Notes, and the lines of the trace.
+struct Tape {
+    notes: Notes,
+    task: Arc<Task>,
+    lines: Arc<Mutex<Vec<String>>>,
+}
+
+impl Recorder for Tape {
+    fn record(&mut self, entry: &Entry<'_>) {
+        self.notes.record(entry);
+        let line = Line::of(&self.task, entry).text();
+        if let Entry::Planned { now, .. } = entry {
+            let note = format!("{}: the plan is there", now.to_decimal(1));
+            let notes = self.notes.0.lock();
+            notes.unwrap_or_else(PoisonError::into_inner).push(note);
+        }
+        let lines = self.lines.lock();
+        lines.unwrap_or_else(PoisonError::into_inner).push(line);
+    }
+}
+
+pub(crate) struct Told {
+    pub(crate) notes: Vec<String>,
+    pub(crate) lines: Vec<String>,
+    pub(crate) report: Report,
+}
+
+pub(crate) fn settings() -> RunSettings {
+    RunSettings {
+        plans_aside: true,
+        watches_room: true,
+        ..RunSettings::default()
+    }
+}
+
+/// The world of a script, and what says when it is over.
+pub(crate) fn telling(
+    (end, script): (i64, Vec<(Rational, Event)>),
+    planner: &Beside,
+    quarters: &[i64],
+) -> (Telling, Arc<AtomicBool>) {
+    let is_to_end = Arc::new(AtomicBool::new(false));
+    let script = script.into_iter();
+    let script = script.map(|(time, event)| Observation { time, event });
+    let world = Telling {
+        inner: Scripted {
+            now: Rational::ZERO,
+            coming: script.collect(),
+            end: Rational::from(end),
+            is_to_end: Arc::clone(&is_to_end),
+            slow: None,
+            on_cancel: None,
+        },
+        planner: planner.clone(),
+        quarters: quarters.to_vec(),
+        started: 0,
+    };
+    (world, is_to_end)
+}
+
+pub(crate) fn told(
+    execution: Execution<'_>,
+    task: &Arc<Task>,
+    script: (i64, Vec<(Rational, Event)>),
+    planner: &Beside,
+    quarters: &[i64],
+) -> Told {
+    let (mut world, is_to_end) = telling(script, planner, quarters);
+    told_in(execution, task, planner, &mut world, &is_to_end)
+}
+
+/// The run in that world, which says when it is over.
+pub(crate) fn told_in(
+    execution: Execution<'_>,
+    task: &Arc<Task>,
+    planner: &Beside,
+    world: &mut dyn World,
+    is_to_end: &Arc<AtomicBool>,
+) -> Told {
+    let is_to_end = Arc::clone(is_to_end);
+    let (notes, lines) = (Notes::default(), Arc::default());
+    let report = execution
+        .planned_by(planner.clone())
+        .recorded_by(Tape {
+            notes: notes.clone(),
+            task: Arc::clone(task),
+            lines: Arc::clone(&lines),
+        })
+        .ending_when(move || is_to_end.load(Ordering::SeqCst))
+        .run_in(world);
+    let notes = notes.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
+    Told {
+        notes: notes.clone(),
+        lines: lines.clone(),
+        report,
+    }
+}
+
+pub(crate) fn seconds(seconds: i64) -> Rational {
+    Rational::from(seconds)
+}
+
+#[track_caller]
+pub(crate) fn assert_has(told: &Told, notes: &[&str]) {
+    let mut left = told.notes.iter();
+    for note in notes {
+        let found = left.any(|it| it.contains(note));
+        assert!(found, "no `{note}` in its place in {:#?}", told.notes);
+    }
+}
