@@ -463,6 +463,29 @@ fn what_an_action_should_have_done_is_compared_with_what_is_seen() {
         "{:?}",
         report.reasons
     );
+    // What has to hold throughout is heeded throughout: the other way is taken once the path is gone.
+    let domain = "(define (domain ways) (:requirements :durative-actions)
+        (:predicates (path) (there))
+        (:durative-action walk :parameters () :duration (= ?duration 10)
+          :condition (over all (path)) :effect (at end (there)))
+        (:durative-action ride :parameters () :duration (= ?duration 30) :condition ()
+          :effect (at end (there))))";
+    let problem = "(define (problem p) (:domain ways) (:init (path)) (:goal (there)))";
+    let task = self::task(domain, problem);
+    let fact = task.fact_named("(path)").expect("a correct test");
+    let mut world = Toy {
+        coming: vec![Observation {
+            time: 4.into(),
+            event: Event::Fact { fact, truth: false },
+        }],
+        ..Toy::default()
+    };
+    let report = run(&task, &mut world);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:?}");
+    let done: Vec<_> = report.executed.iter().map(|it| &it.step).collect();
+    assert_eq!(done[0].duration, Some(Rational::from(4)), "{report:?}");
+    assert_eq!(done[1].action.name, "(ride)");
+    assert_eq!(causes(&report), [Cause::Surprise]);
 }
 
 #[test]
@@ -617,6 +640,23 @@ fn the_judge_goes_by_the_epsilon_of_the_plan() {
     assert_eq!(check(&["--epsilon", "0.01"]), Some(1));
     assert_eq!(check(&["--tolerance", "0.001"]), Some(0));
     assert_eq!(check(&["--tolerance", "0.01"]), Some(1));
+    // A plan that is not valid is not begun.
+    let plan = temporary("wrong.plan");
+    fs::write(&plan, "0: (drive rover depot shelf) [10]\n").expect("a plan");
+    let line = [
+        &["run"],
+        &DELIVERY[..],
+        &[&plan, "--planner", "none", "--json"],
+    ]
+    .concat();
+    let outcome = json(&line);
+    assert_eq!(outcome["verdict"], "no-plan", "{outcome:#}");
+    assert_eq!(outcome["executed"], serde_json::json!([]), "{outcome:#}");
+    assert!(
+        outcome["why"].to_string().contains("not valid"),
+        "{outcome:#}"
+    );
+    let _ = fs::remove_file(plan);
 }
 
 #[test]
