@@ -344,7 +344,7 @@ impl Variables {
         let bound = &row.bound - &row.value(&point).unwrap_or_default();
         let mut factors = Vec::new();
         for (variable, ends) in self.ends.iter().enumerate() {
-            let own = ends.iter().filter_map(|end| row.factors.get(end));
+            let own = ends.iter().filter_map(|end| row.factors.get(*end));
             let factor: Rational = own.sum();
             if !factor.is_zero() {
                 factors.push((variable, factor));

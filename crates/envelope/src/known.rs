@@ -70,7 +70,12 @@ impl Known {
                 if place >= self.mentions.len() {
                     self.mentions.resize_with(place + 1, Vec::new);
                 }
-                self.mentions[place].push(Mention {
+                let mentions = &mut self.mentions[place];
+                // Most ends count in one row or two.
+                if mentions.len() == mentions.capacity() {
+                    mentions.reserve_exact(mentions.len().max(1));
+                }
+                mentions.push(Mention {
                     cut,
                     row: first + offset,
                     factor: factor.clone(),

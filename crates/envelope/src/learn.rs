@@ -117,7 +117,7 @@ pub(crate) fn without_strategy(
             found.extend(reader.cut(refutation, envelope));
         }
         found.retain(|cut| {
-            let ends = cut.rows.iter().map(|row| row.factors.keys().copied());
+            let ends = cut.rows.iter().map(|row| row.factors.keys());
             known.insert(ends.map(Vec::from_iter).collect::<Vec<_>>())
         });
         cuts.append(&mut found);

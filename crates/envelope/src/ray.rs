@@ -183,7 +183,7 @@ impl Ray {
         // Between the numbers at which an end comes to its limit, the value is linear.
         let mut corners = vec![Rational::ZERO, most.clone()];
         for end in row.factors.keys() {
-            let place = place(*end);
+            let place = place(end);
             if let Some(limit) = &self.most[place]
                 && let Some(number) = (limit - &self.base[place]).checked_div(&self.step[place])
                 && number.is_positive()

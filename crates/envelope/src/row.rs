@@ -1,16 +1,16 @@
 //! A linear inequality in the ends of boxes.
 
-use std::collections::BTreeMap;
-
 use elbowroom_num::{Rational, Total};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
+
+use crate::linear::Terms;
 
 /// `Σ factor · reach(end) <= bound`, or `<` when strict: a half-space of boxes, each of which is
 /// given by how far out its ends lie ([`BoxEnd::reach`]).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
     /// The factor of each end; none is zero.
-    pub factors: BTreeMap<BoxEnd, Rational>,
+    pub factors: Terms<BoxEnd>,
     /// The upper bound of the sum.
     pub bound: Rational,
     /// Whether the bound itself is excluded.

@@ -60,7 +60,7 @@ fn belief(bencher: Bencher<'_, '_>, facts: usize) {
 }
 
 fn action(index: usize, needed: FactId, changed: FactId) -> Action {
-    let snap = |condition, effects| SnapAction { condition, effects };
+    let snap = |condition, effects| Arc::new(SnapAction { condition, effects });
     let guard = || Condition::TRUE;
     let effect = Effect {
         guard: Guard {

@@ -412,10 +412,9 @@ impl Progression {
 /// Leaves out the effects that will not take place, and what is decided of the others' guards.
 fn decide_guards(body: &mut DurativeBody, at_end: &[bool], continuous: &[bool]) {
     let mut on = at_end.iter();
-    body.end
-        .effects
-        .retain(|_| on.next().copied().unwrap_or(true));
-    for effect in &mut body.end.effects {
+    let end = Arc::make_mut(&mut body.end);
+    end.effects.retain(|_| on.next().copied().unwrap_or(true));
+    for effect in &mut end.effects {
         effect.guard.at_start = Condition::TRUE;
     }
     let mut on = continuous.iter();

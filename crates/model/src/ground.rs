@@ -2,6 +2,8 @@
 //!
 //! Facts and fluents are numbers here; [`Task`](crate::Task) knows their names.
 
+use std::sync::Arc;
+
 use crate::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
 
 /// A ground atom, as a position in its task's table.
@@ -213,12 +215,12 @@ pub enum Body {
 pub struct DurativeBody {
     /// All must hold; none means that any duration `>= 0` will do.
     pub duration: Vec<DurationConstraint>,
-    /// Its start.
-    pub start: SnapAction,
+    /// Its start. Shared, as copies of an action that differ in its duration alone are.
+    pub start: Arc<SnapAction>,
     /// Needed at every moment of the open interval between start and end.
     pub over_all: Condition,
     /// Its end.
-    pub end: SnapAction,
+    pub end: Arc<SnapAction>,
     /// Change while it runs.
     pub continuous: Vec<ContinuousEffect>,
 }
@@ -270,9 +272,9 @@ impl Action {
                         at_end: constraint.at_end,
                     })
                     .collect(),
-                start: body.start.map_leaves(replace),
+                start: Arc::new(body.start.map_leaves(replace)),
                 over_all: body.over_all.map_leaves(replace),
-                end: body.end.map_leaves(replace),
+                end: Arc::new(body.end.map_leaves(replace)),
                 continuous: body
                     .continuous
                     .iter()

@@ -4,6 +4,7 @@ mod autonomous;
 mod constraints;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use elbowroom_num::Rational;
 
@@ -122,9 +123,9 @@ impl<'a> Grounder<'a> {
                         at_end: constraint.at_end,
                     })
                     .collect(),
-                start: self.ground_snap(at_start, start_effects, binding, known),
+                start: Arc::new(self.ground_snap(at_start, start_effects, binding, known)),
                 over_all: self.expand(over_all, binding, known),
-                end: self.ground_snap(at_end, end_effects, binding, known),
+                end: Arc::new(self.ground_snap(at_end, end_effects, binding, known)),
                 continuous: self.ground_continuous(continuous, binding, known),
             }),
         };

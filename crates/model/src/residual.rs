@@ -84,10 +84,10 @@ impl RunningAction {
         Action {
             body: Body::Durative(DurativeBody {
                 duration: bounds(&self.duration, &elapsed),
-                start: SnapAction {
+                start: Arc::new(SnapAction {
                     condition: Condition::TRUE,
                     effects: Vec::new(),
-                },
+                }),
                 over_all: body.over_all,
                 end: body.end,
                 continuous: body.continuous,

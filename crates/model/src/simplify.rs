@@ -1,5 +1,7 @@
 //! Conditions, expressions and actions without the parts that are the same in every state.
 
+use std::sync::Arc;
+
 use elbowroom_num::Rational;
 
 use crate::ground::{
@@ -146,9 +148,9 @@ impl Action {
                 for constraint in &mut body.duration {
                     simplify_expression(&mut constraint.bound, constants);
                 }
-                body.start.simplify(constants);
+                Arc::make_mut(&mut body.start).simplify(constants);
                 simplify_condition(&mut body.over_all, constants);
-                body.end.simplify(constants);
+                Arc::make_mut(&mut body.end).simplify(constants);
                 body.continuous.retain_mut(|effect| {
                     simplify_expression(&mut effect.rate, constants);
                     effect.guard.simplify(constants);

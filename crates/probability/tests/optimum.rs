@@ -253,10 +253,10 @@ fn steps_from<'c>(
     let mut steps = Vec::new();
     for (id, instance) in case.plan.instances() {
         let (snap, next) = match &instance.action.body {
-            Body::Durative(body) if running.contains(&id) => (&body.end, without(running, id)),
+            Body::Durative(body) if running.contains(&id) => (&*body.end, without(running, id)),
             Body::Durative(body) => {
                 let more = running.iter().copied().chain([id]).collect();
-                (&body.start, more)
+                (&*body.start, more)
             }
             Body::Instantaneous(snap) => (snap, running.to_vec()),
         };

@@ -54,6 +54,7 @@ mod bridges;
 mod consistency;
 mod consistent;
 mod direction;
+mod few;
 mod ids;
 mod implied;
 mod lists;

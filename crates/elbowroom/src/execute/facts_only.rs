@@ -21,8 +21,8 @@ fn without_numbers(action: &Action) -> Action {
     match &mut action.body {
         Body::Instantaneous(snap) => strip(snap),
         Body::Durative(body) => {
-            strip(&mut body.start);
-            strip(&mut body.end);
+            strip(Arc::make_mut(&mut body.start));
+            strip(Arc::make_mut(&mut body.end));
             body.over_all = taken_as(&body.over_all, true);
             body.continuous.clear();
         }

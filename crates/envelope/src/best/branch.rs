@@ -12,6 +12,7 @@ use super::master::{Master, Span};
 use super::{BestProof, BestRun, BestStep, Case, Reasons, Touch, Variables};
 use crate::cut::{Cut, Ground};
 use crate::learn::Learnt;
+use crate::linear::Terms;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
 use crate::ray::{Ray, place};
@@ -397,7 +398,7 @@ impl Search<'_> {
             ends.push((end, outside));
         }
         let rows = ends.into_iter().map(|(end, bound)| Row {
-            factors: [(end, Rational::ONE)].into(),
+            factors: Terms::one(end, Rational::ONE),
             bound,
             is_strict: true,
         });

@@ -69,7 +69,7 @@ impl Pieces {
                 continue;
             };
             for row in bounds.divided(plan, origins, envelope).unwrap_or_default() {
-                let ends: Vec<BoxEnd> = row.factors.keys().copied().collect();
+                let ends: Vec<BoxEnd> = row.factors.keys().collect();
                 if !ends.is_empty() && row.holds_in(envelope) && self.known.insert(vec![ends]) {
                     rows.push(row);
                 }

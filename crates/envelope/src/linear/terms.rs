@@ -90,6 +90,23 @@ impl<K: Copy + Ord> Terms<K> {
     }
 }
 
+/// From coefficients in the order of what they belong to, none zero.
+impl<K: Copy + Ord> FromIterator<(K, Rational)> for Terms<K> {
+    fn from_iter<I: IntoIterator<Item = (K, Rational)>>(terms: I) -> Self {
+        let mut all = Vec::from_iter(terms);
+        debug_assert!(
+            all.windows(2).all(|two| two[0].0 < two[1].0),
+            "each is after the one before"
+        );
+        debug_assert!(
+            all.iter().all(|(_, coefficient)| !coefficient.is_zero()),
+            "no coefficient is zero"
+        );
+        all.shrink_to_fit();
+        Self(all)
+    }
+}
+
 impl<'a, K: Copy + Ord> IntoIterator for &'a Terms<K> {
     type Item = &'a (K, Rational);
     type IntoIter = std::slice::Iter<'a, (K, Rational)>;

@@ -167,16 +167,16 @@ pub(crate) fn compared(
 }
 
 /// Drops inequalities between constants that hold; `None` if one does not.
-pub(crate) fn settled(conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
-    let mut open = Vec::new();
-    for inequality in conjunction {
-        match inequality.expression.as_constant() {
-            Some(value) if value.is_negative() || (value.is_zero() && !inequality.is_strict) => {}
-            Some(_) => return None,
-            None => open.push(inequality),
-        }
+pub(crate) fn settled(mut conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
+    let is_broken = |inequality: &Inequality| {
+        let value = inequality.expression.as_constant();
+        value.is_some_and(|value| value.is_positive() || (value.is_zero() && inequality.is_strict))
+    };
+    if conjunction.iter().any(is_broken) {
+        return None;
     }
-    Some(open)
+    conjunction.retain(|inequality| inequality.expression.as_constant().is_none());
+    Some(conjunction)
 }
 
 pub(crate) fn always_if(condition: bool) -> Alternatives {

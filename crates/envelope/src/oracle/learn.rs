@@ -191,7 +191,7 @@ impl Oracle {
             Ground::Cycle(_) | Ground::Semireducible(_) => {
                 let mut values = envelope.nearest(&self.plan.nominal());
                 for end in row.factors.keys() {
-                    values[end.parameter] = if *end == moved {
+                    values[end.parameter] = if end == moved {
                         end.side.at_reach(reach)
                     } else {
                         let interval = envelope.interval(end.parameter);

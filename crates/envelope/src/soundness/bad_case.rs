@@ -237,7 +237,6 @@ impl<'a, S: Scale> Schedules<'a, S> {
         if case.inequalities.is_empty() && self.reduction.coupled.is_empty() {
             return Outcome::Possible;
         }
-        let mut certificates = Vec::new();
         let multiplied: Vec<ParameterId> = {
             let mut ids: Vec<_> = case
                 .inequalities
@@ -254,6 +253,8 @@ impl<'a, S: Scale> Schedules<'a, S> {
         {
             return self.each_possible(case, parameter);
         }
+        // Mostly one, and there are as many as conditions.
+        let mut certificates = Vec::with_capacity(corners.len());
         for corner in corners {
             let fixed: Vec<Inequality> = case
                 .inequalities

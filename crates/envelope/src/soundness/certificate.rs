@@ -62,6 +62,7 @@ impl Certificate {
             }
             is_same
         });
+        self.ends.shrink_to_fit();
         self
     }
 

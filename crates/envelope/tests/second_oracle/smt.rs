@@ -307,7 +307,7 @@ impl<'a> Encoder<'a> {
                 Body::Instantaneous(snap) => snap,
                 Body::Durative(body) => &body.start,
             }),
-            Node::End(id) => action(id).durative().map(|body| &body.end),
+            Node::End(id) => action(id).durative().map(|body| &*body.end),
         }
     }
 

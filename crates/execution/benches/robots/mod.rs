@@ -215,19 +215,19 @@ fn leave_durations_open(plan: &mut ParametrizedPlan) {
 }
 
 fn nothing(index: usize) -> Action {
-    let snap = || SnapAction {
+    let nothing = Arc::new(SnapAction {
         condition: Condition::TRUE,
         effects: Vec::new(),
-    };
+    });
     Action {
         schema: SchemaId(0),
         arguments: Vec::new(),
         name: format!("(work {index})"),
         body: Body::Durative(DurativeBody {
             duration: Vec::new(),
-            start: snap(),
+            start: Arc::clone(&nothing),
             over_all: Condition::TRUE,
-            end: snap(),
+            end: nothing,
             continuous: Vec::new(),
         }),
     }

@@ -422,8 +422,8 @@ fn may_matter(news: &News) -> Option<StepId> {
 fn set_amount(action: &mut Action, is_end: bool, measured: &Measured) {
     let effects: &mut [Effect] = match &mut action.body {
         Body::Instantaneous(snap) => &mut snap.effects,
-        Body::Durative(body) if is_end => &mut body.end.effects,
-        Body::Durative(body) => &mut body.start.effects,
+        Body::Durative(body) if is_end => &mut Arc::make_mut(&mut body.end).effects,
+        Body::Durative(body) => &mut Arc::make_mut(&mut body.start).effects,
     };
     for effect in effects {
         if let Change::Update { fluent, value, .. } = &mut effect.change

@@ -461,8 +461,14 @@ fn as_it_was(entry: &Opened, is_whole: bool) -> Action {
         Body::Instantaneous(snap) => put_in(snap, &entry.measured[0]),
         Body::Durative(body) => {
             body.duration.clear();
-            put_in(&mut body.start, &entry.measured[0]);
-            put_in(&mut body.end, &entry.measured[1]);
+            for (snap, measured) in [&mut body.start, &mut body.end]
+                .into_iter()
+                .zip(&entry.measured)
+            {
+                if !measured.is_empty() {
+                    put_in(Arc::make_mut(snap), measured);
+                }
+            }
             if !is_whole {
                 cut_off(body);
             }
@@ -484,8 +490,8 @@ fn put_in(snap: &mut SnapAction, measured: &[Measured]) {
 /// A cancelled action has no end, and its over-all conditions no longer matter.
 fn cut_off(body: &mut DurativeBody) {
     body.over_all = Condition::TRUE;
-    body.end = SnapAction {
+    body.end = Arc::new(SnapAction {
         condition: Condition::TRUE,
         effects: Vec::new(),
-    };
+    });
 }

@@ -1,5 +1,7 @@
 //! Constants in a ground action: where they stand, and parameters in their place.
 
+use std::sync::Arc;
+
 use elbowroom_model::Task;
 use elbowroom_model::ground::{
     Action, Body, Change, Condition, Effect, Expression, FluentId, SnapAction,
@@ -70,8 +72,8 @@ fn rewritten(task: &Task, action: &Action, place: Place, replace: Replace<'_>) -
     match &mut action.body {
         Body::Instantaneous(snap) => rewrite_snap(task, snap, place, replace),
         Body::Durative(body) => {
-            rewrite_snap(task, &mut body.start, place, replace);
-            rewrite_snap(task, &mut body.end, place, replace);
+            rewrite_snap(task, Arc::make_mut(&mut body.start), place, replace);
+            rewrite_snap(task, Arc::make_mut(&mut body.end), place, replace);
             match place {
                 Place::Conditions(function) => {
                     rewrite_condition(task, &mut body.over_all, function, replace);

@@ -79,7 +79,7 @@ fn changes_numbers(action: &Action, only_grows: bool) -> bool {
 fn snaps(action: &Action) -> impl Iterator<Item = &SnapAction> {
     let (first, second) = match &action.body {
         Body::Instantaneous(body) => (body, None),
-        Body::Durative(body) => (&body.start, Some(&body.end)),
+        Body::Durative(body) => (&*body.start, Some(&*body.end)),
     };
     [Some(first), second].into_iter().flatten()
 }

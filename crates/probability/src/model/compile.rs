@@ -200,7 +200,7 @@ impl Compiler<'_> {
         let mut start = self.snap(action, &body.start)?;
         start.success = self.likelihoods.start(action)?;
         start.over_all = self.requirement(&body.over_all);
-        let mut ending = body.end.clone();
+        let mut ending = SnapAction::clone(&body.end);
         for effect in &mut ending.effects {
             self.remember_guard(effect, &mut start);
         }

@@ -322,7 +322,7 @@ impl<'a> Worlds<'a> {
         let failure = 1.0 - self.likelihoods.start(action).unwrap();
         let snap = match &action.body {
             Body::Instantaneous(snap) => snap.clone(),
-            Body::Durative(body) => body.start.clone(),
+            Body::Durative(body) => SnapAction::clone(&body.start),
         };
         let nothing = SnapAction {
             condition: snap.condition,

@@ -28,7 +28,7 @@
 //! ways end after a few edges, in proportion to their size.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::collections::{BTreeSet, BinaryHeap};
 use std::ops::ControlFlow;
 
 use super::conflict::Conflict;
@@ -36,6 +36,7 @@ use super::dispatchable::Dispatchable;
 use super::extended::Extended;
 use super::graph::{Edge, EdgeId, Graph, Kind, Origin, Way, WayId};
 use super::{LinkId, UncertainNetwork};
+use crate::few::Few;
 use crate::{NodeId, Weight};
 
 /// The limit on the steps of a conflict.
@@ -122,12 +123,23 @@ struct Frame<W> {
     plain: Vec<EdgeId>,
     /// Whether the plain edges have been begun with.
     is_last: bool,
-    reached: BTreeMap<NodeId, Reached<W>>,
+    reached: Few<NodeId, Reached<W>>,
     /// Edges that close a cycle at the node in this pass, other than that of the shortest one. Those found last, of
     /// which the others may be parts, come first.
     others: BTreeSet<EdgeId>,
     region: Vec<NodeId>,
     queue: BinaryHeap<Reverse<(Extended<W>, NodeId)>>,
+}
+
+impl<W: Weight> Frame<W> {
+    /// The way from a node that has been reached.
+    fn at(&self, node: NodeId) -> &Reached<W> {
+        self.reached.get(node).expect("it has been reached")
+    }
+
+    fn distance(&self, node: NodeId) -> Extended<W> {
+        self.at(node).distance.clone()
+    }
 }
 
 /// Where ways under way close a cycle.
@@ -206,7 +218,7 @@ impl<'a, W: Weight> Search<'a, W> {
                 }
                 continue;
             };
-            let reached = frame.reached.get_mut(&node).expect("queued when reached");
+            let reached = frame.reached.get_mut(node).expect("queued when reached");
             if reached.distance < distance || reached.way.is_some() {
                 continue;
             }
@@ -249,7 +261,7 @@ impl<'a, W: Weight> Search<'a, W> {
             label: None,
             plain: Vec::new(),
             is_last: false,
-            reached: BTreeMap::new(),
+            reached: Few::default(),
             others: BTreeSet::new(),
             region: Vec::new(),
             queue: BinaryHeap::new(),
@@ -292,7 +304,7 @@ impl<'a, W: Weight> Search<'a, W> {
         let Some(frame) = self.frames.last_mut() else {
             return;
         };
-        if let Some(known) = frame.reached.get(&from) {
+        if let Some(known) = frame.reached.get(from) {
             let (longer, by) = if known.distance <= distance {
                 (&distance, edge)
             } else {
@@ -322,7 +334,7 @@ impl<'a, W: Weight> Search<'a, W> {
         let Some(frame) = self.frames.last_mut() else {
             return false;
         };
-        let distance = frame.reached[&node].distance.clone();
+        let distance = frame.distance(node);
         let is_one_edge = self.graph.ways[way].rest().is_none();
         let edge = |kind| Edge {
             from: node,
@@ -381,7 +393,7 @@ impl<'a, W: Weight> Search<'a, W> {
     fn way(&mut self, node: NodeId) -> WayId {
         let way = self.way_to(self.frames.len() - 1, node);
         let frame = self.frames.last_mut();
-        if let Some(reached) = frame.and_then(|frame| frame.reached.get_mut(&node)) {
+        if let Some(reached) = frame.and_then(|frame| frame.reached.get_mut(node)) {
             reached.way = Some(way);
         }
         way
@@ -389,7 +401,7 @@ impl<'a, W: Weight> Search<'a, W> {
 
     /// The shortest way from a node to that frame's, as far as it is known.
     fn way_to(&mut self, frame: usize, node: NodeId) -> WayId {
-        let edge = self.frames[frame].reached[&node].edge;
+        let edge = self.frames[frame].at(node).edge;
         self.way_by(frame, edge)
     }
 
@@ -397,7 +409,7 @@ impl<'a, W: Weight> Search<'a, W> {
     fn way_by(&mut self, frame: usize, edge: EdgeId) -> WayId {
         let frame = &self.frames[frame];
         let next = self.graph.edges[edge].to;
-        let rest = match frame.reached.get(&next) {
+        let rest = match frame.reached.get(next) {
             Some(reached) if next != frame.node => reached.way,
             _ => None,
         };
@@ -411,7 +423,7 @@ impl<'a, W: Weight> Search<'a, W> {
             return;
         };
         let label = frame.label;
-        let distance = frame.reached[&node].distance.clone();
+        let distance = frame.distance(node);
         for index in 0..self.graph.positive_into[node.index()].len() {
             let id = self.graph.positive_into[node.index()][index];
             let edge = &self.graph.edges[id];

@@ -141,7 +141,7 @@ impl Instances {
                 Body::Durative(body) => {
                     let bounds = moments.duration(body)?;
                     let over_all = literals(&body.over_all);
-                    (&body.start, Some(&body.end), Some(bounds), over_all)
+                    (&*body.start, Some(&*body.end), Some(bounds), over_all)
                 }
             };
             let (least, most) = bounds.unwrap_or((Rational::ZERO, Some(Rational::ZERO)));

@@ -99,7 +99,7 @@ fn multipliers(proof: &BestProof) -> Vec<(&Cut, Rational)> {
             });
             let sum: Rational = moving
                 .flat_map(|own| own.ends.iter().map(move |end| (end, &own.scale)))
-                .filter_map(|(end, scale)| Some(cut.rows[0].factors.get(end)? * scale))
+                .filter_map(|(end, scale)| Some(cut.rows[0].factors.get(*end)? * scale))
                 .sum();
             let gain = Rational::ONE.checked_div(&sum);
             gain.map(|gain| (cut, gain)).into_iter().collect()

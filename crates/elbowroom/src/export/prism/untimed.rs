@@ -211,8 +211,8 @@ impl<'p> Process<'p> {
             .flat_map(|(action, (_, ground))| match &ground.body {
                 Body::Instantaneous(snap) => vec![(action, Kind::Instant, snap)],
                 Body::Durative(body) => vec![
-                    (action, Kind::Start, &body.start),
-                    (action, Kind::End, &body.end),
+                    (action, Kind::Start, &*body.start),
+                    (action, Kind::End, &*body.end),
                 ],
             })
             .map(|(action, kind, snap)| Happening { action, kind, snap })

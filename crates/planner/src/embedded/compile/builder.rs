@@ -4,6 +4,8 @@ mod durations;
 mod finish;
 mod snaps;
 
+use std::sync::Arc;
+
 use elbowroom_model::ground::{self, Body, Condition, DurativeBody};
 use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Footprint, Situation, Task};
@@ -262,7 +264,7 @@ impl<'a> Builder<'a> {
     /// The end of an action that is under way; its guards are decided.
     fn end_of(&mut self, body: &DurativeBody, footprint: &Footprint) -> u32 {
         let mut decided = body.clone();
-        for effect in &mut decided.end.effects {
+        for effect in &mut Arc::make_mut(&mut decided.end).effects {
             effect.guard.at_start = Condition::TRUE;
         }
         let shifts = Shifts::of(&body.end.effects);

@@ -1,0 +1,95 @@
+//! Maps most of which are small.
+
+use std::collections::BTreeMap;
+
+/// So many entries stand in a list.
+const FEW: usize = 8;
+
+/// A map for searches of which very many are under way at once, each with a few entries: these stand
+/// in a list that is no larger than it has to be, where a search tree has room for eleven from the
+/// beginning. Once there are many, they are moved to a tree.
+#[derive(Clone, Debug)]
+pub(crate) struct Few<K, V> {
+    /// Empty once there is a tree.
+    list: Vec<(K, V)>,
+    tree: BTreeMap<K, V>,
+}
+
+impl<K, V> Default for Few<K, V> {
+    fn default() -> Self {
+        Self {
+            list: Vec::new(),
+            tree: BTreeMap::new(),
+        }
+    }
+}
+
+impl<K: Copy + Ord, V> Few<K, V> {
+    pub(crate) fn get(&self, key: K) -> Option<&V> {
+        if self.tree.is_empty() {
+            let entry = self.list.iter().find(|(own, _)| *own == key);
+            entry.map(|(_, value)| value)
+        } else {
+            self.tree.get(&key)
+        }
+    }
+
+    pub(crate) fn get_mut(&mut self, key: K) -> Option<&mut V> {
+        if self.tree.is_empty() {
+            let entry = self.list.iter_mut().find(|(own, _)| *own == key);
+            entry.map(|(_, value)| value)
+        } else {
+            self.tree.get_mut(&key)
+        }
+    }
+
+    /// Puts a value in, in place of the key's own if it has one.
+    pub(crate) fn insert(&mut self, key: K, value: V) {
+        if let Some(own) = self.get_mut(key) {
+            *own = value;
+        } else if self.tree.is_empty() && self.list.len() < FEW {
+            if self.list.len() == self.list.capacity() {
+                self.list.reserve_exact(self.list.len().max(1));
+            }
+            self.list.push((key, value));
+        } else {
+            self.tree.extend(std::mem::take(&mut self.list));
+            self.tree.insert(key, value);
+        }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.list.clear();
+        self.tree.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::prelude::*;
+
+    use super::Few;
+
+    proptest! {
+        #[test]
+        fn it_holds_what_a_map_holds(steps in prop::collection::vec((0..30_usize, 0..40_u32), 0..80)) {
+            let (mut few, mut map) = (Few::default(), BTreeMap::new());
+            for (key, value) in steps {
+                // One step in forty begins anew.
+                if value == 0 {
+                    few.clear();
+                    map.clear();
+                } else {
+                    few.insert(key, value);
+                    map.insert(key, value);
+                }
+                for key in 0..30 {
+                    prop_assert_eq!(few.get(key), map.get(&key));
+                    prop_assert_eq!(few.get_mut(key), map.get_mut(&key));
+                }
+            }
+        }
+    }
+}
