@@ -14,6 +14,10 @@ pub trait Recorder: Send {
     /// leaves its record.
     fn record(&mut self, entry: &Entry<'_>);
 
+    /// The world is told now what was recorded since the last time, all commands of one decision. Whoever
+    /// promises that nothing is begun that is not on record sees to that here, once for all of them.
+    fn commit(&mut self) {}
+
     /// A lasting run takes up a plan, or rests with nothing under way, and could be gone on with from
     /// what `stand` says, without what was recorded before: whoever wants to, may begin its record
     /// anew here, and says whether it has. Asked whenever a plan is taken up, before that is recorded,
@@ -27,6 +31,10 @@ pub trait Recorder: Send {
 impl<R: Recorder + ?Sized> Recorder for &mut R {
     fn record(&mut self, entry: &Entry<'_>) {
         (**self).record(entry);
+    }
+
+    fn commit(&mut self) {
+        (**self).commit();
     }
 
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {

@@ -308,13 +308,12 @@ impl<'a> Run<'a> {
                 // What starts at once is told at once, and must be known before anything else is
                 // decided.
                 self.agenda.push(Todo::Pass(self.now.clone()));
-                let orders = orders.into_iter().rev();
-                self.agenda.extend(orders.map(Todo::Start));
+                self.start(orders);
             }
             Decision::Cancel(steps) => {
-                let tickets = steps.iter().rev();
+                let tickets = steps.iter();
                 let tickets = tickets.filter_map(|step| self.account.ticket(*step));
-                self.agenda.extend(tickets.map(Todo::Cancel));
+                self.cancel(tickets.collect());
             }
             Decision::Wait { until } => self.wait(until)?,
             Decision::Replan => {
@@ -331,30 +330,47 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    fn start(&mut self, order: Order) -> Command {
-        let ticket = self.account.open(&order, &self.now);
-        let command = Command::Start {
-            ticket,
-            action: order.action,
-            duration: order.duration,
-        };
-        self.ports.recorder.record(&Entry::Command {
-            now: &self.now,
-            command: &command,
-            planned: &order.planned,
-        });
-        command
+    /// Records that actions start; the world is told before anything else is done.
+    fn start(&mut self, orders: Vec<Order>) {
+        let mut commands = Vec::with_capacity(orders.len());
+        for order in orders {
+            let ticket = self.account.open(&order, &self.now);
+            let command = Command::Start {
+                ticket,
+                action: order.action,
+                duration: order.duration,
+            };
+            self.ports.recorder.record(&Entry::Command {
+                now: &self.now,
+                command: &command,
+                planned: &order.planned,
+            });
+            commands.push(command);
+        }
+        self.send(commands);
     }
 
-    fn cancel(&mut self, ticket: Ticket) -> Command {
-        let command = Command::Cancel { ticket };
-        self.ports.recorder.record(&Entry::Command {
-            now: &self.now,
-            command: &command,
-            planned: &Planned::default(),
-        });
-        self.account.note_cancel(ticket, &self.now);
-        command
+    /// The same for actions that are cancelled.
+    fn cancel(&mut self, tickets: Vec<Ticket>) {
+        let mut commands = Vec::with_capacity(tickets.len());
+        for ticket in tickets {
+            let command = Command::Cancel { ticket };
+            self.ports.recorder.record(&Entry::Command {
+                now: &self.now,
+                command: &command,
+                planned: &Planned::default(),
+            });
+            self.account.note_cancel(ticket, &self.now);
+            commands.push(command);
+        }
+        self.send(commands);
+    }
+
+    /// Has the world told these, which are on record.
+    fn send(&mut self, commands: Vec<Command>) {
+        self.ports.recorder.commit();
+        self.agenda
+            .extend(commands.into_iter().rev().map(Todo::Send));
     }
 
     /// Waits until the executor's next decision time, or until the patience with an action ends.

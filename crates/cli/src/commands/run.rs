@@ -337,12 +337,8 @@ impl Job<'_> {
         let mut world = self.attended(world, &Rational::ONE);
         (self.begun)();
         let outcome = {
-            let writer = JournalWriter {
-                task: Arc::clone(self.task),
-                file: &mut file,
-                kept: kept.clone(),
-                desk: self.attendance.desk().cloned(),
-            };
+            let desk = self.attendance.desk();
+            let writer = JournalWriter::new(self.task, &mut file, &kept, desk);
             let writer = self.attendance.witnessed(writer, self.task, true);
             let mut writer = views.shown(writer, self.task);
             let begun = Clock::start();

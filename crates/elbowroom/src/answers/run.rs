@@ -283,6 +283,10 @@ impl Recorder for Heard<'_, '_> {
             .notice(&Event::Run(RunProgress { entry, plans }));
     }
 
+    fn commit(&mut self) {
+        self.inner.commit();
+    }
+
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
         self.inner.begin_anew(stand)
     }

@@ -9,7 +9,7 @@ use super::beginning::Course;
 use super::stand::TakesUp;
 use super::{Next, Run, Stop};
 use crate::event::{Command, Ticket};
-use crate::executor::{Mission, News, Order};
+use crate::executor::{Mission, News};
 use crate::reason::{Cause, Reason};
 
 /// Something to do. Each takes no time in the world, but for [`Todo::Pass`] and [`Todo::Close`].
@@ -18,10 +18,10 @@ pub(super) enum Todo {
     Begin(Option<TimeTriggeredPlan>),
     /// Ask the executor.
     Decide,
-    /// Start an action.
-    Start(Order),
-    /// Cancel one.
-    Cancel(Ticket),
+    /// Cancel actions.
+    Cancel(Vec<Ticket>),
+    /// Tell the world what is on record.
+    Send(Command),
     /// Let time pass.
     Pass(Rational),
     /// Give up what has been silent for too long.
@@ -70,8 +70,8 @@ impl Run<'_> {
             }
             Todo::Begin(None) => self.replan(&Reason::new(Cause::NewPlan))?,
             Todo::Decide => self.decide_and_follow()?,
-            Todo::Start(order) => return Ok(Some(self.start(order))),
-            Todo::Cancel(ticket) => return Ok(Some(self.cancel(ticket))),
+            Todo::Cancel(tickets) => self.cancel(tickets),
+            Todo::Send(command) => return Ok(Some(command)),
             Todo::Pass(until) => {
                 let until = until.min(self.settings.time_limit.clone());
                 self.asked = Some(Next::Wait { until });
@@ -79,7 +79,7 @@ impl Run<'_> {
             Todo::GiveUpTheSilent => self.give_up_the_silent(),
             Todo::GiveUp(ticket, since) => {
                 self.agenda.push(Todo::NoteSilence(ticket, since));
-                return Ok(Some(self.cancel(ticket)));
+                self.cancel(vec![ticket]);
             }
             Todo::NoteSilence(ticket, since) => self.note_silence(ticket, since),
             Todo::Settle(awaited) => self.go_on_settling(awaited),

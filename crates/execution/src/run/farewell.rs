@@ -66,9 +66,9 @@ impl Run<'_> {
         self.progress.begin_plan();
         // What stops at once is told at once.
         self.agenda.push(Todo::Close(self.now.clone()));
-        let running = open.into_iter().rev();
+        let running = open.into_iter();
         let running = running.filter(|ticket| !self.account.is_cancelled(*ticket));
-        self.agenda.extend(running.map(Todo::Cancel));
+        self.agenda.push(Todo::Cancel(running.collect()));
     }
 
     /// Waits for what was told to stop, if there is something left.

@@ -30,14 +30,13 @@ impl Run<'_> {
             RunningRule::Keep => {
                 let lost = self.what_cannot_go_on();
                 self.agenda.push(Todo::Settle(Some(lost.clone())));
-                self.agenda.extend(lost.into_iter().rev().map(Todo::Cancel));
+                self.agenda.push(Todo::Cancel(lost));
             }
             RunningRule::Await => self.agenda.push(Todo::Settle(None)),
             RunningRule::Cancel => {
                 self.agenda.push(Todo::Settle(None));
-                let running: Vec<Ticket> = self.account.open_tickets().collect();
-                let running = running.into_iter().rev();
-                self.agenda.extend(running.map(Todo::Cancel));
+                let running = self.account.open_tickets().collect();
+                self.agenda.push(Todo::Cancel(running));
             }
         }
     }
@@ -100,8 +99,7 @@ impl Run<'_> {
                 // No plan can bear that it goes on: it has failed, and the next one does without.
                 self.agenda.push(Todo::Plan(reason.clone()));
                 self.agenda.push(Todo::Settle(Some(overdue.clone())));
-                let overdue = overdue.into_iter().rev();
-                self.agenda.extend(overdue.map(Todo::Cancel));
+                self.agenda.push(Todo::Cancel(overdue));
                 return Ok(());
             }
         }

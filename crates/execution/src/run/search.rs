@@ -423,8 +423,7 @@ impl Run<'_> {
             // No plan can bear that it goes on: it has failed, and the next one does without.
             self.agenda.push(Todo::Plan(reason));
             self.agenda.push(Todo::Settle(Some(overdue.clone())));
-            let overdue = overdue.into_iter().rev();
-            self.agenda.extend(overdue.map(Todo::Cancel));
+            self.agenda.push(Todo::Cancel(overdue));
             return Ok(());
         }
         Err(Stop::Over(match answer {

@@ -27,13 +27,40 @@ impl Kept {
 }
 
 /// Writes each entry into a journal. Before the world is told to start or to cancel something, that
-/// is on the disk, and so is what people ask before they are told that it was taken in; all else is handed to the operating system at once.
+/// is on the disk, together with all else that the same decision starts or cancels, and so is what people ask before they are told that it was taken in; all else is handed to the operating system at once.
 pub(super) struct JournalWriter<'a> {
-    pub(super) task: Arc<Task>,
-    pub(super) file: &'a mut JournalFile,
-    pub(super) kept: Kept,
+    task: Arc<Task>,
+    file: &'a mut JournalFile,
+    kept: Kept,
     /// Who waits for requests to be on the disk.
-    pub(super) desk: Option<Desk>,
+    desk: Option<Desk>,
+    /// Whether commands were written since the disk was last waited for.
+    has_commands: bool,
+}
+
+impl<'a> JournalWriter<'a> {
+    pub(super) fn new(
+        task: &Arc<Task>,
+        file: &'a mut JournalFile,
+        kept: &Kept,
+        desk: Option<&Desk>,
+    ) -> Self {
+        Self {
+            task: Arc::clone(task),
+            file,
+            kept: kept.clone(),
+            desk: desk.cloned(),
+            has_commands: false,
+        }
+    }
+
+    /// A record was lost.
+    fn lose(&self) {
+        self.kept.0.store(true, Ordering::SeqCst);
+        if let Some(desk) = &self.desk {
+            desk.lose();
+        }
+    }
 }
 
 impl Recorder for JournalWriter<'_> {
@@ -42,15 +69,18 @@ impl Recorder for JournalWriter<'_> {
         let is_written = self.file.write(&format!("{}\n", line.text()));
         let is_answer = matches!(entry, Entry::Passed { .. });
         let has_requests = is_answer && self.desk.as_ref().is_some_and(Desk::has_fetched);
-        let is_to_sync = has_requests || matches!(entry, Entry::Command { .. });
-        let is_kept = is_written && (!is_to_sync || self.file.sync());
+        self.has_commands |= matches!(entry, Entry::Command { .. });
+        let is_kept = is_written && (!has_requests || self.file.sync());
         if !is_kept {
-            self.kept.0.store(true, Ordering::SeqCst);
-            if let Some(desk) = &self.desk {
-                desk.lose();
-            }
+            self.lose();
         } else if let Some(desk) = self.desk.as_ref().filter(|_| has_requests) {
             desk.note_recorded();
+        }
+    }
+
+    fn commit(&mut self) {
+        if std::mem::take(&mut self.has_commands) && !self.file.sync() {
+            self.lose();
         }
     }
 

@@ -83,6 +83,10 @@ impl Recorder for Live<'_> {
         }
     }
 
+    fn commit(&mut self) {
+        self.inner.commit();
+    }
+
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
         self.inner.begin_anew(stand)
     }

@@ -217,12 +217,7 @@ pub(in crate::commands) fn run(
         let recorder = PastRecorder {
             past: Arc::clone(&past),
             task: Arc::clone(&task),
-            writer: JournalWriter {
-                task: Arc::clone(&task),
-                file: &mut file,
-                kept: kept.clone(),
-                desk: attendance.desk().cloned(),
-            },
+            writer: JournalWriter::new(&task, &mut file, &kept, attendance.desk()),
         };
         let begun = Clock::start();
         let clock = || begun.seconds();

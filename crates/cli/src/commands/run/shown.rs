@@ -32,6 +32,10 @@ impl<R: Recorder> Recorder for Shown<R> {
         }
     }
 
+    fn commit(&mut self) {
+        self.inner.commit();
+    }
+
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
         self.inner.begin_anew(stand)
     }

@@ -87,6 +87,10 @@ impl Recorder for PastRecorder<'_> {
         }
     }
 
+    fn commit(&mut self) {
+        self.writer.commit();
+    }
+
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
         // What the journal has is only played again until then.
         self.past.is_over() && self.past.difference().is_none() && self.writer.begin_anew(stand)
