@@ -55,10 +55,15 @@ impl Attendance {
         self.0.as_ref().map(|attendants| &attendants.desk)
     }
 
+    /// Where they ask how it stands.
+    pub(crate) fn status(&self) -> Option<&Status> {
+        let asked = self.0.as_ref().and_then(|it| it.asked.as_ref());
+        asked.map(|(status, _)| status)
+    }
+
     /// To be told what the run believes.
     pub(crate) fn listener(&self) -> impl FnMut(&elbowroom::execution::Progression) + Send + use<> {
-        let asked = self.0.as_ref().and_then(|it| it.asked.as_ref());
-        let status = asked.map(|(status, _)| status.clone());
+        let status = self.status().cloned();
         move |belief| {
             if let Some(status) = &status {
                 status.believe(belief);

@@ -8,6 +8,8 @@ use elbowroom::execution::{Event, Observation, Request};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 
+use crate::clock::Clock;
+
 /// The limit on requests that wait.
 const MOST_WAITING: usize = 1000;
 
@@ -55,6 +57,8 @@ struct State {
     is_lost: bool,
     /// The run has ended.
     is_over: bool,
+    /// Since when the world owes the run an answer.
+    asked: Option<Clock>,
 }
 
 impl Desk {
@@ -155,6 +159,21 @@ impl Desk {
     pub(crate) fn note_recorded(&self) {
         let mut state = self.lock();
         state.recorded = state.fetched;
+    }
+
+    /// The run asks something of its world, or tells it.
+    pub(crate) fn note_question(&self) {
+        self.lock().asked = Some(Clock::start());
+    }
+
+    /// The world has answered.
+    pub(crate) fn note_answer(&self) {
+        self.lock().asked = None;
+    }
+
+    /// How long the world has not answered, if it was asked something.
+    pub(crate) fn unanswered(&self) -> Option<Duration> {
+        self.lock().asked.map(Clock::elapsed)
     }
 
     /// The run has taken in what is recorded, and whoever asks how it stands is told so.

@@ -2,6 +2,8 @@
 
 #![cfg(unix)]
 
+#[path = "executive/asked.rs"]
+mod asked;
 #[path = "executive/client.rs"]
 mod client;
 mod command;

@@ -14,7 +14,7 @@ mod disks;
 #[path = "../../../testing/skipped.rs"]
 mod skipped;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -194,8 +194,14 @@ fn judge_what_was_done(folder: &Path, what: &str, text: &str) {
     }
 }
 
-/// Nothing was begun twice.
+/// Nothing was begun twice: neither under the number of its start, nor under another one what was done already.
 fn judge_what_was_begun(folder: &Path, what: &str) {
+    let mut done = BTreeMap::new();
+    for line in lines(folder, "done") {
+        let (ticket, errand) = line.split_once(' ').expect("a ticket and an errand");
+        let first = done.entry(errand.to_owned()).or_insert(ticket.to_owned());
+        assert_eq!(first, ticket, "{what}: {errand} was done, and done again");
+    }
     let begun = lines(folder, "begun");
     let tickets: BTreeSet<_> = begun
         .iter()

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom::execution::{Command, Event, Observation, Passage, World, WorldError};
+use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -29,6 +30,8 @@ const GLANCE: Duration = Duration::from_millis(50);
 pub(crate) struct Attended<'a, W> {
     inner: W,
     desk: Option<Desk>,
+    /// Where people ask what time it is.
+    status: Option<Status>,
     task: Arc<Task>,
     interrupt: Interrupt,
     /// Rings when a plan is there.
@@ -59,6 +62,7 @@ impl<'a, W: World> Attended<'a, W> {
         Self {
             inner,
             desk: attendance.desk().cloned(),
+            status: attendance.status().cloned(),
             task: Arc::clone(task),
             interrupt: interrupt.clone(),
             bell: Bell::default(),
@@ -103,8 +107,23 @@ impl<'a, W: World> Attended<'a, W> {
         Observation { time, event }
     }
 
+    /// Asks the world itself.
+    fn ask<T>(&mut self, question: impl FnOnce(&mut W) -> T) -> T {
+        if let Some(desk) = &self.desk {
+            desk.note_question();
+        }
+        let answer = question(&mut self.inner);
+        if let Some(desk) = &self.desk {
+            desk.note_answer();
+        }
+        answer
+    }
+
     fn note(&mut self, passage: &Passage) {
         self.now.clone_from(&passage.now);
+        if let Some(status) = &self.status {
+            status.pass(&self.now);
+        }
         for observation in &passage.observations {
             if let Event::Ended { ticket, .. } = &observation.event {
                 self.open.remove(&ticket.0);
@@ -124,7 +143,7 @@ impl<W: World> World for Attended<'_, W> {
         {
             self.open.insert(ticket.0);
         }
-        self.inner.command(now, command)
+        self.ask(|world| world.command(now, command))
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
@@ -154,7 +173,7 @@ impl<W: World> World for Attended<'_, W> {
             };
             let piece = &self.now + piece;
             let before = self.now.clone();
-            let mut passage = self.inner.wait(until.min(&piece))?;
+            let mut passage = self.ask(|world| world.wait(until.min(&piece)))?;
             let has_passed = passage.now > self.now;
             self.note(&passage);
             if is_planning {
@@ -187,6 +206,6 @@ impl<W: World> World for Attended<'_, W> {
         facts: &[FactId],
         fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
-        self.inner.look(facts, fluents)
+        self.ask(|world| world.look(facts, fluents))
     }
 }

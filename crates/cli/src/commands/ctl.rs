@@ -177,7 +177,8 @@ impl Desk<'_> {
         output::print(&if taken.taken {
             format!("{name}done\n")
         } else {
-            format!("{name}it will be taken in as soon as a plan is made\n")
+            let until = taken.until.as_deref().unwrap_or("it can be");
+            format!("{name}not yet taken in, but as soon as {}\n", tame(until))
         })?;
         Ok(Exit::Yes)
     }
@@ -224,6 +225,12 @@ fn state(state: &State) -> String {
         let _ = write!(text, ": {}", tame(why));
     }
     text.push('\n');
+    if let Some(seconds) = state.unanswered {
+        let _ = writeln!(
+            text,
+            "  the world has not answered for {seconds} s: nothing is started, and no request taken in, until it does"
+        );
+    }
     for goal in &state.goals {
         let _ = writeln!(text, "  goal {}: {}", tame(&goal.name), tame(&goal.goal));
     }
@@ -295,8 +302,9 @@ fn guarantee(guarantee: &GuaranteeNow) -> String {
     for room in &guarantee.parameters {
         let _ = writeln!(
             text,
-            "  {}: planned {}, from {} to {}",
+            "  {}, {}: planned {}, from {} to {}",
             room.name,
+            room.meaning,
             nearest(&room.nominal.0),
             end(&room.least),
             end(&room.most)

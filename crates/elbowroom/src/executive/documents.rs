@@ -84,8 +84,11 @@ impl Described for Activity {
 documents! {
     /// How things stand.
     pub struct State {
-        /// The time by the world's clock when something was last heard, in seconds.
+        /// The time by the world's clock when it was last heard, in seconds.
         pub now: Exact,
+        /// For how many seconds the world has not answered what it was asked, by this machine's clock; none as long as
+        /// it answers within a second. Until it does, nothing is started, and no request is taken in.
+        pub unanswered: Option<u64>,
         /// What the executive is doing.
         pub activity: Activity,
         /// Why, in words, where there is something to say: why it rests, or makes a plan.
@@ -177,6 +180,8 @@ documents! {
     pub struct Room {
         /// Its name.
         pub name: String,
+        /// What it is, in words: `duration of (move a b)`.
+        pub meaning: String,
         /// Its value if nothing deviates.
         pub nominal: Exact,
         /// The least value that is guaranteed to work; none if there is no limit, or no guarantee.
@@ -237,8 +242,10 @@ documents! {
     /// A request has come in.
     pub struct Taken {
         /// Whether the executive has taken it in: then it survives a crash if there is a journal.
-        /// Otherwise it waits until a plan is made.
         pub taken: bool,
+        /// What it waits for, in words, if it has not been taken in.
+        [optional serde(default, skip_serializing_if = "Option::is_none")]
+        pub until: Option<String>,
         /// The name of the goal that the request is about.
         [optional serde(default, skip_serializing_if = "Option::is_none")]
         pub name: Option<String>,

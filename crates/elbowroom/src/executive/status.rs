@@ -12,6 +12,7 @@ use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_pddl::{ProblemText, write_problem};
+use elbowroom_plan::ParameterId;
 use elbowroom_report::exact::Exact;
 use elbowroom_report::trace::SnapshotLine;
 
@@ -119,6 +120,14 @@ impl Status {
         state
     }
 
+    /// The world's clock says so, though nothing has happened.
+    pub fn pass(&self, now: &Rational) {
+        let mut known = self.known();
+        if *now > known.now {
+            known.now.clone_from(now);
+        }
+    }
+
     /// The plan.
     pub fn plan(&self) -> PlanNow {
         let known = self.known();
@@ -194,6 +203,7 @@ impl Known {
         };
         State {
             now: Exact(self.now.clone()),
+            unanswered: None,
             why: self.rest.clone().or_else(|| self.why.clone()),
             activity,
             goals: self.goals.clone(),
@@ -348,6 +358,9 @@ impl Known {
                 };
                 Room {
                     name: parameter.name.clone(),
+                    meaning: mission
+                        .plan
+                        .describe(&mission.task, ParameterId::from(index)),
                     nominal: Exact(parameter.nominal.clone()),
                     least: end(|interval| interval.lower.value()),
                     most: end(|interval| interval.upper.value()),

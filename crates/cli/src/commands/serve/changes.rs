@@ -18,6 +18,7 @@ use serde::de::DeserializeOwned;
 
 use super::front::{Front, Refused};
 use crate::desk::{Ask, Reception};
+use crate::words::counted;
 
 /// How long a client waits for the run to take its request in; afterwards it is told that it will.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -40,6 +41,7 @@ impl Front {
                 self.stop();
                 Ok(Taken {
                     taken: true,
+                    until: None,
                     name: None,
                 })
             }
@@ -64,16 +66,31 @@ impl Front {
             Refused::new(503, "too many requests wait for the executive", help)
         };
         let number = self.desk().hand_in(asks).ok_or_else(full)?;
-        let taken = match self.desk().await_taken(number, PATIENCE) {
-            Reception::Taken => true,
-            Reception::Waits => false,
+        let until = match self.desk().await_taken(number, PATIENCE) {
+            Reception::Taken => None,
+            Reception::Waits => Some(self.obstacle()),
             Reception::Lost => return Err(lost()),
             Reception::Over => {
                 let error = "the executive has ended before it took this in";
                 return Err(Refused::new(409, error, "start another one"));
             }
         };
-        Ok(Taken { taken, name })
+        Ok(Taken {
+            taken: until.is_none(),
+            until,
+            name,
+        })
+    }
+
+    /// What a request waits for that is not taken in at once.
+    fn obstacle(&self) -> String {
+        match self.unanswered() {
+            Some(seconds) => format!(
+                "the world answers, which it has not done for {}",
+                counted(usize::try_from(seconds).unwrap_or(usize::MAX), "second")
+            ),
+            None => "a plan is made".to_owned(),
+        }
     }
 
     fn goal(&self, given: NewGoal) -> Result<Taken, Refused> {
@@ -164,8 +181,10 @@ impl Front {
             Refused::new(422, first.unwrap_or_default(), help)
         })?;
         let Ok((status, task)) = self.run() else {
-            let (taken, name) = (self.first.give(given.problem)?, None);
-            return Ok(Taken { taken, name });
+            let taken = self.first.give(given.problem)?;
+            let until = (!taken).then(|| "it is read".to_owned());
+            let name = None;
+            return Ok(Taken { taken, until, name });
         };
         let state = status.state();
         check_further(&problem, task, &state)?;

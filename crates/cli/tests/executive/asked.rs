@@ -1,0 +1,147 @@
+//! What an executive says of itself, and what it makes of what it is told.
+
+use std::fs;
+use std::process::Command;
+
+use serde_json::{Value, json};
+
+use super::client::{Executive, folder};
+use super::skipped::skipped;
+use super::{command, ctl, exact, lines, simulated, with_robot};
+
+fn signal(process: &str, name: &str) {
+    let told = Command::new("kill").args(["-s", name, process]).status();
+    assert!(told.expect("every Unix has `kill`").success());
+}
+
+/// A program that hangs is named, and no request is said to wait for a plan because of it.
+#[test]
+fn a_world_that_stands_still_is_named() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped("there is no python3");
+        return;
+    }
+    let place = folder("still");
+    let journal = place.join("journal").display().to_string();
+    let line = with_robot(&place, &journal);
+    let line: Vec<&str> = line.iter().map(String::as_str).collect();
+    let mut own = Executive::start(&place, &line);
+    let state = own.await_state(|state| state["activity"] == "executing");
+    assert_eq!(state["unanswered"], Value::Null, "{state}");
+    let robot = fs::read_to_string(place.join("pid")).expect("a pid");
+    signal(&robot, "STOP");
+    let state = own.await_state(|state| state["unanswered"].is_u64());
+    assert_eq!(state["activity"], "executing", "{state}");
+    let (status, answer) = own.post("/v1/pause", &Value::Null);
+    assert_eq!((status, &answer["taken"]), (202, &json!(false)), "{answer}");
+    let until = answer["until"].as_str().expect("what it waits for");
+    assert!(until.starts_with("the world answers, which"), "{until}");
+    let told = ctl(&["--to", &own.address(), "state"]);
+    let told = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(told.contains("the world has not answered for"), "{told}");
+    signal(&robot, "CONT");
+    let state = own.await_state(|state| state["activity"] == "paused");
+    assert_eq!(state["unanswered"], Value::Null, "{state}");
+    assert_eq!(own.post("/v1/resume", &Value::Null).0, 200);
+    own.await_state(|state| state["why"] == "reached: problem");
+    own.post("/v1/stop", &Value::Null);
+    assert_eq!(own.end().status.code(), Some(0));
+    let begun = lines(&place, "begun");
+    assert_eq!(begun.len(), 6, "{begun:?}");
+}
+
+/// The time goes on where nothing happens.
+#[test]
+fn who_asks_is_told_what_time_it_is() {
+    let own = simulated("time");
+    let rested = own.await_state(|state| state["why"] == "reached: problem");
+    own.await_state(|state| exact(&state["now"]) > exact(&rested["now"]) + 1.0);
+}
+
+#[test]
+fn the_guarantee_says_what_its_quantities_are() {
+    let own = simulated("meanings");
+    own.await_state(|state| state["activity"] == "executing");
+    let (_, guarantee) = own.get("/v1/guarantee");
+    let parameters = guarantee["parameters"].as_array().expect("parameters");
+    assert_eq!(parameters.len(), 6, "{guarantee}");
+    for parameter in parameters {
+        let meaning = parameter["meaning"].as_str().expect("words");
+        assert!(meaning.starts_with("duration of (do "), "{meaning}");
+    }
+    let told = ctl(&["--to", &own.address(), "guarantee"]);
+    let told = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(told.contains("duration of (do "), "{told}");
+}
+
+/// A number that is told counts in the next plan: with a full battery, nobody charges.
+#[test]
+fn a_number_is_taken_in_and_planned_with() {
+    let battery = ["domain", "problem"].map(|it| format!("cases/battery/{it}.pddl"));
+    let run = |name: &str, charge: Option<&str>| {
+        let place = folder(name);
+        let text = fs::read_to_string(command::root().join(&battery[1])).expect("a problem");
+        let goal = "(:goal (and (surveyed crater) (surveyed boulder)))";
+        let text = text.replace(goal, "(:goal (and))");
+        let problem = place.join("problem.pddl");
+        fs::write(&problem, text).expect("written");
+        let problem = problem.display().to_string();
+        let own = Executive::start(&place, &[&battery[0], &problem, "--realtime", "100"]);
+        own.await_state(|state| state["activity"] == "resting");
+        if let Some(charge) = charge {
+            let line = ["number", "(charge rover)", charge];
+            let told = ctl(&[
+                &["--token", &own.token(), "--to", &own.address()],
+                &line[..],
+            ]
+            .concat());
+            assert!(told.status.success(), "{told:?}");
+            let (_, state) = own.get("/v1/state");
+            let numbers = state["numbers"].as_array().expect("numbers");
+            let is_it = |it: &&Value| it["fluent"] == "(charge rover)";
+            let own = numbers.iter().find(is_it).expect("the charge");
+            assert_eq!(own["value"]["exact"], charge, "{state}");
+        }
+        let goal = json!({"goal": "(and (surveyed crater) (surveyed boulder))", "name": "both"});
+        assert_eq!(own.post("/v1/goals", &goal).0, 200);
+        own.await_state(|state| state["why"] == "reached: both");
+        let (_, plan) = own.get("/v1/plan");
+        let steps = plan["steps"].as_array().expect("steps");
+        let actions = steps.iter().filter_map(|it| it["action"].as_str());
+        let charges = actions.filter(|it| it.starts_with("(recharge"));
+        charges.count()
+    };
+    assert!(run("as-it-was", None) > 0);
+    // 2 of it are used in each of 50 seconds, and 10 have to stay.
+    assert_eq!(run("told", Some("112")), 0);
+}
+
+/// Without `--http`, only this machine is listened to.
+#[test]
+fn only_this_machine_reaches_an_executive() {
+    let own = simulated("local");
+    let text = fs::read_to_string(format!("/proc/{}/net/tcp", own.process()));
+    let Ok(text) = text else {
+        skipped("this system does not list who listens");
+        return;
+    };
+    let port: u16 = own
+        .address()
+        .rsplit(':')
+        .next()
+        .and_then(|it| it.parse().ok())
+        .expect("a port");
+    let listening: Vec<&str> = text
+        .lines()
+        .filter_map(|line| line.split_whitespace().nth(1))
+        .filter(|it| it.ends_with(&format!(":{port:04X}")))
+        .collect();
+    assert!(!listening.is_empty(), "{text}");
+    // 127.0.0.1, its bytes in the order of the machine.
+    assert!(
+        listening
+            .iter()
+            .all(|it| it.starts_with("0100007F:") || it.starts_with("7F000001:")),
+        "{listening:?}"
+    );
+}
