@@ -200,8 +200,11 @@ impl fmt::Display for Reason {
         if let Some(since) = &self.since {
             write!(f, ", since {}", since.to_decimal(3))?;
         }
-        if !self.behind.is_empty() {
-            let behind: Vec<String> = self.behind.iter().map(ToString::to_string).collect();
+        // What it is about explains nothing.
+        let about = self.about.as_ref().map(ToString::to_string);
+        let behind = self.behind.iter().map(ToString::to_string);
+        let behind: Vec<String> = behind.filter(|it| about.as_ref() != Some(it)).collect();
+        if !behind.is_empty() {
             write!(f, " (behind it: {})", behind.join("; "))?;
         }
         Ok(())

@@ -149,7 +149,7 @@ pub(super) fn checked(
 }
 
 fn show(
-    arguments: &RunArgs,
+    (arguments, spec): (&RunArgs, &RunSpec),
     outcome: &RunOutcome,
     has_lost: bool,
     output: &mut Output,
@@ -157,19 +157,23 @@ fn show(
     if arguments.json {
         output.document(&outcome.answer)
     } else {
-        output::print(&text::human(&outcome.answer, &outcome.report, has_lost))
+        let ends = text::Ends {
+            has_lost,
+            is_lasting: spec.is_lasting,
+        };
+        output::print(&text::human(&outcome.answer, &outcome.report, ends))
     }
 }
 
 /// Shows what came of a run with a journal; `trouble` is why that could not be written.
 pub(super) fn conclude(
-    (arguments, spec): (&RunArgs, &RunSpec),
+    asked: (&RunArgs, &RunSpec),
     mut outcome: RunOutcome,
     trouble: Option<String>,
     output: &mut Output,
 ) -> Answer {
     let Some(why) = trouble else {
-        show(arguments, &outcome, false, output)?;
+        show(asked, &outcome, false, output)?;
         return exit(outcome.verdict());
     };
     // Nobody has asked it to end.
@@ -177,8 +181,8 @@ pub(super) fn conclude(
     if has_lost {
         outcome.answer.report.why = Some(format!("the journal cannot be written: {why}"));
     }
-    show(arguments, &outcome, has_lost, output)?;
-    let resume = if spec.is_lasting {
+    show(asked, &outcome, has_lost, output)?;
+    let resume = if asked.1.is_lasting {
         RESUME_SERVE
     } else {
         RESUME
@@ -261,7 +265,7 @@ impl Job<'_> {
         };
         views.close();
         let trouble = file.close();
-        let shown = show(arguments, &outcome, false, output);
+        let shown = show((arguments, spec), &outcome, false, output);
         // The run has been what it was, whatever became of its record.
         if let Some(trouble) = trouble {
             output::warn(&trouble);

@@ -139,7 +139,7 @@ documents! {
         pub value: Exact,
     }
 
-    /// The plan that is executed, or was last.
+    /// The plan that is executed.
     pub struct PlanNow {
         /// Its actions, by planned start; none if there is no plan.
         pub steps: Vec<StepNow>,
@@ -170,7 +170,7 @@ documents! {
         pub promise: Option<String>,
         /// Since when.
         pub since: Option<Exact>,
-        /// The last thing that deviated so much that a plan was given up for it.
+        /// The last thing since it rested that deviated so much that a plan was given up for it.
         pub deviation: Option<String>,
         /// The quantities that may deviate, and how far.
         pub parameters: Vec<Room>,

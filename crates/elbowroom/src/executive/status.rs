@@ -288,6 +288,7 @@ impl Known {
                 self.since = None;
                 self.room.clear();
                 self.promise = None;
+                self.deviation = None;
                 self.decided = None;
                 let reasons: Vec<String> = dead_end.iter().map(ToString::to_string).collect();
                 let goals = goals.join(", ");

@@ -11,9 +11,20 @@ use crate::number::nearest;
 use crate::words::{counted, tame};
 use crate::wrap::wrapped;
 
-/// `has_lost` is whether the run was ended because its journal cannot be written.
-pub(super) fn human(answer: &RunAnswer, report: &Report, has_lost: bool) -> String {
-    let replans = counted(report.replans, "new plan");
+/// How a run ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ends {
+    /// Whether it was ended because its journal cannot be written.
+    pub(super) has_lost: bool,
+    /// Whether it goes on when its goals are reached: then it counts from there anew.
+    pub(super) is_lasting: bool,
+}
+
+pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
+    let mut replans = counted(report.replans, "new plan");
+    if ends.is_lasting {
+        replans.push_str(" since it last rested");
+    }
     let time = nearest(&report.time);
     let width = Look::of_stdout().width;
     let mut text = match &report.verdict {
@@ -42,7 +53,7 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, has_lost: bool) -> Stri
                 styled(HINT, "limit")
             )
         }
-        Verdict::Interrupted if has_lost => {
+        Verdict::Interrupted if ends.has_lost => {
             format!(
                 "{}: the journal cannot be written, so the run was ended at {time}, after {replans}\n",
                 styled(BAD, "failed")
