@@ -1,12 +1,12 @@
 """How late actions are started on a wall clock: 100 robots, 10,000 actions.
 
-    python3 testing/jitter.py target/release/elbowroom [--load N] [--pace 10] [EXECUTOR…]
+    python3 testing/jitter.py target/release/elbowroom [--load N] [--pace 10] [--journal] [EXECUTOR…]
 
 Each robot drives from place to place, a hundred times, and each tenth time waits for a dock that others use, too.
 Durations deviate. The world is a process, this file once more, whose clock runs PACE times as fast as the one on
 the wall; meanwhile N other processes do nothing but calculate. How late a start is, is the time on the wall from
 the earliest moment at which it could be, as the trace has it, to the one at which the world has read that it is
-to start. Standard library only.
+to start. With --journal, nothing is started that is not on the disk. Standard library only.
 
     python3 testing/jitter.py target/release/elbowroom --replan [--load N] [--robots 100] [EXECUTOR…]
 
@@ -84,7 +84,8 @@ def lateness(trace, log, pace):
     arrivals = dict(json.loads(log.read_text()))
     late = []
     for text in trace.read_text().splitlines():
-        line = json.loads(text)
+        # A record of a journal begins with a checksum.
+        line = json.loads(text[text.index("{") :])
         earliest = (line.get("planned") or {}).get("earliest")
         if line["event"] == "command" and earliest:
             arrival = arrivals[line["command"]["ticket"]]
@@ -225,6 +226,7 @@ def main():
     parser.add_argument("--actions", type=int, default=10_000)
     parser.add_argument("--robots", type=int, default=100)
     parser.add_argument("--replan", action="store_true")
+    parser.add_argument("--journal", action="store_true")
     chosen = parser.parse_intermixed_args()
     # While a plan is made, an executive lets no world run ahead of the clock on the wall.
     chosen.pace = chosen.pace or (1 if chosen.replan else 10)
@@ -251,7 +253,9 @@ def main():
             place = pathlib.Path(__file__).resolve()
             own = [sys.executable, place, "world", "--pace", chosen.pace, folder / "arrivals"]
             line += ["--executor", executor, "--world-process", shlex.join(map(str, own))]
-            line += ["--trace", "trace.jsonl"]
+            record = "journal" if chosen.journal else "trace.jsonl"
+            (folder / record).unlink(missing_ok=True)
+            line += ["--journal" if chosen.journal else "--trace", record]
             if chosen.replan:
                 for row in replanned(line, folder, chosen.pace):
                     print(f"| `{executor}` | {row} |", flush=True)
@@ -260,7 +264,7 @@ def main():
             done = subprocess.run(line, cwd=folder, capture_output=True)
             if done.returncode not in (0, 1):
                 raise SystemExit(f"{executor}: {done.stderr.decode()}")
-            late = lateness(folder / "trace.jsonl", folder / "arrivals", chosen.pace)
+            late = lateness(folder / record, folder / "arrivals", chosen.pace)
             if not late:
                 raise SystemExit(f"{executor}: nothing was started: {done.stdout.decode()}")
             at = [f"{late[(len(late) - 1) * share // 100]:.2f} ms" for share in (50, 99, 100)]
