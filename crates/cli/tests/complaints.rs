@@ -2,169 +2,24 @@
 //! scenario like that of the thread, and what happens here.
 
 mod command;
+#[path = "complaints/toy.rs"]
+mod toy;
 
 use std::fs;
-use std::sync::{Arc, Mutex};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
+use std::process::{self, Command, Stdio};
 
 use command::{elbowroom, root};
 use elbowroom::execute::Execution;
-use elbowroom::execution::run::{ExecutedStep, Report, RunSettings, Verdict};
-use elbowroom::execution::{
-    Cause, Command, Ending, Entry, Event, Observation, Passage, Recorder, Request, Ticket, World,
-    WorldError,
-};
-use elbowroom::model::Task;
+use elbowroom::execution::run::{ExecutedStep, RunSettings, Verdict};
+use elbowroom::execution::{Cause, Ending, Event, Observation, Request};
 use elbowroom::num::Rational;
-use elbowroom::pddl::{self, Source};
+use toy::{ERRANDS, Fault, Faults, Toy, Warnings, causes, errands, run, task};
 
 const MATCH: [&str; 2] = ["cases/match/domain.pddl", "cases/match/problem.pddl"];
 const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
 const PLAN: &str = "cases/delivery/plan.plan";
-
-/// Two robots that fetch things, in ten seconds each.
-const ERRANDS: &str = "(define (domain errands) (:requirements :durative-actions :typing)
-    (:types robot item)
-    (:predicates (free ?r - robot) (here ?x - item) (have ?x - item))
-    (:durative-action fetch :parameters (?r - robot ?x - item) :duration (= ?duration 10)
-      :condition (and (at start (free ?r)) (at start (here ?x)))
-      :effect (and (at start (not (free ?r))) (at end (free ?r)) (at end (have ?x)))))";
-
-fn errands(goal: &str) -> Arc<Task> {
-    let problem = format!(
-        "(define (problem day) (:domain errands) (:objects r s - robot book cup - item)
-           (:init (free r) (free s) (here book) (here cup)) (:goal {goal}))"
-    );
-    task(ERRANDS, &problem)
-}
-
-fn task(domain: &str, problem: &str) -> Arc<Task> {
-    let source = |text: &str| Source::new("test", text);
-    let read = pddl::read_problem(&source(domain), &source(problem));
-    Arc::new(Task::new(read.expect("a correct test").0))
-}
-
-/// A world in which actions take as long as they were planned to, but for its faults.
-#[derive(Default)]
-struct Toy {
-    now: Rational,
-    coming: Vec<Observation>,
-    /// What is reported of a start, by its number: nothing, a failure, …
-    fault: Option<fn(u64) -> Fault>,
-    /// What is seen when an action has ended.
-    seen: Vec<Event>,
-    /// What was told to start and has neither ended nor was cancelled.
-    open: Vec<Ticket>,
-}
-
-enum Fault {
-    None,
-    Silent,
-    Fails,
-    Lasts(i64),
-    /// It starts so many milliseconds late, and lasts so many seconds.
-    StartsLate(i64, i64),
-}
-
-impl World for Toy {
-    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
-        let at = |time: Rational, event: Event| Observation { time, event };
-        let measured = Vec::new;
-        match command {
-            Command::Start {
-                ticket, duration, ..
-            } => {
-                let ticket = *ticket;
-                self.open.push(ticket);
-                let fault = self.fault.map_or(Fault::None, |fault| fault(ticket.0));
-                let mut begun = now.clone();
-                let (duration, ending) = match fault {
-                    Fault::Silent => return Ok(()),
-                    Fault::StartsLate(late, seconds) => {
-                        begun += Rational::new(late, 1000);
-                        (Some(seconds.into()), Ending::Succeeded)
-                    }
-                    Fault::None => (duration.clone(), Ending::Succeeded),
-                    Fault::Lasts(seconds) => (Some(seconds.into()), Ending::Succeeded),
-                    Fault::Fails => {
-                        let why = "the gripper slips".to_owned();
-                        (duration.clone(), Ending::Failed { why })
-                    }
-                };
-                let started = Event::Started {
-                    ticket,
-                    measured: measured(),
-                };
-                let end = &begun + duration.unwrap_or_default();
-                self.coming.push(at(begun, started));
-                let ended = Event::Ended {
-                    ticket,
-                    ending,
-                    measured: measured(),
-                };
-                self.coming.push(at(end.clone(), ended));
-                let seen = self.seen.drain(..).map(|event| at(end.clone(), event));
-                self.coming.extend(seen);
-            }
-            Command::Cancel { ticket } => {
-                let about = *ticket;
-                self.open.retain(|open| *open != about);
-                self.coming.retain(
-                    |it| !matches!(it.event, Event::Ended { ticket, .. } if ticket == about),
-                );
-                let ended = Event::Ended {
-                    ticket: about,
-                    ending: Ending::Cancelled,
-                    measured: measured(),
-                };
-                self.coming.push(at(now.clone(), ended));
-            }
-        }
-        Ok(())
-    }
-
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        let next = self.coming.iter().map(|it| it.time.clone()).min();
-        let now = next.into_iter().chain([until.clone()]).min();
-        self.now = now.unwrap_or_default().max(self.now.clone());
-        let now = self.now.clone();
-        let observations: Vec<_> = self.coming.extract_if(.., |it| it.time <= now).collect();
-        for observation in &observations {
-            if let Event::Ended { ticket, .. } = observation.event {
-                self.open.retain(|open| *open != ticket);
-            }
-        }
-        Ok(Passage { now, observations })
-    }
-}
-
-fn run(task: &Arc<Task>, world: &mut Toy) -> Report {
-    let settings = RunSettings {
-        watches_room: true,
-        time_limit: Rational::from(100_000),
-        ..RunSettings::default()
-    };
-    Execution::of(task)
-        .with_settings(settings)
-        .explaining()
-        .run_in(world)
-}
-
-/// The actions that were warned of, and until when the plan can bear each.
-#[derive(Clone, Default)]
-struct Warnings(Arc<Mutex<Vec<(String, Rational)>>>);
-
-impl Recorder for Warnings {
-    fn record(&mut self, entry: &Entry<'_>) {
-        if let Entry::Warning { action, until, .. } = entry {
-            let mut warnings = self.0.lock().expect("no thread has panicked");
-            warnings.push(((*action).to_owned(), (*until).clone()));
-        }
-    }
-}
-
-fn causes(report: &Report) -> Vec<Cause> {
-    report.reasons.iter().map(|reason| reason.cause).collect()
-}
 
 fn json(arguments: &[&str]) -> serde_json::Value {
     let done = elbowroom(arguments);
@@ -174,7 +29,7 @@ fn json(arguments: &[&str]) -> serde_json::Value {
 
 /// A file that no other test uses.
 fn temporary(name: &str) -> String {
-    let name = format!("elbowroom-complaints-{}-{name}", std::process::id());
+    let name = format!("elbowroom-complaints-{}-{name}", process::id());
     std::env::temp_dir().join(name).display().to_string()
 }
 
@@ -208,6 +63,40 @@ fn parallel_actions_are_executed_in_parallel_and_as_the_plan_needs_it() {
     for inspection in inspections {
         let is_lit = |burn: &&&(String, f64, f64)| burn.1 < inspection.1 && inspection.2 < burn.2;
         assert!(burns.iter().any(|burn| is_lit(&burn)), "{spans:?}");
+    }
+
+    // What takes no time comes when it is due, and not all at once.
+    let domain = ERRANDS.replacen(
+        "(:durative-action",
+        "(:action label :parameters (?x - item) :precondition (have ?x) :effect (labelled ?x))
+    (:durative-action",
+        1,
+    );
+    let domain = domain.replacen(
+        "(have ?x - item)",
+        "(have ?x - item) (labelled ?x - item)",
+        1,
+    );
+    let problem = "(define (problem day) (:domain errands) (:objects r - robot book cup - item)
+        (:init (free r) (here book) (here cup)) (:goal (and (labelled book) (labelled cup))))";
+    let report = run(&task(&domain, problem), &mut Toy::default());
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:?}");
+    let labels = report.executed.iter().map(|it| &it.step);
+    let labels: Vec<_> = labels
+        .filter(|it| it.action.name.starts_with("(label"))
+        .collect();
+    assert_eq!(labels.len(), 2, "{report:?}");
+    let fetched = |item: &str| {
+        let steps = report.executed.iter().map(|it| &it.step);
+        let mut own = steps.filter(|it| it.action.name == format!("(fetch r {item})"));
+        let own = own.next().expect("it was fetched");
+        &own.start + own.duration.as_ref().expect("it takes time")
+    };
+    for label in labels {
+        let items = ["book", "cup"].into_iter();
+        let mut own = items.filter(|item| label.action.name.contains(item));
+        let item = own.next().expect("it is labelled");
+        assert!(label.start >= fetched(item), "{report:?}");
     }
 }
 
@@ -441,6 +330,41 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
     };
     assert!(others.iter().any(runs_on), "{report:?}");
     assert!(world.open.is_empty());
+    // Whether the time is up, no plan is left, or somebody asks for the end: it is waited for until a robot
+    // that slides on has stopped.
+    let ends: [(Rational, Option<Faults>); 2] = [
+        (Rational::from(5), None),
+        (
+            Rational::from(1000),
+            Some(|ticket| {
+                if ticket == 0 {
+                    Fault::Fails
+                } else {
+                    Fault::None
+                }
+            }),
+        ),
+    ];
+    for (time_limit, fault) in ends {
+        let settings = RunSettings {
+            time_limit,
+            most_replans: 0,
+            ..RunSettings::default()
+        };
+        let mut world = Toy {
+            slides: 3,
+            fault,
+            ..Toy::default()
+        };
+        let two = errands("(and (have book) (have cup))");
+        let report = Execution::of(&two)
+            .with_settings(settings)
+            .run_in(&mut world);
+        assert_ne!(report.verdict, Verdict::GoalReached, "{report:?}");
+        assert!(world.open.is_empty(), "{report:?}");
+        let is_over = |done: &ExecutedStep| done.ending.is_some();
+        assert!(report.executed.iter().all(is_over), "{report:?}");
+    }
 }
 
 #[test]
@@ -505,6 +429,29 @@ fn a_plan_and_its_progress_can_be_seen_in_time() {
         assert!(text.contains(words), "{words}");
     }
     let _ = (fs::remove_file(trace), fs::remove_file(page));
+    // While it goes on, the same page is served, and each line of the trace as it comes.
+    let arguments = [&["run"], &DELIVERY[..], &["--realtime", "20", "--serve=0"]].concat();
+    let mut run = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .args(arguments)
+        .current_dir(root())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the command can be started");
+    let mut said = BufReader::new(run.stderr.take().expect("it is piped")).lines();
+    let address = said.find_map(|line| {
+        let line = line.expect("UTF-8");
+        let (_, behind) = line.split_once("http://")?;
+        Some(behind.trim_end_matches('/').to_owned())
+    });
+    let address = address.expect("it says where it is shown");
+    let mut page = TcpStream::connect(&address).expect("it listens");
+    page.write_all(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        .expect("it is asked");
+    let mut head = [0; 12];
+    page.read_exact(&mut head).expect("an answer");
+    assert_eq!(&head, b"HTTP/1.1 200");
+    let _ = (run.kill(), run.wait());
 }
 
 #[test]

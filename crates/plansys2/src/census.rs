@@ -7,11 +7,12 @@ use crate::Hub;
 /// Performers say once a second that they are there: so long after the first one, all have been heard.
 const A_ROUND: Duration = Duration::from_millis(1200);
 
-/// Waits for performers: for those of the actions that are needed, or, where none are named, for the first one and
-/// those that are heard soon after.
+/// Waits for performers: for those of the actions that are needed; where none are named, for those of all actions of the
+/// domain; and where these are not known either, for the first one and those that are heard soon after.
 #[derive(Debug)]
 pub struct Census {
     needs: Vec<String>,
+    domain: Vec<String>,
     within: Duration,
     first: Option<Duration>,
 }
@@ -21,9 +22,20 @@ impl Census {
     pub fn new(needs: Vec<String>, within: Duration) -> Self {
         Self {
             needs,
+            domain: Vec::new(),
             within,
             first: None,
         }
+    }
+
+    /// These are the actions of the domain, in lower case.
+    pub fn know(&mut self, domain: Vec<String>) {
+        self.domain = domain;
+    }
+
+    /// The actions of the domain that nobody performs, as far as has been heard. A plan may do without them.
+    pub fn unattended(&self, hub: &Hub, now: Duration) -> Vec<&str> {
+        missing(&self.domain, hub, now)
     }
 
     /// Whether time can begin.
@@ -31,25 +43,19 @@ impl Census {
     /// # Errors
     /// The time to wait is over, and an action that is needed has no performer.
     pub fn is_over(&mut self, hub: &Hub, now: Duration) -> Result<bool, String> {
-        let performers = hub.performers(now);
-        if !performers.is_empty() {
+        if !hub.performers(now).is_empty() {
             self.first.get_or_insert(now);
         }
-        let is_there = |need: &&String| {
-            performers
-                .iter()
-                .any(|(_, action)| action.to_lowercase() == **need)
-        };
-        let missing: Vec<_> = self
-            .needs
-            .iter()
-            .filter(|it| !is_there(it))
-            .map(String::as_str)
-            .collect();
+        let missing = missing(&self.needs, hub, now);
         let is_round = self
             .first
             .is_some_and(|at| now.saturating_sub(at) >= A_ROUND);
-        if missing.is_empty() && (is_round || !self.needs.is_empty()) {
+        let are_all_there = match (&self.needs[..], &self.domain[..]) {
+            ([], []) => is_round,
+            ([], _) => self.unattended(hub, now).is_empty(),
+            _ => missing.is_empty(),
+        };
+        if are_all_there {
             return Ok(true);
         }
         if now < self.within {
@@ -65,6 +71,17 @@ impl Census {
             hub.listed(now)
         ))
     }
+}
+
+/// Those of the actions that nobody performs.
+fn missing<'a>(actions: &'a [String], hub: &Hub, now: Duration) -> Vec<&'a str> {
+    let performers = hub.performers(now);
+    let is_there = |wanted: &&String| {
+        let mut performed = performers.iter().map(|(_, action)| action.to_lowercase());
+        performed.any(|action| action == **wanted)
+    };
+    let missing = actions.iter().filter(|it| !is_there(it));
+    missing.map(String::as_str).collect()
 }
 
 #[cfg(test)]
@@ -98,6 +115,21 @@ mod tests {
         let nobody = Hub::new("elbowroom");
         assert_eq!(census.is_over(&nobody, seconds(2)), Ok(false));
         assert_eq!(census.is_over(&nobody, seconds(3)), Ok(true));
+    }
+
+    #[test]
+    fn where_the_domain_is_known_all_its_actions_are_waited_for_and_those_missing_are_named() {
+        let mut census = Census::new(vec![], seconds(10));
+        census.know(vec!["move".into(), "pick".into()]);
+        let hub = hub_with("move");
+        assert_eq!(census.is_over(&hub, seconds(3)), Ok(false));
+        assert_eq!(census.unattended(&hub, seconds(3)), ["pick"]);
+        // A plan may do without.
+        assert_eq!(census.is_over(&hub, seconds(10)), Ok(true));
+        let mut census = Census::new(vec![], seconds(10));
+        census.know(vec!["move".into()]);
+        assert_eq!(census.is_over(&hub, seconds(0)), Ok(true));
+        assert!(census.unattended(&hub, seconds(0)).is_empty());
     }
 
     #[test]

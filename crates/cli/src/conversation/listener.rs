@@ -15,9 +15,12 @@ use super::clocks::Clocks;
 const VERSIONS: [u64; 2] = [1, 2];
 
 /// The first message to a program.
-pub(crate) fn hello() -> Value {
+pub(crate) fn hello(task: &Task) -> Value {
+    let schemas = task.problem().schemas.iter();
+    let actions: Vec<&str> = schemas.map(|schema| schema.name.as_str()).collect();
     json!({
         "type": "hello", "protocol": "elbowroom-world", "version": VERSIONS[0], "versions": VERSIONS,
+        "actions": actions,
     })
 }
 

@@ -71,7 +71,7 @@ impl ProcessWorld {
         manners: Manners,
         interrupt: Interrupt,
     ) -> Result<Self, Failure> {
-        Self::greeted(command, task, manners, interrupt, &hello())
+        Self::greeted(command, task, manners, interrupt, &hello(task))
     }
 
     /// The same for a run that was cut off: the program is told what is known of what was under
@@ -83,7 +83,7 @@ impl ProcessWorld {
         interrupt: Interrupt,
         (resumed, given): (&Value, u64),
     ) -> Result<Self, Failure> {
-        let mut hello = hello();
+        let mut hello = hello(task);
         hello["resumed"] = resumed.clone();
         let mut world = Self::greeted(command, task, manners, interrupt, &hello)?;
         if let Some(last) = given.checked_sub(1) {

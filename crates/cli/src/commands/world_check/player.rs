@@ -63,7 +63,7 @@ impl Player {
             now: Rational::ZERO,
             actions: BTreeMap::new(),
         };
-        match player.tell(&hello()) {
+        match player.tell(&hello(task)) {
             Ok(()) => Ok(player),
             Err(gone) => {
                 let _ = player.child.kill();

@@ -6,6 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use elbowroom_plansys2::{Census, Command, Effect, Hub, World};
+use serde_json::Value;
 
 use super::expert::{Expert, Heard};
 use super::options::Settings;
@@ -101,11 +102,23 @@ impl Session {
                     break;
                 }
                 Ok(Input::Expert(heard)) => self.hear(heard),
-                Ok(line @ Input::Line(_)) => said.push(line),
+                Ok(Input::Line(line)) => {
+                    if let Some(actions) = actions_of(&line) {
+                        self.census.know(actions);
+                    }
+                    said.push(Input::Line(line));
+                }
                 // Nobody serves here.
                 Ok(_) | Err(_) => {}
             }
             self.settle();
+        }
+        let unattended = self.census.unattended(&self.hub, self.now());
+        if !unattended.is_empty() {
+            remark(&format!(
+                "no performer of {} was heard: what a plan starts of it will fail",
+                unattended.join(", ")
+            ));
         }
         Ok(said)
     }
@@ -210,4 +223,18 @@ fn say(lines: &[String]) {
         let _ = writeln!(out, "{line}");
     }
     let _ = out.flush();
+}
+
+/// The actions of the domain, if this is the greeting that has them.
+fn actions_of(line: &str) -> Option<Vec<String>> {
+    let message: Value = serde_json::from_str(line).ok()?;
+    let actions = message
+        .get("actions")
+        .filter(|_| message["type"] == "hello")?;
+    let names = actions.as_array()?.iter();
+    Some(
+        names
+            .filter_map(|it| Some(it.as_str()?.to_lowercase()))
+            .collect(),
+    )
 }
