@@ -6,6 +6,8 @@ use crate::Hub;
 
 /// Performers say once a second that they are there: so long after the first one, all have been heard.
 const A_ROUND: Duration = Duration::from_millis(1200);
+/// So long after the first one, those that are still missing are not waited for: a plan may do without them.
+const STRAGGLERS: Duration = Duration::from_secs(3);
 
 /// Waits for performers: for those of the actions that are needed; where none are named, for those of all actions of the
 /// domain; and where these are not known either, for the first one and those that are heard soon after.
@@ -47,13 +49,14 @@ impl Census {
             self.first.get_or_insert(now);
         }
         let missing = missing(&self.needs, hub, now);
-        let is_round = self
-            .first
-            .is_some_and(|at| now.saturating_sub(at) >= A_ROUND);
-        let are_all_there = match (&self.needs[..], &self.domain[..]) {
-            ([], []) => is_round,
-            ([], _) => self.unattended(hub, now).is_empty(),
-            _ => missing.is_empty(),
+        let first = self.first;
+        let is_since = |round| first.is_some_and(|at| now.saturating_sub(at) >= round);
+        let are_all_there = if self.needs.is_empty() {
+            // More than one may perform an action.
+            let is_attended = || self.unattended(hub, now).is_empty();
+            is_since(STRAGGLERS) || is_since(A_ROUND) && is_attended()
+        } else {
+            missing.is_empty()
         };
         if are_all_there {
             return Ok(true);
@@ -122,14 +125,16 @@ mod tests {
         let mut census = Census::new(vec![], seconds(10));
         census.know(vec!["move".into(), "pick".into()]);
         let hub = hub_with("move");
-        assert_eq!(census.is_over(&hub, seconds(3)), Ok(false));
-        assert_eq!(census.unattended(&hub, seconds(3)), ["pick"]);
+        assert_eq!(census.is_over(&hub, seconds(0)), Ok(false));
+        assert_eq!(census.is_over(&hub, seconds(2)), Ok(false));
+        assert_eq!(census.unattended(&hub, seconds(2)), ["pick"]);
         // A plan may do without.
-        assert_eq!(census.is_over(&hub, seconds(10)), Ok(true));
+        assert_eq!(census.is_over(&hub, seconds(3)), Ok(true));
         let mut census = Census::new(vec![], seconds(10));
         census.know(vec!["move".into()]);
-        assert_eq!(census.is_over(&hub, seconds(0)), Ok(true));
-        assert!(census.unattended(&hub, seconds(0)).is_empty());
+        assert_eq!(census.is_over(&hub, seconds(0)), Ok(false));
+        assert_eq!(census.is_over(&hub, seconds(2)), Ok(true));
+        assert!(census.unattended(&hub, seconds(2)).is_empty());
     }
 
     #[test]
