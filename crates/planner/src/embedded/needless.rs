@@ -1,8 +1,8 @@
 //! Plans without steps that nothing needs (*action elimination*, Nakhost & Müller, ICAPS 2010).
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use elbowroom_model::ground::{Body, FactId};
+use elbowroom_model::ground::{Body, FactId, FluentId};
 use elbowroom_model::validate::{self, Report, Verdict};
 use elbowroom_model::{Footprint, Situation, Step, Task, TimeTriggeredPlan, validate_from};
 use elbowroom_num::Rational;
@@ -10,9 +10,10 @@ use elbowroom_num::Rational;
 /// The plan without the steps that it works without. A search can come to a goal by way of an
 /// action that makes true what another one, perhaps under way before, makes true anyway.
 ///
-/// Only steps are tried that change no number and supply no fact that is read before anything else
-/// supplies it: there are few of them, and whether the plan works without one is for the judge to
-/// say. `goes_on` is asked before each trial; once it says no, the other steps stay.
+/// Only steps are tried that supply no fact that is read before anything else supplies it: there are few
+/// of them, and whether the plan works without one is for the judge to say. Of steps that change numbers which
+/// something reads, most are there for that, so that they are tried only as long as few trials
+/// were in vain ([`MOST_IN_VAIN`]). `goes_on` is asked before each trial; once it says no, the other steps stay.
 pub(super) fn without_needless(
     task: &Task,
     situation: &Situation,
@@ -21,12 +22,15 @@ pub(super) fn without_needless(
     goes_on: &mut dyn FnMut() -> bool,
 ) -> (TimeTriggeredPlan, Report) {
     let mut timeline = Timeline::new(task, situation, &plan.steps);
-    let mut left = (plan, report);
+    let (mut left, mut in_vain) = ((plan, report), 0);
     // What is under way comes first, and stays. Later steps may need earlier ones.
     for index in (situation.running.len()..left.0.steps.len()).rev() {
-        if !timeline.may_be_needless(index) {
-            continue;
-        }
+        let reads_on = match timeline.supplies(index) {
+            Supplies::Facts => continue,
+            Supplies::Numbers if in_vain >= MOST_IN_VAIN => continue,
+            Supplies::Numbers => true,
+            Supplies::Nothing => false,
+        };
         if !goes_on() {
             break;
         }
@@ -36,16 +40,33 @@ pub(super) fn without_needless(
         if let Verdict::Valid(report) = verdict {
             left = (fewer, report);
             timeline.remove(index);
+        } else {
+            in_vain += usize::from(reads_on);
         }
     }
     left
+}
+
+/// So many trials to leave out what changes numbers that are read are in vain at most: each takes a look at the whole plan.
+const MOST_IN_VAIN: usize = 20;
+
+/// What others read of that which a step makes so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Supplies {
+    /// A fact that would be false without it.
+    Facts,
+    /// No such fact, but a number that it changes.
+    Numbers,
+    Nothing,
 }
 
 /// The reads and writes of a plan's happenings, in the order of their times.
 struct Timeline<'a> {
     situation: &'a Situation,
     moments: Vec<Moment>,
-    goal: BTreeSet<FactId>,
+    goal: Footprint,
+    /// For each number the steps that read it; `None` is a timed initial.
+    readers: BTreeMap<FluentId, BTreeSet<Option<usize>>>,
 }
 
 struct Moment {
@@ -90,26 +111,43 @@ impl<'a> Timeline<'a> {
         );
         // Stable: what is read throughout an action comes after its start.
         moments.sort_by(|one, other| one.time.cmp(&other.time));
+        let mut readers: BTreeMap<FluentId, BTreeSet<Option<usize>>> = BTreeMap::new();
+        for moment in &moments {
+            for fluent in &moment.footprint.reads_fluents {
+                readers.entry(*fluent).or_default().insert(moment.step);
+            }
+        }
         Self {
             situation,
             moments,
-            goal: Footprint::of_condition(task, task.goal()).reads,
+            readers,
+            goal: Footprint::of_condition(task, task.goal()),
         }
     }
 
-    /// Whether nothing is known to need the step.
-    fn may_be_needless(&self, step: usize) -> bool {
+    /// What is known to be read of a step.
+    fn supplies(&self, step: usize) -> Supplies {
         let own = self.moments.iter().enumerate();
-        own.filter(|(_, moment)| moment.step == Some(step))
-            .all(|(place, moment)| {
-                let footprint = &moment.footprint;
-                footprint.shifts.is_empty()
-                    && footprint.assigns.is_empty()
-                    && footprint
-                        .adds
-                        .iter()
-                        .all(|fact| !self.is_read(*fact, place))
-            })
+        let mut own = own.filter(|(_, moment)| moment.step == Some(step));
+        let mut reads_on = false;
+        let has_facts = own.any(|(place, moment)| {
+            let footprint = &moment.footprint;
+            let mut changed = footprint.shifts.union(&footprint.assigns);
+            reads_on |= changed.any(|fluent| self.is_number_read(*fluent, step));
+            footprint.adds.iter().any(|fact| self.is_read(*fact, place))
+        });
+        match (has_facts, reads_on) {
+            (true, _) => Supplies::Facts,
+            (false, true) => Supplies::Numbers,
+            (false, false) => Supplies::Nothing,
+        }
+    }
+
+    /// Whether another step, or the goal, reads a number.
+    fn is_number_read(&self, fluent: FluentId, step: usize) -> bool {
+        let readers = self.readers.get(&fluent);
+        self.goal.reads_fluents.contains(&fluent)
+            || readers.is_some_and(|all| all.iter().any(|it| *it != Some(step)))
     }
 
     /// Whether a fact is read as this moment's step makes it, and would be false without that step.
@@ -136,10 +174,83 @@ impl<'a> Timeline<'a> {
                 return false;
             }
         }
-        self.goal.contains(&fact)
+        self.goal.reads.contains(&fact)
     }
 
     fn remove(&mut self, step: usize) {
         self.moments.retain(|moment| moment.step != Some(step));
+        for readers in self.readers.values_mut() {
+            readers.remove(&Some(step));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use elbowroom_model::validate::Settings;
+    use elbowroom_model::{Situation, Task, validate};
+    use elbowroom_pddl::{Source, read_plan, read_problem};
+
+    use super::{Verdict, without_needless};
+
+    const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions :typing :fluents)
+        (:types robot item)
+        (:predicates (free ?r - robot) (have ?x - item) (sold ?x - item))
+        (:functions (charge ?r - robot))
+        (:durative-action fetch :parameters (?r - robot ?x - item) :duration (= ?duration 5)
+          :condition (and (at start (free ?r)) (at start (>= (charge ?r) 1)))
+          :effect (and (at start (not (free ?r))) (at end (free ?r)) (at end (have ?x))
+                       (at end (decrease (charge ?r) 1))))
+        (:durative-action load :parameters (?r - robot) :duration (= ?duration 2)
+          :condition (at start (free ?r))
+          :effect (and (at start (not (free ?r))) (at end (free ?r)) (at end (increase (charge ?r) 2))))
+        (:action sell :parameters (?x - item) :precondition (have ?x)
+          :effect (and (not (have ?x)) (sold ?x))))";
+
+    /// The plan without what it does not need, in which each line is an action.
+    fn left(init: &str, goal: &str, plan: &str) -> Vec<String> {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:objects r s - robot book pen - item)
+              (:init (free r) (free s) {init}) (:goal {goal}))"
+        );
+        let source = |text: &str| Source::new("test", text);
+        let (problem, _) =
+            read_problem(&source(DOMAIN), &source(&problem)).expect("a correct test");
+        let task = Task::new(problem);
+        let (plan, _) = read_plan(&source(plan), &task).expect("a correct test");
+        let Verdict::Valid(report) = validate::validate(&task, &plan, &Settings::default()) else {
+            panic!("a plan that works");
+        };
+        let situation = Situation::initial(&task);
+        let (plan, _) = without_needless(&task, &situation, plan, report, &mut || true);
+        assert!(validate::validate(&task, &plan, &Settings::default()).is_valid());
+        plan.steps.iter().map(|it| it.action.name.clone()).collect()
+    }
+
+    #[test]
+    fn what_changes_a_number_is_left_out_if_nobody_needs_it() {
+        let plan = "0: (fetch r book) [5]\n0: (fetch s pen) [5]";
+        let init = "(have book) (= (charge r) 1) (= (charge s) 1)";
+        assert_eq!(left(init, "(have pen)", plan), ["(fetch s pen)"]);
+        // Nor is needed then what it was loaded for.
+        let plan = "0: (load r) [2]\n3: (fetch r book) [5]\n0: (fetch s pen) [5]";
+        let init = "(have book) (= (charge r) 0) (= (charge s) 1)";
+        assert_eq!(left(init, "(have pen)", plan), ["(fetch s pen)"]);
+    }
+
+    #[test]
+    fn what_a_number_is_needed_for_stays() {
+        let plan = "0: (load r) [2]\n3: (fetch r book) [5]\n9: (fetch r pen) [5]";
+        let init = "(= (charge r) 0) (= (charge s) 0)";
+        let goal = "(and (have pen) (have book))";
+        assert_eq!(left(init, goal, plan).len(), 3);
+        // It had been there before, but is sold meanwhile.
+        let plan = "0: (sell book)\n1: (fetch r book) [5]";
+        let init = "(have book) (= (charge r) 1) (= (charge s) 0)";
+        assert_eq!(left(init, "(and (sold book) (have book))", plan).len(), 2);
+        // The goal reads the number.
+        let plan = "0: (load r) [2]";
+        let init = "(= (charge r) 0) (= (charge s) 0)";
+        assert_eq!(left(init, "(>= (charge r) 2)", plan), ["(load r)"]);
     }
 }
