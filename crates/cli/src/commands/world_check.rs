@@ -1,6 +1,7 @@
 //! `elbowroom world-check`: does a program keep to the protocol of worlds?
 
 mod player;
+mod resumed;
 mod table;
 
 use std::fmt::Write as _;
@@ -9,11 +10,12 @@ use std::time::Duration;
 
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
+use elbowroom::report::wire;
 use elbowroom::text::Source;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::args::{ProblemArgs, WorldCheckArgs};
-use crate::conversation::{Greeting, launch};
+use crate::conversation::{Ability, Greeting, launch};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::look::{BAD, GOOD, HINT, Look, styled};
@@ -21,6 +23,7 @@ use crate::output::{self, Output};
 use crate::words::{excerpt, tame};
 use crate::wrap::wrapped;
 use player::{Gone, Player};
+use resumed::resumed;
 use table::{Check, Findings, Outcome, Row};
 
 /// What a world is told to do when there is no plan.
@@ -49,13 +52,22 @@ pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
     })?;
     let patience = Duration::try_from_secs_f64(arguments.answer_within.to_f64());
     let patience = patience.unwrap_or(Duration::MAX);
-    let (rows, greeting) = match Player::new(program, &Arc::new(task), patience) {
+    let task = Arc::new(task);
+    let (rows, greeting) = match Player::new(program, &task, patience) {
         Ok(mut player) => {
-            let outcome = play(&mut player, &actions);
+            let outcome = play(&mut player, &task, &actions);
             let greeting = player.greeting().cloned();
-            let rows = match outcome {
-                Ok(()) => player.stop().rows(None),
-                Err(Gone) => cut_short(player.abandon()),
+            let is_over = outcome.is_err();
+            let last = if !is_over && player.can(Ability::Resume) {
+                resumed(player, &arguments.command, &task, &actions[0])
+            } else if is_over {
+                Err(player.abandon())
+            } else {
+                Ok(player)
+            };
+            let rows = match last {
+                Ok(player) => player.stop().rows(None),
+                Err(findings) => cut_short(findings),
             };
             (rows, greeting)
         }
@@ -117,9 +129,20 @@ fn script(
     Ok((task, actions))
 }
 
-fn play(player: &mut Player, actions: &[(String, Rational)]) -> Result<(), Gone> {
+fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Result<(), Gone> {
     // Nothing has been told, so time passes.
     pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
+    if player.can(Ability::Beliefs) {
+        let (facts, values) = beliefs(task);
+        player.believe(&facts, &values)?;
+        player.look()?;
+        // Then what has changed, here a value that is not known any more.
+        let values = values.as_object().into_iter().flatten().take(1);
+        let values = values.map(|(fluent, _)| (fluent.clone(), Value::Null));
+        player.believe(&json!({}), &Value::Object(values.collect()))?;
+        player.look()?;
+        player.findings.look_at(Check::HearsBeliefs);
+    }
     let (name, duration) = &actions[0];
     let (other, other_duration) = actions.last().unwrap_or(&actions[0]);
     let long = longest(duration).max(longest(other_duration));
@@ -174,6 +197,18 @@ fn play(player: &mut Player, actions: &[(String, Rational)]) -> Result<(), Gone>
     pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
     player.findings.look_at(Check::EndsOnce);
     Ok(())
+}
+
+/// The facts that are true at the beginning, and all values, by name.
+fn beliefs(task: &Task) -> (Value, Value) {
+    let facts = task.initial().facts.iter();
+    let facts = facts.map(|fact| (task.fact_name(*fact), Value::Bool(true)));
+    let values = task.initial().values.iter();
+    let values = values.map(|(fluent, value)| (task.fluent_name(*fluent), wire::number(value)));
+    (
+        Value::Object(facts.collect()),
+        Value::Object(values.collect()),
+    )
 }
 
 fn longest(duration: &Rational) -> Rational {

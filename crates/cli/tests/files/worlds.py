@@ -1,10 +1,15 @@
 """Worlds for `elbowroom world-check`: `right`, and those that each do one thing wrong."""
 
 import json
+import os
 import sys
 
 fault = sys.argv[1]
-now, ends, starts, news, held = 0.0, {}, 0, [], []
+now, ends, starts, news, held, known = 0.0, {}, 0, [], [], {}
+# Those that say that they know what was under way when they were killed.
+REMEMBER = ["right", "forgets", "does not say what became of it", "begins again", "invents a start",
+            "never ends what was under way", "does not start again", "loses its time"]
+ledger = __file__ + ".ledger"
 
 
 def report(kind, ticket, time=None, **more):
@@ -24,7 +29,42 @@ def greet():
         say({"type": "hello", "version": 2, "can": ["cancel"]})
         say({"type": "hello", "version": 2, "can": ["cancel"]})
     else:
-        say({"type": "hello", "version": 2, "name": fault, "can": ["cancel", "feedback"]})
+        can = ["cancel", "feedback"]
+        can += ["resume"] if fault in REMEMBER else []
+        can += ["beliefs"] if fault in ["right", "dies of beliefs"] else []
+        say({"type": "hello", "version": 2, "name": fault, "can": can})
+
+
+def note(ticket, end):
+    """So that it is known to whoever is started again."""
+    with open(ledger, "a", encoding="utf-8") as file:
+        file.write(json.dumps([ticket, now, end]) + "\n")
+
+
+def remember(time):
+    global now
+    if fault == "does not start again":
+        sys.exit(5)
+    if fault != "loses its time":
+        now = time
+    if fault == "forgets":
+        return
+    with open(ledger, encoding="utf-8") as file:
+        for ticket, begun, end in map(json.loads, file):
+            known[ticket] = begun
+            ends[ticket] = 1e9 if fault == "never ends what was under way" else end
+
+
+def recall(ticket):
+    if fault == "does not say what became of it":
+        return
+    if ticket in known or fault == "invents a start":
+        begun = now + 0.5 if fault == "begins again" else known.get(ticket, now)
+        held.append((begun, ticket))
+    else:
+        news.append({"type": "unknown", "ticket": ticket})
+    news.extend({"type": "started", "ticket": it, "time": at} for at, it in held if at <= now)
+    held[:] = [it for it in held if it[0] > now]
 
 
 def start(ticket, duration):
@@ -48,6 +88,8 @@ def start(ticket, duration):
     if fault == "is ahead of time":
         return report("ended", ticket, time=now + duration, outcome="succeeded")
     ends[ticket] = now + (1e9 if fault == "never ends" else duration)
+    if fault in REMEMBER and starts == 5:
+        note(ticket, ends[ticket])
     return None
 
 
@@ -64,6 +106,10 @@ def wait(until):
     global now
     if fault == "reports late":
         news.extend(held)
+        held.clear()
+    if fault == "begins again" and held:
+        now = max(now, held[0][0])
+        news.extend({"type": "started", "ticket": it, "time": at} for at, it in held)
         held.clear()
     if news:
         return
@@ -106,6 +152,13 @@ for line in sys.stdin:
     kind = message["type"]
     if kind == "hello":
         greet()
+        if "resumed" in message:
+            remember(message["resumed"]["now"]["decimal"])
+        elif os.path.exists(ledger):
+            os.remove(ledger)
+    elif kind == "believed":
+        if fault == "dies of beliefs":
+            sys.exit(6)
     elif kind == "start":
         start(message["ticket"], message["duration"]["decimal"])
     elif kind == "cancel":
@@ -114,6 +167,8 @@ for line in sys.stdin:
         wait(message["until"]["decimal"])
         answer(message["question"])
     elif kind == "look":
+        for ticket in message.get("tickets", []):
+            recall(ticket)
         answer(message["question"])
     elif kind == "stop":
         if fault == "does not stop":

@@ -1,6 +1,6 @@
 //! The other side of a conversation with a world: asks, listens, and notes what is wrong.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::process::Child;
 use std::sync::Arc;
 use std::time::Duration;
@@ -35,6 +35,18 @@ pub(super) struct Player {
     /// What time it says it is.
     pub(super) now: Rational,
     actions: BTreeMap<u64, Begun>,
+    /// Of which starts it has said that it knows nothing.
+    unknown: BTreeSet<u64>,
+    /// Whether it is asked what happened before it was started: then reports are of that time.
+    recalls: bool,
+}
+
+/// What is left of a world that was killed.
+pub(super) struct Rest {
+    pub(super) findings: Findings,
+    /// The time that it had last.
+    pub(super) now: Rational,
+    patience: Duration,
 }
 
 /// What became of a start.
@@ -49,21 +61,58 @@ struct Begun {
 impl Player {
     /// Greets a program that has just been started.
     pub(super) fn new(
-        (child, mouth, ears): (Child, Mouth, Ears),
+        program: (Child, Mouth, Ears),
         task: &Arc<Task>,
         patience: Duration,
+    ) -> Result<Self, (Gone, Findings)> {
+        let nothing = Rest {
+            findings: Findings::default(),
+            now: Rational::ZERO,
+            patience,
+        };
+        Self::greeted(program, task, nothing, &hello(task))
+    }
+
+    /// Greets a program that was started again. `open` is what it was told before, as far as is known: ticket,
+    /// action, and whether it has reported that it has started.
+    pub(super) fn resumed(
+        program: (Child, Mouth, Ears),
+        task: &Arc<Task>,
+        rest: Rest,
+        open: &[(u64, &str, bool)],
+    ) -> Result<Self, (Gone, Findings)> {
+        let mut hello = hello(task);
+        let starts = open.iter().map(|(ticket, action, started)| {
+            json!({ "ticket": ticket, "action": action, "started": started })
+        });
+        let starts: Vec<Value> = starts.collect();
+        hello["resumed"] = json!({ "now": wire::number(&rest.now), "open": starts });
+        let mut player = Self::greeted(program, task, rest, &hello)?;
+        for (ticket, action, _) in open {
+            player.note_start(*ticket, action, false);
+        }
+        Ok(player)
+    }
+
+    fn greeted(
+        (child, mouth, ears): (Child, Mouth, Ears),
+        task: &Arc<Task>,
+        rest: Rest,
+        hello: &Value,
     ) -> Result<Self, (Gone, Findings)> {
         let mut player = Self {
             child,
             mouth,
             ears,
             listener: Listener::new(task),
-            patience,
-            findings: Findings::default(),
-            now: Rational::ZERO,
+            patience: rest.patience,
+            findings: rest.findings,
+            now: rest.now,
             actions: BTreeMap::new(),
+            unknown: BTreeSet::new(),
+            recalls: false,
         };
-        match player.tell(&hello(task)) {
+        match player.tell(hello) {
             Ok(()) => Ok(player),
             Err(gone) => {
                 let _ = player.child.kill();
@@ -78,9 +127,29 @@ impl Player {
         self.listener.greeting()
     }
 
-    /// Whether it says it can stop actions.
+    /// Whether it says it can do that.
+    pub(super) fn can(&self, ability: Ability) -> bool {
+        self.listener.greeting().is_some() && self.listener.can(ability)
+    }
+
+    /// Whether it may be told to stop actions; whoever has not greeted may, too.
     pub(super) fn can_cancel(&self) -> bool {
         self.listener.can(Ability::Cancel)
+    }
+
+    /// When the action has started.
+    pub(super) fn started(&self, ticket: u64) -> Option<&Rational> {
+        self.actions.get(&ticket)?.started.as_ref()
+    }
+
+    /// The action that was, or was to be, started.
+    pub(super) fn name_of(&self, ticket: u64) -> &str {
+        self.actions.get(&ticket).map_or("", |it| &it.name)
+    }
+
+    /// Whether it has said that it knows nothing of that start.
+    pub(super) fn is_unknown(&self, ticket: u64) -> bool {
+        self.unknown.contains(&ticket)
     }
 
     /// Whether the action has started, and has not ended.
@@ -115,16 +184,27 @@ impl Player {
         name: &str,
         duration: Option<&Rational>,
     ) -> Result<(), Gone> {
-        self.listener.note_start(ticket);
-        let action = Begun {
-            name: name.to_owned(),
-            is_instantaneous: duration.is_none(),
-            ..Begun::default()
-        };
-        self.actions.insert(ticket, action);
+        self.note_start(ticket, name, duration.is_none());
         self.tell(&json!({
             "type": "start", "ticket": ticket, "action": name,
             "duration": duration.map(wire::number), "now": wire::number(&self.now),
+        }))
+    }
+
+    fn note_start(&mut self, ticket: u64, name: &str, is_instantaneous: bool) {
+        self.listener.note_start(ticket);
+        let action = Begun {
+            name: name.to_owned(),
+            is_instantaneous,
+            ..Begun::default()
+        };
+        self.actions.insert(ticket, action);
+    }
+
+    /// Tells what is believed.
+    pub(super) fn believe(&mut self, facts: &Value, values: &Value) -> Result<(), Gone> {
+        self.tell(&json!({
+            "type": "believed", "now": wire::number(&self.now), "facts": facts, "values": values,
         }))
     }
 
@@ -141,6 +221,18 @@ impl Player {
         let number = self.listener.next_question();
         let question = json!({ "type": "look", "facts": [], "fluents": [], "question": number });
         self.ask(&question, None)
+    }
+
+    /// Asks what became of these.
+    pub(super) fn recall(&mut self, tickets: &[u64]) -> Result<(), Gone> {
+        let number = self.listener.next_question();
+        let question = json!({
+            "type": "look", "facts": [], "fluents": [], "tickets": tickets, "question": number,
+        });
+        self.recalls = true;
+        let answered = self.ask(&question, None);
+        self.recalls = false;
+        answered
     }
 
     /// Lets time pass until then, or until something is observed.
@@ -214,7 +306,8 @@ impl Player {
                 continue;
             }
             match self.listener.read(line) {
-                Ok(Said::Greeting | Said::Clock | Said::Unknown) => {}
+                Ok(Said::Greeting | Said::Clock) => {}
+                Ok(Said::Unknown) => self.unknown.extend(ticket_of(line)),
                 Ok(Said::Observation(observation)) => observations.push(observation),
                 Ok(Said::Time(now)) => {
                     self.findings.look_at(Check::Speaks);
@@ -278,10 +371,11 @@ impl Player {
             let name = excerpt(&action.name);
             let mut wrong = |check, why| self.findings.wrong(check, why);
             let (is, now) = (time.to_f64(), self.now.to_f64());
+            let is_old = *time < before - &Rational::ONE;
             if *time > self.now {
                 let why = format!("{name}: a report of {is} came at {now}, before its time");
                 wrong(Check::ReportsInTime, why);
-            } else if *time < before - &Rational::ONE {
+            } else if is_old && !self.recalls {
                 let why = format!("{name}: a report of {is} came at {now}");
                 wrong(Check::ReportsInTime, why);
             }
@@ -346,10 +440,27 @@ impl Player {
         self.findings
     }
 
+    /// Kills it, as a crash would.
+    pub(super) fn killed(mut self) -> Rest {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        Rest {
+            findings: self.findings,
+            now: self.now,
+            patience: self.patience,
+        }
+    }
+
     /// The conversation has ended otherwise.
     pub(super) fn abandon(mut self) -> Findings {
         let _ = self.child.kill();
         let _ = self.child.wait();
         self.findings
     }
+}
+
+/// Of which start a message is.
+fn ticket_of(line: &str) -> Option<u64> {
+    let message: Value = serde_json::from_str(line).ok()?;
+    message["ticket"].as_u64()
 }

@@ -18,12 +18,14 @@ pub(super) enum Check {
     DoesTwoAtOnce,
     Cancels,
     IgnoresTheUnknown,
+    HearsBeliefs,
+    Resumes,
     Stops,
 }
 
 impl Check {
     /// All of them, in the order in which they are shown, with a word and a sentence for each.
-    pub(super) const ALL: [(Self, &str, &str); 14] = [
+    pub(super) const ALL: [(Self, &str, &str); 16] = [
         (Self::Lives, "lives", "it lives until it is told to stop"),
         (
             Self::Speaks,
@@ -76,6 +78,16 @@ impl Check {
             Self::IgnoresTheUnknown,
             "ignores-the-unknown",
             "what it does not know (a message, a cancel of what has ended) does not disturb it",
+        ),
+        (
+            Self::HearsBeliefs,
+            "hears-beliefs",
+            "it is told what is believed, and goes on",
+        ),
+        (
+            Self::Resumes,
+            "resumes",
+            "killed and started again, it knows what became of what was under way",
         ),
         (Self::Stops, "stops", "it ends within a second after `stop`"),
     ];

@@ -1,0 +1,101 @@
+//! A world that is killed while it does something, and started again: does it know what became of that?
+
+use std::sync::Arc;
+
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+
+use super::player::{Gone, Player};
+use super::table::{Check, Findings};
+use super::{longest, pass, until_begun};
+use crate::conversation::launch;
+use crate::words::excerpt;
+
+/// The start that is under way when the world is killed, and one that the world was not told any more.
+const UNDER_WAY: u64 = 4;
+const UNTOLD: u64 = 5;
+
+/// Plays that, and gives back the world that was started again. `Err` where the conversation has come to its end.
+pub(super) fn resumed(
+    mut player: Player,
+    command: &str,
+    task: &Arc<Task>,
+    (name, duration): &(String, Rational),
+) -> Result<Player, Findings> {
+    let step = duration / Rational::from(10);
+    let begun = player
+        .start(UNDER_WAY, name, Some(duration))
+        .and_then(|()| until_begun(&mut player, &[UNDER_WAY], &longest(duration), &step));
+    if begun.is_err() {
+        return Err(player.abandon());
+    }
+    if !player.is_running(UNDER_WAY) {
+        // It was refused, or takes no time: nothing is under way.
+        return Ok(player);
+    }
+    let mut rest = player.killed();
+    let killed = rest.now.clone();
+    let program = match launch(command) {
+        Ok(program) => program,
+        Err(why) => {
+            let why = format!("it cannot be started again: {why}");
+            rest.findings.wrong(Check::Resumes, why);
+            return Err(rest.findings);
+        }
+    };
+    let open = [(UNDER_WAY, name.as_str(), true), (UNTOLD, name, false)];
+    let again = Player::resumed(program, task, rest, &open);
+    let mut player = again.map_err(|(Gone, findings)| findings)?;
+    match asked(&mut player, &killed, duration) {
+        Ok(()) => Ok(player),
+        Err(Gone) => Err(player.abandon()),
+    }
+}
+
+/// What the world that was started again says of what it was told before.
+fn asked(player: &mut Player, killed: &Rational, duration: &Rational) -> Result<(), Gone> {
+    player.recall(&[UNDER_WAY, UNTOLD])?;
+    player.findings.look_at(Check::Resumes);
+    for ticket in [UNDER_WAY, UNTOLD] {
+        if !player.has_begun(ticket) && !player.is_unknown(ticket) {
+            let why = format!(
+                "asked what became of start {ticket}, it answers neither `started` nor `ended` nor `unknown`"
+            );
+            player.findings.wrong(Check::Resumes, why);
+        }
+    }
+    if player.is_unknown(UNDER_WAY) {
+        let why = format!(
+            "it had reported start {UNDER_WAY}, and knows nothing of it when it is started again; write each start down \
+             before it begins (in Python: `World(…, ledger=FILE)`), or do not claim `resume`"
+        );
+        player.findings.wrong(Check::Resumes, why);
+    }
+    let long = longest(duration);
+    let step = (duration / Rational::from(10)).max(Rational::ONE);
+    pass(player, &long, &step, |player| !player.is_running(UNDER_WAY))?;
+    if player.is_running(UNDER_WAY) {
+        let why = format!(
+            "start {UNDER_WAY} had not ended {} s after it was started again",
+            long.to_f64()
+        );
+        player.findings.wrong(Check::Resumes, why);
+    }
+    // Just before it was killed, it had said when that began.
+    let began = player.started(UNDER_WAY).cloned();
+    if let Some(began) = began.filter(|began| began > killed) {
+        let why = format!(
+            "what was under way at {} began again at {}; what has begun must not be begun twice",
+            killed.to_f64(),
+            began.to_f64()
+        );
+        player.findings.wrong(Check::Resumes, why);
+    }
+    if player.has_begun(UNTOLD) {
+        let name = excerpt(player.name_of(UNTOLD));
+        let why =
+            format!("it was never told start {UNTOLD}, and reports that {name} was begun for it");
+        player.findings.wrong(Check::Resumes, why);
+    }
+    Ok(())
+}
