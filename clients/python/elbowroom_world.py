@@ -99,17 +99,18 @@ class Action:
         part = None if completion is None else min(1.0, max(0.0, float(completion)))
         self._tell(type="feedback", completion=part, note=note)
 
-    def started(self, measured: dict[str, float] | None = None) -> None:
-        """It has started now."""
-        self._tell(type="started", **({"measured": measured} if measured else {}))
+    def started(self, measured: dict[str, float] | None = None, *, stamp: Stamp | None = None) -> None:
+        """It has started now, or when the ``stamp`` says (:meth:`World.clock`)."""
+        self._tell(type="started", stamp=stamp, **({"measured": measured} if measured else {}))
 
-    def succeeded(self, measured: dict[str, float] | None = None) -> None:
-        """It has ended now, as the domain says. ``measured``: by how much it really changed fluents."""
-        self._end("succeeded", **({"measured": measured} if measured else {}))
+    def succeeded(self, measured: dict[str, float] | None = None, *, stamp: Stamp | None = None) -> None:
+        """It has ended now, or when the ``stamp`` says, as the domain says. ``measured``: by how much it really
+        changed fluents."""
+        self._end("succeeded", stamp=stamp, **({"measured": measured} if measured else {}))
 
-    def failed(self, why: str) -> None:
-        """It has ended now without its effects."""
-        self._end("failed", why=why)
+    def failed(self, why: str, *, stamp: Stamp | None = None) -> None:
+        """It has ended now, or when the ``stamp`` says, without its effects."""
+        self._end("failed", why=why, stamp=stamp)
 
     def was_cancelled(self) -> None:
         """It has stopped, as it was told to."""
@@ -127,6 +128,8 @@ class Action:
 
 
 Does = Callable[[Action], Any]
+Stamp = tuple[str, float]
+"""A time by another clock, such as that of a robot's arm: its name, and what it showed."""
 
 
 class World:
@@ -218,14 +221,23 @@ class World:
 
     # What a program reports by itself, from any thread.
 
-    def fact(self, name: str, becomes: bool) -> None:
-        """A fact was seen to be so: ``world.fact("(open door)", False)``."""
-        report = {"type": "fact", "fact": name, "becomes": bool(becomes)}
+    def fact(self, name: str, becomes: bool, *, stamp: Stamp | None = None) -> None:
+        """A fact was seen to be so: ``world.fact("(open door)", False)``; now, or when the ``stamp`` says."""
+        report = {"type": "fact", "fact": name, "becomes": bool(becomes), "stamp": stamp}
         self._inbox.put(("report", report, self.now()))
 
-    def value(self, fluent: str, value: float) -> None:
-        """A value was seen: ``world.value("(charge rover)", 17.5)``."""
-        report = {"type": "value", "fluent": fluent, "value": value}
+    def value(self, fluent: str, value: float, *, stamp: Stamp | None = None) -> None:
+        """A value was seen: ``world.value("(charge rover)", 17.5)``; now, or when the ``stamp`` says."""
+        report = {"type": "value", "fluent": fluent, "value": value, "stamp": stamp}
+        self._inbox.put(("report", report, self.now()))
+
+    def clock(self, name: str, reads: float, rate: float | None = None) -> None:
+        """Another clock shows this now: ``world.clock("arm", 1700000012.4)``. To be said now and then. From then on,
+        reports can say when something happened by that clock: ``world.fact("(open door)", True, stamp=("arm",
+        1700000012.9))``. ``rate`` is how many of its seconds pass in one of the world's; without it, that is measured
+        from one reading to the next. In version 1 of the protocol there is one clock, and what is reported happens now."""
+        report = {"type": "clock", "clock": name, "reads": float(reads)}
+        report.update({} if rate is None else {"rate": float(rate)})
         self._inbox.put(("report", report, self.now()))
 
     def now(self) -> float:
@@ -417,7 +429,9 @@ class World:
     def _take(self, report: dict[str, Any], at: float) -> None:
         """Notes what is to be reported; each start and each end once, and in this order."""
         report = dict(report, time=max(0.0, at))
-        ticket, what = report.get("ticket"), report["type"]
+        ticket, what, stamp = report.get("ticket"), report["type"], report.pop("stamp", None)
+        if what == "clock" and self._version < 2:
+            return
         if ticket is not None:
             if ticket in self._ended or (what == "started" and ticket in self._begun):
                 return
@@ -438,6 +452,9 @@ class World:
                 self._ended[ticket] = report
                 if self._ledger is not None:
                     self._ledger.write(report=dict(report, type="ended", outcome="succeeded"))
+        if stamp is not None and self._version >= 2:
+            # Who asks after a crash is told the world's own time: nothing is known of other clocks then.
+            report = dict(report, clock=stamp[0], time=float(stamp[1]))
         self._news.append(report)
 
     def _see(self, question: dict[str, Any]) -> None:

@@ -199,6 +199,50 @@ class OnTheWallClock(unittest.TestCase):
         self.assertEqual([it["type"] for it in seen], ["fact", "value"])
         self.assertEqual(seen[1]["value"], 17.5)
 
+    def test_reports_can_have_the_time_of_another_clock(self):
+        world = World("rover")
+
+        @world.starter("drive")
+        def drive(action):
+            world.clock("arm", 1000.0, rate=2)
+            action.started(stamp=("arm", 1000.5))
+            world.value("(charge rover)", 7, stamp=("arm", 1001))
+            world.fact("(open door)", True)
+            action.failed("the wheels slip", stamp=("arm", 1002))
+
+        peer = Peer(world)
+        peer.start(0)
+        reports = peer.reports(5)
+        clock, started, value, fact, ended = reports
+        self.assertEqual((clock["clock"], clock["reads"], clock["rate"]), ("arm", 1000.0, 2.0))
+        times = [(it.get("clock"), it["time"]) for it in (started, value, ended)]
+        self.assertEqual(times, [("arm", 1000.5), ("arm", 1001.0), ("arm", 1002.0)])
+        self.assertNotIn("clock", fact)
+        self.assertLess(fact["time"], 100)
+        # Asked again, it says its own time.
+        again, _ = peer.ask(type="look", facts=[], fluents=[], tickets=[0])
+        self.assertEqual([it["type"] for it in again], ["ended"])
+        self.assertNotIn("clock", again[0])
+        self.assertLess(again[0]["time"], 100)
+        self.assertNotIn("stamp", again[0])
+        self.assertTrue(peer.stop())
+
+    def test_in_version_1_there_is_one_clock(self):
+        world = World("rover")
+
+        @world.starter("drive")
+        def drive(action):
+            world.clock("arm", 1000.0)
+            action.started(stamp=("arm", 1000.5))
+
+        peer = Peer(world, version=1)
+        peer.start(0)
+        (started,) = peer.reports(1)
+        self.assertEqual(started["type"], "started")
+        self.assertNotIn("clock", started)
+        self.assertLess(started["time"], 100)
+        self.assertTrue(peer.stop())
+
     def test_what_is_believed_is_heard_by_who_wants_to(self):
         world, heard = World(), []
         world.believed(lambda facts, values: heard.append((facts, values)))

@@ -5,6 +5,7 @@ mod command;
 #[path = "../../../testing/skipped.rs"]
 mod skipped;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::process::Command;
 
@@ -179,6 +180,77 @@ fn a_world_that_cannot_be_started_is_no_answer() {
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(text.contains("cannot start the world"), "{text}");
+}
+
+/// A robot's arm has a clock of its own, which is ahead and twice as fast. What it reports of has happened when
+/// that clock says, and not when it is heard.
+#[test]
+fn what_another_clock_has_seen_has_happened_when_it_says() {
+    if !python_is_there() {
+        return;
+    }
+    let script = "import os, sys
+sys.path.insert(0, os.path.join(os.getcwd(), 'clients', 'python'))
+from elbowroom_world import World
+world = World('arm', speed=20)
+
+@world.starter('*')
+def work(action):
+    arm = lambda time: 1e9 + 2 * time
+    world.clock('arm', arm(world.now()), rate=2)
+    action.started()
+    def end():
+        action.sleep(action.duration or 0)
+        happened = world.now() - 0.5
+        with open(sys.argv[1], 'a') as file:
+            print(action.ticket, happened, file=file)
+        action.succeeded(stamp=('arm', arm(happened)))
+    import threading
+    threading.Thread(target=end, daemon=True).start()
+
+world.run()
+";
+    let file = |name: &str| {
+        let name = format!("elbowroom-{}-{name}", std::process::id());
+        std::env::temp_dir().join(name).display().to_string()
+    };
+    let [program, times, trace] = ["arm.py", "times", "arm.jsonl"].map(file);
+    fs::write(&program, script).expect("a temporary file can be written");
+    let world = format!("python3 {program} {times}");
+    let line = ["--world-process", &world, "--trace", &trace];
+    let output = elbowroom(&[&["run"], &DELIVERY[..], &line].concat());
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let happened = fs::read_to_string(&times).expect("what has happened");
+    let happened: BTreeMap<u64, f64> = happened
+        .lines()
+        .map(|line| {
+            let (ticket, time) = line.split_once(' ').expect("two numbers");
+            let time = time.parse().expect("a time");
+            (ticket.parse().expect("a ticket"), time)
+        })
+        .collect();
+    let text = fs::read_to_string(&trace).expect("a trace");
+    let lines = text
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"));
+    let mut heard = 0;
+    for line in lines.filter(|line: &Value| line["event"] == "observed") {
+        let seen = &line["observation"];
+        if seen["type"] == "ended" {
+            let ticket = seen["ticket"].as_u64().expect("a ticket");
+            let time = seen["time"]["decimal"].as_f64().expect("a time");
+            // The reading took a moment.
+            assert!(
+                (time - happened[&ticket]).abs() < 0.2,
+                "{line}: {happened:?}"
+            );
+            heard += 1;
+        }
+    }
+    assert_eq!(heard, happened.len(), "{text}");
+    for file in [program, times, trace] {
+        fs::remove_file(file).expect("it was written");
+    }
 }
 
 /// How far a running action has come is in the trace, and changes no decision.
