@@ -365,6 +365,21 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
         let is_over = |done: &ExecutedStep| done.ending.is_some();
         assert!(report.executed.iter().all(is_over), "{report:?}");
     }
+    // Who never confirms that he has stopped is waited for, but for five seconds only.
+    let settings = RunSettings {
+        time_limit: Rational::from(5),
+        ..RunSettings::default()
+    };
+    let mut world = Toy {
+        slides: 1_000_000,
+        ..Toy::default()
+    };
+    let one = errands("(have book)");
+    let report = Execution::of(&one)
+        .with_settings(settings)
+        .run_in(&mut world);
+    assert_eq!(report.verdict, Verdict::TimeLimit, "{report:?}");
+    assert_eq!(report.time, Rational::from(10), "{report:?}");
 }
 
 #[test]

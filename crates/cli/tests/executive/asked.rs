@@ -146,3 +146,77 @@ fn only_this_machine_reaches_an_executive() {
         "{listening:?}"
     );
 }
+
+/// Whether a value is as a schema says, and has nothing of which that says nothing.
+fn conforms(value: &Value, schema: &Value, all: &Value) -> Result<(), String> {
+    let wrong = |why: &str| Err(format!("{why}: {value} for {schema}"));
+    if let Some(name) = schema["$ref"].as_str() {
+        let name = name.rsplit('/').next().unwrap_or_default();
+        return conforms(value, &all[name], all);
+    }
+    if let Some(any) = schema["anyOf"].as_array() {
+        let fits = any.iter().any(|it| conforms(value, it, all).is_ok());
+        return if fits { Ok(()) } else { wrong("none of these") };
+    }
+    let is_listed = |list: &Vec<Value>| list.contains(value);
+    if !schema["enum"].as_array().is_none_or(is_listed) {
+        return wrong("not listed");
+    }
+    match (schema["type"].as_str(), value) {
+        (Some("null"), Value::Null)
+        | (Some("string"), Value::String(_))
+        | (Some("boolean"), Value::Bool(_))
+        | (Some("number"), Value::Number(_)) => Ok(()),
+        (Some("integer"), Value::Number(number)) if number.is_u64() => Ok(()),
+        (Some("array"), Value::Array(items)) => items
+            .iter()
+            .try_for_each(|it| conforms(it, &schema["items"], all)),
+        (Some("object"), Value::Object(members)) => {
+            let required = schema["required"].as_array().into_iter().flatten();
+            for name in required.filter_map(Value::as_str) {
+                if !members.contains_key(name) {
+                    return wrong(&format!("`{name}` is missing"));
+                }
+            }
+            members
+                .iter()
+                .try_for_each(|(name, member)| match schema["properties"].get(name) {
+                    Some(own) => conforms(member, own, all),
+                    None => wrong(&format!("`{name}` is not in it")),
+                })
+        }
+        _ => wrong("of another type"),
+    }
+}
+
+#[test]
+fn answers_are_as_the_interface_says() {
+    let own = simulated("answers");
+    let (_, interface) = own.get("/v1/openapi.json");
+    let all = &interface["components"]["schemas"];
+    let is_right = |answer: &Value, path: &str, verb: &str, status: &str| {
+        let content = &interface["paths"][path][verb]["responses"][status]["content"];
+        let schema = &content["application/json"]["schema"];
+        assert!(schema.is_object(), "{verb} {path}: {interface}");
+        conforms(answer, schema, all).unwrap_or_else(|why| panic!("{verb} {path}: {why}"));
+    };
+    for activity in ["executing", "resting"] {
+        own.await_state(|state| state["activity"] == activity);
+        for path in ["/v1/state", "/v1/plan", "/v1/guarantee", "/v1/next"] {
+            is_right(&own.get(path).1, path, "get", "200");
+        }
+    }
+    let (_, taken) = own.post("/v1/goals", &json!({"goal": "(done a3)", "name": "x"}));
+    is_right(&taken, "/v1/goals", "post", "200");
+    let (status, refusal) = own.post("/v1/goals", &json!({"goal": "(nonsense)"}));
+    assert_eq!(status, 422);
+    is_right(&refusal, "/v1/goals", "post", "default");
+    // It tells right from wrong.
+    let mut state = own.get("/v1/state").1;
+    state["plans"] = json!("many");
+    assert!(conforms(&state, &all["State"], all).is_err());
+    state["plans"] = json!(1);
+    assert_eq!(conforms(&state, &all["State"], all), Ok(()));
+    state["more"] = json!(1);
+    assert!(conforms(&state, &all["State"], all).is_err());
+}
