@@ -10,7 +10,8 @@ use super::number::positive;
 #[derive(Args, Debug)]
 #[command(after_help = "\
 The world is told to start the first actions of the plan that take time: one to its end, one that is \
-cancelled at once, two at a time. A robot moves. Without a plan, the world is told to `(wait-a-second)`.
+cancelled at once, two at a time. A robot moves. Without a plan, the world is told to `(wait-a-second)`. \
+A program that claims `resume` is killed while it does something, and started again.
 
 Exit codes: 0 nothing is wrong; 1 something is; 2 the world cannot be started.")]
 pub(crate) struct WorldCheckArgs {

@@ -8,7 +8,8 @@ fault = sys.argv[1]
 now, ends, starts, news, held, known = 0.0, {}, 0, [], [], {}
 # Those that say that they know what was under way when they were killed.
 REMEMBER = ["right", "forgets", "does not say what became of it", "begins again", "invents a start",
-            "never ends what was under way", "does not start again", "loses its time"]
+            "never ends what was under way", "does not start again", "loses its time", "forgets what is over",
+            "claims it only once"]
 ledger = __file__ + ".ledger"
 
 
@@ -20,7 +21,7 @@ def say(message):
     print(message if isinstance(message, str) else json.dumps(message), flush=True)
 
 
-def greet():
+def greet(again):
     if fault == "speaks of feedback without greeting":
         return
     if fault == "speaks version 3":
@@ -30,8 +31,8 @@ def greet():
         say({"type": "hello", "version": 2, "can": ["cancel"]})
     else:
         can = ["cancel", "feedback"]
-        can += ["resume"] if fault in REMEMBER else []
-        can += ["beliefs"] if fault in ["right", "dies of beliefs"] else []
+        can += ["resume"] if fault in REMEMBER and not (again and fault == "claims it only once") else []
+        can += ["beliefs"] if fault in ["right", "dies of beliefs", "answers beliefs"] else []
         say({"type": "hello", "version": 2, "name": fault, "can": can})
 
 
@@ -41,7 +42,7 @@ def note(ticket, end):
         file.write(json.dumps([ticket, now, end]) + "\n")
 
 
-def remember(time):
+def remember(time, opened):
     global now
     if fault == "does not start again":
         sys.exit(5)
@@ -51,15 +52,22 @@ def remember(time):
         return
     with open(ledger, encoding="utf-8") as file:
         for ticket, begun, end in map(json.loads, file):
-            known[ticket] = begun
+            if ticket in opened:
+                known[ticket] = begun, end
+    for ticket, (_, end) in known.items():
+        if end > now:
             ends[ticket] = 1e9 if fault == "never ends what was under way" else end
 
 
 def recall(ticket):
     if fault == "does not say what became of it":
         return
-    if ticket in known or fault == "invents a start":
-        begun = now + 0.5 if fault == "begins again" else known.get(ticket, now)
+    if fault == "forgets what is over" and ticket not in ends:
+        news.append({"type": "unknown", "ticket": ticket})
+    elif ticket in known and ticket not in ends:
+        report("ended", ticket, time=known[ticket][1], outcome="succeeded")
+    elif ticket in known or fault == "invents a start":
+        begun = now + 0.5 if fault == "begins again" else known.get(ticket, (now, None))[0]
         held.append((begun, ticket))
     else:
         news.append({"type": "unknown", "ticket": ticket})
@@ -88,7 +96,7 @@ def start(ticket, duration):
     if fault == "is ahead of time":
         return report("ended", ticket, time=now + duration, outcome="succeeded")
     ends[ticket] = now + (1e9 if fault == "never ends" else duration)
-    if fault in REMEMBER and starts == 5:
+    if fault in REMEMBER:
         note(ticket, ends[ticket])
     return None
 
@@ -151,14 +159,16 @@ for line in sys.stdin:
     message = json.loads(line)
     kind = message["type"]
     if kind == "hello":
-        greet()
+        greet("resumed" in message)
         if "resumed" in message:
-            remember(message["resumed"]["now"]["decimal"])
+            remember(message["resumed"]["now"]["decimal"], [it["ticket"] for it in message["resumed"]["open"]])
         elif os.path.exists(ledger):
             os.remove(ledger)
     elif kind == "believed":
         if fault == "dies of beliefs":
             sys.exit(6)
+        if fault == "answers beliefs":
+            say({"type": "time", "now": now})
     elif kind == "start":
         start(message["ticket"], message["duration"]["decimal"])
     elif kind == "cancel":

@@ -201,6 +201,13 @@ impl Player {
         self.actions.insert(ticket, action);
     }
 
+    /// It is known that this has started.
+    pub(super) fn note_begun(&mut self, ticket: u64) {
+        if let Some(action) = self.actions.get_mut(&ticket) {
+            action.started = Some(Rational::ZERO);
+        }
+    }
+
     /// Tells what is believed.
     pub(super) fn believe(&mut self, facts: &Value, values: &Value) -> Result<(), Gone> {
         self.tell(&json!({

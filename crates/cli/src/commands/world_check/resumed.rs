@@ -8,10 +8,11 @@ use elbowroom::num::Rational;
 use super::player::{Gone, Player};
 use super::table::{Check, Findings};
 use super::{longest, pass, until_begun};
-use crate::conversation::launch;
+use crate::conversation::{Ability, launch};
 use crate::words::excerpt;
 
-/// The start that is under way when the world is killed, and one that the world was not told any more.
+/// A start that is over when the world is killed, one that is under way, and one that it was not told any more.
+const OVER: u64 = 0;
 const UNDER_WAY: u64 = 4;
 const UNTOLD: u64 = 5;
 
@@ -43,9 +44,15 @@ pub(super) fn resumed(
             return Err(rest.findings);
         }
     };
-    let open = [(UNDER_WAY, name.as_str(), true), (UNTOLD, name, false)];
+    let name = name.as_str();
+    let open = [
+        (OVER, name, true),
+        (UNDER_WAY, name, true),
+        (UNTOLD, name, false),
+    ];
     let again = Player::resumed(program, task, rest, &open);
     let mut player = again.map_err(|(Gone, findings)| findings)?;
+    player.note_begun(OVER);
     match asked(&mut player, &killed, duration) {
         Ok(()) => Ok(player),
         Err(Gone) => Err(player.abandon()),
@@ -54,8 +61,24 @@ pub(super) fn resumed(
 
 /// What the world that was started again says of what it was told before.
 fn asked(player: &mut Player, killed: &Rational, duration: &Rational) -> Result<(), Gone> {
-    player.recall(&[UNDER_WAY, UNTOLD])?;
+    player.recall(&[OVER, UNDER_WAY, UNTOLD])?;
     player.findings.look_at(Check::Resumes);
+    if !player.can(Ability::Resume) {
+        let why = "started again, it does not claim `resume` any more";
+        player.findings.wrong(Check::Resumes, why);
+    }
+    if !player.has_ended(OVER) {
+        let why = if player.is_unknown(OVER) {
+            format!(
+                "it had reported the end of start {OVER}, and knows nothing of it when it is started again"
+            )
+        } else {
+            format!(
+                "start {OVER} was over, and it does not answer `ended` when it is asked about it again"
+            )
+        };
+        player.findings.wrong(Check::Resumes, why);
+    }
     for ticket in [UNDER_WAY, UNTOLD] {
         if !player.has_begun(ticket) && !player.is_unknown(ticket) {
             let why = format!(

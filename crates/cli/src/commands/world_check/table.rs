@@ -93,6 +93,18 @@ impl Check {
     ];
 }
 
+impl Check {
+    /// Why it is not looked at in a conversation that comes to its end.
+    fn occasion(self) -> &'static str {
+        match self {
+            Self::Cancels => "its greeting does not claim `cancel`",
+            Self::HearsBeliefs => "its greeting does not claim `beliefs`",
+            Self::Resumes => "its greeting does not claim `resume`",
+            _ => "there was no occasion",
+        }
+    }
+}
+
 /// The outcome of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -148,7 +160,7 @@ impl Findings {
             } else if self.done.contains(&check) {
                 (Outcome::Passed, Vec::new())
             } else {
-                let why = end.unwrap_or("there was no occasion");
+                let why = end.unwrap_or_else(|| check.occasion());
                 (Outcome::Skipped, vec![why.to_owned()])
             };
             Row {
