@@ -1,9 +1,11 @@
 //! The conversation with a program that is a world: `docs/formats/world-protocol.md`.
 
+mod believed;
 mod clocks;
 mod listener;
 mod pipes;
 
+pub(crate) use believed::believed;
 pub(crate) use listener::{Ability, Greeting, Listener, Said, hello, is_time};
 pub(crate) use pipes::{Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Mouth, Told};
 

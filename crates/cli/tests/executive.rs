@@ -41,6 +41,15 @@ fn ctl(line: &[&str]) -> Output {
     command::elbowroom(&[&["ctl"], line].concat())
 }
 
+/// Whether robots can be made; if not, that is said.
+fn python_is_there() -> bool {
+    let is_there = Command::new("python3").arg("--version").output().is_ok();
+    if !is_there {
+        skipped("there is no python3");
+    }
+    is_there
+}
+
 fn exact(number: &Value) -> f64 {
     number["decimal"].as_f64().expect("a number")
 }
@@ -483,6 +492,12 @@ fn bad_clients_delay_nothing() {
     assert!(starts >= 4, "{starts}");
 }
 
+/// Sends a signal to a process that is there.
+fn signal(process: &str, name: &str) {
+    let told = Command::new("kill").args(["-s", name, process]).status();
+    assert!(told.expect("every Unix has `kill`").success());
+}
+
 fn kill(pid: &str) {
     let _ = Command::new("kill").args(["-9", pid.trim()]).output();
 }
@@ -512,8 +527,7 @@ fn with_robot(folder: &Path, journal: &str) -> Vec<String> {
 /// back: the goals stand, the pause stands, and nothing is started twice.
 #[test]
 fn what_was_asked_survives_kill_9() {
-    if Command::new("python3").arg("--version").output().is_err() {
-        skipped("there is no python3");
+    if !python_is_there() {
         return;
     }
     for (name, world_too) in [("killed", false), ("both-killed", true)] {

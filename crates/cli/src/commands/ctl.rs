@@ -15,11 +15,12 @@ use crate::args::{CtlArgs, CtlCommand};
 use crate::exit::{Answer, Exit, Failure};
 use crate::http::{self, ask};
 use crate::interrupt::Interrupt;
-use crate::look::{STRONG, styled};
+use crate::look::{Look, STRONG, styled};
 use crate::number::nearest;
 use crate::output::{self, Output};
 use crate::serve::Control;
 use crate::words::{counted, plain, tame};
+use crate::wrap::wrapped;
 
 /// Asks, and prints the answer.
 pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
@@ -226,10 +227,10 @@ fn state(state: &State) -> String {
     }
     text.push('\n');
     if let Some(seconds) = state.unanswered {
-        let _ = writeln!(
-            text,
-            "  the world has not answered for {seconds} s: nothing is started, and no request taken in, until it does"
+        let why = format!(
+            "the world has not answered for {seconds} s: nothing is started, and no request taken in, until it does"
         );
+        let _ = writeln!(text, "{}", wrapped(&why, Look::of_stdout().width, 2));
     }
     for goal in &state.goals {
         let _ = writeln!(text, "  goal {}: {}", tame(&goal.name), tame(&goal.goal));

@@ -10,9 +10,8 @@ use std::time::Duration;
 
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
-use elbowroom::report::wire;
 use elbowroom::text::Source;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::args::{ProblemArgs, WorldCheckArgs};
 use crate::conversation::{Ability, Greeting, launch};
@@ -58,10 +57,13 @@ pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
             let outcome = play(&mut player, &task, &actions);
             let greeting = player.greeting().cloned();
             let is_over = outcome.is_err();
-            let last = if !is_over && player.can(Ability::Resume) {
-                resumed(player, &arguments.command, &task, &actions[0])
-            } else if is_over {
+            if !is_over {
+                player.note_what_it_cannot();
+            }
+            let last = if is_over {
                 Err(player.abandon())
+            } else if player.can(Ability::Resume) {
+                resumed(player, &arguments.command, &task, &actions[0])
             } else {
                 Ok(player)
             };
@@ -133,15 +135,14 @@ fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Res
     // Nothing has been told, so time passes.
     pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
     if player.can(Ability::Beliefs) {
-        let (facts, values) = beliefs(task);
-        player.believe(&facts, &values)?;
-        player.look()?;
-        // Then what has changed, here a value that is not known any more.
-        let values = values.as_object().into_iter().flatten().take(1);
-        let values = values.map(|(fluent, _)| (fluent.clone(), Value::Null));
-        player.believe(&json!({}), &Value::Object(values.collect()))?;
-        player.look()?;
+        let faults = player.findings.faults();
         player.findings.look_at(Check::HearsBeliefs);
+        let heard = beliefs(player, task);
+        if heard.is_err() || player.findings.faults() > faults {
+            let why = "something went wrong once it was told what is believed: `believed` needs no answer";
+            player.findings.wrong(Check::HearsBeliefs, why);
+        }
+        heard?;
     }
     let (name, duration) = &actions[0];
     let (other, other_duration) = actions.last().unwrap_or(&actions[0]);
@@ -199,16 +200,20 @@ fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Res
     Ok(())
 }
 
-/// The facts that are true at the beginning, and all values, by name.
-fn beliefs(task: &Task) -> (Value, Value) {
-    let facts = task.initial().facts.iter();
-    let facts = facts.map(|fact| (task.fact_name(*fact), Value::Bool(true)));
-    let values = task.initial().values.iter();
-    let values = values.map(|(fluent, value)| (task.fluent_name(*fluent), wire::number(value)));
-    (
-        Value::Object(facts.collect()),
-        Value::Object(values.collect()),
-    )
+/// Tells what is so at the beginning, that a value is not known any more, and that it is known again.
+fn beliefs(player: &mut Player, task: &Task) -> Result<(), Gone> {
+    let initial = task.initial();
+    let values = || initial.values.iter();
+    let known = values().map(|(fluent, value)| (*fluent, Some(value)));
+    player.believe(task, initial.facts.iter().copied(), known)?;
+    player.look()?;
+    for is_known in [false, true] {
+        let one = values().take(1);
+        let one = one.map(|(fluent, value)| (*fluent, is_known.then_some(value)));
+        player.believe(task, std::iter::empty(), one)?;
+        player.look()?;
+    }
+    Ok(())
 }
 
 fn longest(duration: &Rational) -> Rational {

@@ -1,24 +1,17 @@
 //! What an executive says of itself, and what it makes of what it is told.
 
 use std::fs;
-use std::process::Command;
 
 use serde_json::{Value, json};
 
 use super::client::{Executive, folder};
 use super::skipped::skipped;
-use super::{command, ctl, exact, lines, simulated, with_robot};
-
-fn signal(process: &str, name: &str) {
-    let told = Command::new("kill").args(["-s", name, process]).status();
-    assert!(told.expect("every Unix has `kill`").success());
-}
+use super::{command, ctl, exact, lines, python_is_there, signal, simulated, with_robot};
 
 /// A program that hangs is named, and no request is said to wait for a plan because of it.
 #[test]
 fn a_world_that_stands_still_is_named() {
-    if Command::new("python3").arg("--version").output().is_err() {
-        skipped("there is no python3");
+    if !python_is_there() {
         return;
     }
     let place = folder("still");

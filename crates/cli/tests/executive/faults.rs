@@ -12,15 +12,7 @@ use serde_json::{Value, json};
 use super::client::{Executive, folder};
 use super::command::root;
 use super::skipped::skipped;
-use super::{DOMAIN, PROBLEM, ctl, with_robot};
-
-fn python_is_there() -> bool {
-    let is_there = Command::new("python3").arg("--version").output().is_ok();
-    if !is_there {
-        skipped("there is no python3");
-    }
-    is_there
-}
+use super::{DOMAIN, PROBLEM, ctl, python_is_there, signal, with_robot};
 
 /// An executive that goes on after a crash ends in order, as one that has just begun does.
 #[test]
@@ -28,8 +20,8 @@ fn signals_end_an_executive_that_goes_on_after_a_crash() {
     if !python_is_there() {
         return;
     }
-    for signal in ["INT", "TERM", "HUP"] {
-        let place = folder(&format!("resumed-{signal}"));
+    for name in ["INT", "TERM", "HUP"] {
+        let place = folder(&format!("resumed-{name}"));
         let journal = place.join("journal").display().to_string();
         let line = with_robot(&place, &journal);
         let line: Vec<&str> = line.iter().map(String::as_str).collect();
@@ -39,15 +31,14 @@ fn signals_end_an_executive_that_goes_on_after_a_crash() {
         let mut again = Executive::start(&place, &["--resume", &journal]);
         again.await_state(|state| state["activity"] != "beginning");
         let process = again.process().to_string();
-        let told = Command::new("kill").args(["-s", signal, &process]).status();
-        assert!(told.expect("every Unix has `kill`").success());
+        signal(&process, name);
         let output = again.end();
-        assert_eq!(output.status.code(), Some(0), "{signal}: {output:?}");
+        assert_eq!(output.status.code(), Some(0), "{name}: {output:?}");
         let report = String::from_utf8_lossy(&output.stdout);
-        assert!(report.contains("asked to end"), "{signal}: {report}");
+        assert!(report.contains("asked to end"), "{name}: {report}");
         let text = fs::read_to_string(&journal).expect("a journal");
         let last = text.lines().last().expect("a record");
-        assert!(last.contains("\"interrupted\""), "{signal}: {last}");
+        assert!(last.contains("\"interrupted\""), "{name}: {last}");
         fs::remove_dir_all(&place).expect("the folder is there");
     }
 }

@@ -9,8 +9,7 @@ use serde_json::{Value, json};
 
 use super::client::{Executive, folder};
 use super::command::root;
-use super::skipped::skipped;
-use super::{DOMAIN, PROBLEM, with_robot};
+use super::{DOMAIN, PROBLEM, python_is_there, with_robot};
 
 fn problem() -> Value {
     let text = fs::read_to_string(root().join(PROBLEM)).expect("a problem");
@@ -72,8 +71,7 @@ fn what_is_wrong_is_told_before_it_listens_for_a_problem() {
 /// Who is told that a problem is taken need not give it again, whatever happens then.
 #[test]
 fn a_first_problem_that_is_taken_survives_kill_9() {
-    if Command::new("python3").arg("--version").output().is_err() {
-        skipped("there is no python3");
+    if !python_is_there() {
         return;
     }
     let place = folder("first-killed");

@@ -18,8 +18,7 @@ use serde_json::{Value, json};
 
 use super::client::{Executive, folder};
 use super::command;
-use super::skipped::skipped;
-use super::{lines, with_robot};
+use super::{lines, python_is_there, with_robot};
 
 const DONE: [&str; 6] = ["a1", "a2", "a3", "b1", "b2", "b3"];
 /// A journal begins anew after every few actions, and none of it is lost.
@@ -234,8 +233,7 @@ fn launched(place: &Path, journal: &str, beginning: &[String]) -> Executive {
 /// played back.
 #[test]
 fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
-    if Command::new("python3").arg("--version").output().is_err() {
-        skipped("there is no python3");
+    if !python_is_there() {
         return;
     }
     let count = std::env::var("ELBOWROOM_SERVE_KILLS").ok();
@@ -265,8 +263,7 @@ fn whenever_an_executive_is_killed_it_goes_on_and_what_was_asked_stands() {
 /// segment as long as the new one has not its name.
 #[test]
 fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
-    if Command::new("python3").arg("--version").output().is_err() {
-        skipped("there is no python3");
+    if !python_is_there() {
         return;
     }
     let place = folder("about-to-begin-anew");

@@ -10,10 +10,10 @@ use elbowroom_num::Rational;
 /// The plan without the steps that it works without. A search can come to a goal by way of an
 /// action that makes true what another one, perhaps under way before, makes true anyway.
 ///
-/// Only steps are tried that supply no fact that is read before anything else supplies it: there are few
-/// of them, and whether the plan works without one is for the judge to say. Of steps that change numbers which
-/// something reads, most are there for that, so that they are tried only as long as few trials
-/// were in vain ([`MOST_IN_VAIN`]). `goes_on` is asked before each trial; once it says no, the other steps stay.
+/// Only steps are tried that supply no fact that is read before anything else supplies it: there are few of
+/// them, and whether the plan works without one is for the judge to say. Steps that change numbers which something
+/// reads are mostly there for that. Both kinds are tried only as long as few trials of that kind were in vain
+/// ([`MOST_IN_VAIN`]). `goes_on` is asked before each trial; once it says no, the other steps stay.
 pub(super) fn without_needless(
     task: &Task,
     situation: &Situation,
@@ -22,15 +22,18 @@ pub(super) fn without_needless(
     goes_on: &mut dyn FnMut() -> bool,
 ) -> (TimeTriggeredPlan, Report) {
     let mut timeline = Timeline::new(task, situation, &plan.steps);
-    let (mut left, mut in_vain) = ((plan, report), 0);
+    let mut left = (plan, report);
+    let (mut of_numbers, mut of_nothing) = (0, 0);
     // What is under way comes first, and stays. Later steps may need earlier ones.
     for index in (situation.running.len()..left.0.steps.len()).rev() {
-        let reads_on = match timeline.supplies(index) {
+        let in_vain = match timeline.supplies(index) {
             Supplies::Facts => continue,
-            Supplies::Numbers if in_vain >= MOST_IN_VAIN => continue,
-            Supplies::Numbers => true,
-            Supplies::Nothing => false,
+            Supplies::Numbers => &mut of_numbers,
+            Supplies::Nothing => &mut of_nothing,
         };
+        if *in_vain >= MOST_IN_VAIN {
+            continue;
+        }
         if !goes_on() {
             break;
         }
@@ -41,13 +44,13 @@ pub(super) fn without_needless(
             left = (fewer, report);
             timeline.remove(index);
         } else {
-            in_vain += usize::from(reads_on);
+            *in_vain += 1;
         }
     }
     left
 }
 
-/// So many trials to leave out what changes numbers that are read are in vain at most: each takes a look at the whole plan.
+/// So many trials of a kind are in vain at most: each takes a look at the whole plan.
 const MOST_IN_VAIN: usize = 20;
 
 /// What others read of that which a step makes so.

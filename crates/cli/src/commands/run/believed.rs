@@ -7,8 +7,9 @@ use elbowroom::execution::Progression;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
-use elbowroom::report::wire;
-use serde_json::{Value, json};
+use serde_json::Value;
+
+use crate::conversation::believed;
 
 /// What is believed, as far as the world has not been told of it: the run notes, and the world fetches.
 #[derive(Clone, Default)]
@@ -115,7 +116,7 @@ impl Known {
                 .values
                 .iter()
                 .map(|(it, value)| (*it, Some(value)));
-            messages.push(message(task, &beginning.now, facts, values));
+            messages.push(believed(task, &beginning.now, facts, values));
         }
         let facts = std::mem::take(&mut self.changed_facts);
         let values = std::mem::take(&mut self.changed_values);
@@ -123,29 +124,8 @@ impl Known {
             let facts = facts.into_iter().map(|it| (it, self.facts[it.index()]));
             let values = values.into_iter();
             let values = values.map(|it| (it, self.values[it.index()].as_ref()));
-            messages.push(message(task, &self.now, facts, values));
+            messages.push(believed(task, &self.now, facts, values));
         }
         messages
     }
-}
-
-fn message<'a>(
-    task: &Task,
-    now: &Rational,
-    facts: impl Iterator<Item = (FactId, bool)>,
-    values: impl Iterator<Item = (FluentId, Option<&'a Rational>)>,
-) -> Value {
-    // What follows from other facts is nobody's to be told: it is as they are.
-    let facts = facts.filter(|(fact, _)| !task.is_derived(*fact));
-    let facts = facts.map(|(fact, truth)| (task.fact_name(fact), truth.into()));
-    let values = values.map(|(fluent, value)| {
-        let value = value.map_or(Value::Null, wire::number);
-        (task.fluent_name(fluent), value)
-    });
-    json!({
-        "type": "believed",
-        "now": wire::number(now),
-        "facts": facts.collect::<serde_json::Map<_, _>>(),
-        "values": values.collect::<serde_json::Map<_, _>>(),
-    })
 }

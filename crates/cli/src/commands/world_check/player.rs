@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use elbowroom::execution::{Ending, Event, Observation};
 use elbowroom::model::Task;
+use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::wire;
 use serde_json::{Value, json};
@@ -14,7 +15,8 @@ use serde_json::{Value, json};
 use super::table::{Check, Findings};
 use crate::clock::Clock;
 use crate::conversation::{
-    Ability, Ears, Greeting, Heard, LONGEST_ANSWER, Listener, Mouth, Said, Told, ended, hello,
+    Ability, Ears, Greeting, Heard, LONGEST_ANSWER, Listener, Mouth, Said, Told, believed, ended,
+    hello,
 };
 use crate::words::excerpt;
 
@@ -137,6 +139,19 @@ impl Player {
         self.listener.can(Ability::Cancel)
     }
 
+    /// Notes what there is no occasion to look at, because it does not claim to do it.
+    pub(super) fn note_what_it_cannot(&mut self) {
+        for (check, can) in [
+            (Check::Cancels, self.can_cancel()),
+            (Check::HearsBeliefs, self.can(Ability::Beliefs)),
+            (Check::Resumes, self.can(Ability::Resume)),
+        ] {
+            if !can {
+                self.findings.leave_out(check);
+            }
+        }
+    }
+
     /// When the action has started.
     pub(super) fn started(&self, ticket: u64) -> Option<&Rational> {
         self.actions.get(&ticket)?.started.as_ref()
@@ -208,11 +223,16 @@ impl Player {
         }
     }
 
-    /// Tells what is believed.
-    pub(super) fn believe(&mut self, facts: &Value, values: &Value) -> Result<(), Gone> {
-        self.tell(&json!({
-            "type": "believed", "now": wire::number(&self.now), "facts": facts, "values": values,
-        }))
+    /// Tells what is believed: these facts are true, and these are the values.
+    pub(super) fn believe<'a>(
+        &mut self,
+        task: &Task,
+        facts: impl Iterator<Item = FactId>,
+        values: impl Iterator<Item = (FluentId, Option<&'a Rational>)>,
+    ) -> Result<(), Gone> {
+        let facts = facts.map(|fact| (fact, true));
+        let message = believed(task, &self.now, facts, values);
+        self.tell(&message)
     }
 
     pub(super) fn cancel(&mut self, ticket: u64) -> Result<(), Gone> {
