@@ -1,6 +1,7 @@
 //! `elbowroom ctl`: asks an executive, `docs/serve.md`.
 
 use std::fmt::Write as _;
+use std::io::{self, ErrorKind};
 
 use elbowroom::answers::Exact;
 use elbowroom::executive::documents::{
@@ -89,7 +90,16 @@ struct Desk<'a> {
 }
 
 impl Desk<'_> {
-    fn unreachable(&self, error: &std::io::Error) -> Failure {
+    fn unreachable(&self, error: &io::Error) -> Failure {
+        if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) {
+            return Failure::new(
+                format!(
+                    "the executive at {} listens, but does not answer",
+                    self.arguments.to
+                ),
+                "look whether it was stopped (`ps` shows T), or its machine is overloaded, and ask again",
+            );
+        }
         Failure::new(
             format!(
                 "cannot ask the executive at {}: {}",

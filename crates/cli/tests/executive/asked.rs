@@ -1,6 +1,7 @@
 //! What an executive says of itself, and what it makes of what it is told.
 
 use std::fs;
+use std::net::TcpListener;
 
 use serde_json::{Value, json};
 
@@ -212,4 +213,20 @@ fn answers_are_as_the_interface_says() {
     assert_eq!(conforms(&state, &all["State"], all), Ok(()));
     state["more"] = json!(1);
     assert!(conforms(&state, &all["State"], all).is_err());
+}
+
+/// Who is stopped still has his port.
+#[test]
+fn an_executive_that_does_not_answer_is_told_apart_from_one_that_is_not_there() {
+    let stopped = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = stopped.local_addr().expect("an address").to_string();
+    let asked = ctl(&["--to", &address, "state"]);
+    let said = String::from_utf8_lossy(&asked.stderr).into_owned();
+    assert_eq!(asked.status.code(), Some(2), "{said}");
+    assert!(said.contains("listens, but does not answer"), "{said}");
+    drop(stopped);
+    let asked = ctl(&["--to", &address, "state"]);
+    let said = String::from_utf8_lossy(&asked.stderr).into_owned();
+    assert_eq!(asked.status.code(), Some(2), "{said}");
+    assert!(said.contains("cannot ask the executive"), "{said}");
 }
