@@ -292,7 +292,7 @@ async function begin(): Promise<void> {
     engine = await Engine.load(by("module").textContent ?? "");
     const about = await ask({ ask: "about" });
     const executors = (about?.answer as unknown as { executors: { example: string; summary: string }[] } | undefined)?.executors ?? [];
-    const wanted = choices.executor.value || "guarded";
+    const wanted = choices.executor.value || "live";
     choices.executor.replaceChildren(...executors.map(({ example, summary }) => {
       const option = new Option(example, example, false, example === wanted);
       option.title = summary;

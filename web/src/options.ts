@@ -10,10 +10,10 @@ const KNOWN: Record<string, Record<string, Kind>> = {
   check: { epsilon: "value", tolerance: "value" },
   plan: { epsilon: "value", "time-limit": "value", first: "flag" },
   envelope: {
-    epsilon: "value", vary: "list", controllable: "list", guarantee: "value", enforce: "flag", contains: "value", method: "value",
+    epsilon: "value", vary: "list", controllable: "list", guarantee: "value", enforce: "flag", contains: "value", timeout: "value", method: "value",
     objective: "value", symmetric: "flag", precision: "value", growth: "value", sharpen: "flag", "time-limit": "value", volume: "flag",
   },
-  run: { epsilon: "value", executor: "value", seed: "number", guarantee: "value", "max-replans": "number" },
+  run: { epsilon: "value", executor: "value", seed: "number", guarantee: "value", timeout: "value", "max-replans": "number" },
 };
 
 /** The words of a line; quotes keep spaces together. */

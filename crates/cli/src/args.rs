@@ -98,14 +98,18 @@ pub(crate) fn read(line: Vec<OsString>) -> CommandLine {
     read.unwrap_or_else(|error| error.format(&mut command).exit())
 }
 
-/// The command line; a program that is called as VAL is takes VAL's.
+/// The command line. A program that is called as VAL is has VAL's arguments, and its default
+/// tolerance, which a later `-t` overrides.
 fn spoken(mut line: Vec<OsString>) -> Vec<OsString> {
     let program = line.first().map(Path::new).and_then(Path::file_stem);
     if program.is_some_and(|name| name.eq_ignore_ascii_case("validate")) {
-        line.insert(1, "val".into());
+        line.splice(1..1, ["val", "-t", VAL_TOLERANCE].map(OsString::from));
     }
     line
 }
+
+/// VAL's own default for `-t`.
+const VAL_TOLERANCE: &str = "0.01";
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
@@ -186,9 +190,10 @@ pub(crate) struct ValArgs {
     /// Also print the plan and the times at which something happens
     #[arg(short, long)]
     pub(crate) verbose: bool,
-    /// Times closer than this count as equal; VAL's own default is 0.01
-    #[arg(short, long, value_name = "T", default_value = "0.01", value_parser = positive_or_zero)]
-    #[arg(allow_negative_numbers = true)]
+    /// Durations may miss their bounds by this; times no more than a tenth of it apart count as equal.
+    /// Called as `Validate`, the default is VAL's own, 0.01
+    #[arg(short, long, value_name = "T", default_value = "0.001", value_parser = positive_or_zero)]
+    #[arg(allow_negative_numbers = true, overrides_with = "tolerance")]
     pub(crate) tolerance: Rational,
 }
 
@@ -222,12 +227,17 @@ pub(crate) struct VerifyArgs {
     /// plan exists
     #[arg(value_name = "ANSWER.json")]
     pub(crate) answer: PathBuf,
-    /// For an answer that no plan exists: the domain file, if it is not where the answer says
+    /// The domain file. For a box: with problem and plan, network and conditions are derived from these
+    /// files, and nothing is assumed. For an answer that no plan exists: if the file is not where the
+    /// answer says
     #[arg(value_name = "DOMAIN", requires = "problem")]
     pub(crate) domain: Option<PathBuf>,
-    /// And the problem file
+    /// The problem file
     #[arg(value_name = "PROBLEM")]
     pub(crate) problem: Option<PathBuf>,
+    /// The plan file, for a box
+    #[arg(value_name = "PLAN")]
+    pub(crate) plan: Option<PathBuf>,
     /// Print the verdict as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
@@ -266,14 +276,14 @@ pub(crate) struct CheckArgs {
     /// problem are checked
     #[arg(value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
-    /// Validate like VAL with `-t T`: times closer than T count as equal, and interfering
-    /// happenings need only differ in time
+    /// Largest difference between a printed time or duration and that of a valid plan (T) that counts
+    /// as rounding; 0 takes the plan as printed. By default one unit of the last printed digit, at
+    /// most 0.001
     #[arg(long, value_name = "T", value_parser = positive_or_zero, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<Rational>,
     /// Minimum time between interfering happenings (epsilon)
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]
-    #[arg(conflicts_with = "tolerance")]
     pub(crate) epsilon: Rational,
     /// Print the answer as one JSON document
     #[arg(long)]
@@ -307,6 +317,11 @@ pub(crate) struct StnArgs {
     /// Also write the network as a graph for Graphviz
     #[arg(long, value_name = "FILE")]
     pub(crate) dot: Option<PathBuf>,
+    /// Largest difference between a printed time or duration and that of a valid plan (T) that counts
+    /// as rounding; 0 takes the plan as printed. By default one unit of the last printed digit, at
+    /// most 0.001
+    #[arg(long, value_name = "T", value_parser = positive_or_zero, allow_negative_numbers = true)]
+    pub(crate) tolerance: Option<Rational>,
     /// Minimum time between interfering happenings (epsilon)
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]

@@ -4,12 +4,11 @@ use std::fs;
 use std::io::{self, ErrorKind, IsTerminal, Read};
 use std::path::Path;
 
-use elbowroom::PlanKind;
-use elbowroom::model::validate::Violation;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
 use elbowroom::plan::format;
+use elbowroom::{PlanKind, RoundingRule};
 
 pub(crate) use elbowroom::AnyPlan;
 
@@ -74,8 +73,14 @@ fn warn(warnings: &[Diagnostic], output: &mut Output) {
     }
 }
 
-/// Reads a plan of either kind: told by its content, or by a name that ends in `.stn`.
-pub(crate) fn any_plan(task: &Task, path: &Path, output: &mut Output) -> Result<AnyPlan, Failure> {
+/// Reads a plan of either kind, which its content or the ending `.stn` of its name decides. `rule`
+/// applies to rounded numbers.
+pub(crate) fn any_plan(
+    task: &Task,
+    path: &Path,
+    rule: &RoundingRule,
+    output: &mut Output,
+) -> Result<AnyPlan, Failure> {
     let text = source(path, "plan")?;
     let is_stn_name = path
         .extension()
@@ -83,7 +88,7 @@ pub(crate) fn any_plan(task: &Task, path: &Path, output: &mut Output) -> Result<
     if is_stn_name || PlanKind::of_text(text.text()) == PlanKind::Stn {
         return Ok(AnyPlan::Stn(format::read(&text, task)?));
     }
-    let plan = with_warnings(pddl::read_plan(&text, task), output)?;
+    let plan = with_warnings(rule.read_plan(&text, task), output)?;
     Ok(AnyPlan::TimeTriggered(plan))
 }
 
@@ -94,10 +99,11 @@ pub(crate) const FIXED_TIMES: &str = "give a plan with fixed times; its network 
 pub(crate) fn time_triggered(
     task: &Task,
     path: &Path,
+    rule: &RoundingRule,
     advice: &str,
     output: &mut Output,
 ) -> Result<TimeTriggeredPlan, Failure> {
-    match any_plan(task, path, output)? {
+    match any_plan(task, path, rule, output)? {
         AnyPlan::TimeTriggered(plan) => Ok(plan),
         AnyPlan::Stn(_) => Err(Failure::new(
             format!(
@@ -109,13 +115,10 @@ pub(crate) fn time_triggered(
     }
 }
 
-/// Says on standard error that not the plan's own times are taken, but valid ones close to them.
-pub(crate) fn tell_repair(path: &Path, violation: &Violation) {
+/// Says on standard error what to do about a plan that is not valid.
+pub(crate) fn tell_about_repairs() {
     output::tell(&format!(
-        "{}: {} is not valid as it stands, perhaps because its times are rounded\n  \
-         {violation}\n  {}: times close to these, which are valid, are taken instead",
-        styled(HINT, "warning"),
-        path.display(),
+        "{}: `elbowroom envelope DOMAIN PROBLEM PLAN --repair` prints the cheapest repair",
         styled(HINT, "note"),
     ));
 }

@@ -1,13 +1,15 @@
-//! Ends a computation when its time is up, or when the user asks to.
+//! Ends a computation when its time is up, or when the user asks to, and reports invalid executions at once.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use elbowroom::answers::{Halt, Watcher};
+use elbowroom::answers::{Event, Halt, Watcher};
 use elbowroom::num::Rational;
 
 use crate::clock::Clock;
 use crate::interrupt::Interrupt;
+use crate::look::{BAD, styled};
+use crate::output;
 
 /// A clock since the start, with the reasons for which a computation ends early.
 #[derive(Clone)]
@@ -47,6 +49,13 @@ impl Watcher for Stopwatch {
             ControlFlow::Break(Halt::TimeLimit)
         } else {
             ControlFlow::Continue(())
+        }
+    }
+
+    fn notice(&mut self, event: &Event<'_>) {
+        // An executive may run for days after this.
+        if let Event::Invalid(invalid) = event {
+            output::tell(&format!("{}: {invalid}", styled(BAD, "bug")));
         }
     }
 }

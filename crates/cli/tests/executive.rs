@@ -7,6 +7,8 @@ mod asked;
 #[path = "executive/client.rs"]
 mod client;
 mod command;
+#[path = "executive/doubts.rs"]
+mod doubts;
 #[path = "executive/faults.rs"]
 mod faults;
 #[path = "executive/first.rs"]
@@ -15,6 +17,8 @@ mod first;
 mod killed;
 #[path = "executive/meanwhile.rs"]
 mod meanwhile;
+#[path = "executive/recorded.rs"]
+mod recorded;
 #[path = "../../../testing/skipped.rs"]
 mod skipped;
 

@@ -31,7 +31,11 @@ const RUN: [&str; 3] = [
 #[test]
 fn options_of_run_that_could_do_nothing_are_refused() {
     for (options, words) in [
-        (&["--planner-time", "5"][..], "--planner-states"),
+        (&["--planner-time", "5"][..], "--planning-budget"),
+        (
+            &["--method", "irr", "--objective", "widths"],
+            "leave out --method irr",
+        ),
         (
             &["--planner-time", "5", "--planner", "none"],
             "says nothing to",

@@ -196,3 +196,95 @@ fn likelihoods_are_kept_in_the_trace() {
     assert_ne!(other, trace);
     assert!(difference(&other, "other.jsonl").is_some());
 }
+
+#[test]
+fn trace_of_a_run_whose_plan_was_refused_says_that_it_cannot_be_replayed() {
+    let trace = Temporary::new("refused.jsonl", "");
+    let case = ["domain.pddl", "problem.pddl", "plan.plan"].map(|file| {
+        root()
+            .join("cases/delivery")
+            .join(file)
+            .display()
+            .to_string()
+    });
+    let [domain, problem, plan] = &case;
+    let made = elbowroom(&[
+        "run",
+        domain,
+        problem,
+        plan,
+        "--timeout",
+        "3",
+        "--trace",
+        &trace.name(),
+    ]);
+    assert_eq!(made.status.code(), Some(1), "{made:?}");
+    let replay = elbowroom(&["run", "--replay", &trace.name()]);
+    assert_eq!(replay.status.code(), Some(2), "{replay:?}");
+    let said = String::from_utf8_lossy(&replay.stderr).replace("\n  ", " ");
+    assert!(said.contains("was refused"), "{said}");
+}
+
+/// Runs whose traces are recorded, by name. With `ELBOWROOM_UPDATE_RECORDED=1` the test writes them again, after an
+/// intended change.
+const RECORDED: [(&str, &str); 8] = [
+    (
+        "guarded",
+        "cases/delivery --world experiments/clumsy/door.toml --executor guarded --seed 2",
+    ),
+    (
+        "esterel",
+        "cases/delivery --world experiments/clumsy/door.toml --executor esterel --seed 3 \
+         --plan cases/delivery/plan.plan --running keep --planning-time 2",
+    ),
+    (
+        "adaptable",
+        "cases/delivery --world experiments/clumsy/door.toml --executor adaptable --seed 4 \
+         --likelihoods experiments/clumsy/door-locks.toml",
+    ),
+    (
+        "cancelled",
+        "cases/delivery --world experiments/clumsy/door.toml --executor stn --seed 5 --running cancel",
+    ),
+    (
+        "late",
+        "cases/delivery --world crates/cli/tests/files/late-drives-world.toml --executor guarded --seed 1",
+    ),
+    (
+        "live",
+        "cases/delivery --world crates/cli/tests/files/clumsy-world.toml --executor live --seed 6 --planning-time 1",
+    ),
+    (
+        "awaited",
+        "cases/match --world crates/cli/tests/files/clumsy-world.toml --executor guarded --seed 1 --running await",
+    ),
+    (
+        "unattended",
+        "crates/cli/tests/files/errands --world crates/cli/tests/files/clumsy-world.toml --executor guarded --seed 3",
+    ),
+];
+
+#[test]
+fn recorded_runs_are_the_same_to_the_byte_and_play_back() {
+    for (name, line) in RECORDED {
+        let stored = format!("crates/cli/tests/files/golden/{name}.jsonl");
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let (domain, problem) = (
+            format!("{}/domain.pddl", words[0]),
+            format!("{}/problem.pddl", words[0]),
+        );
+        let arguments = [&[domain.as_str(), &problem], &words[1..]].concat();
+        let text = played_back(&format!("recorded-{name}"), &arguments);
+        if std::env::var_os("ELBOWROOM_UPDATE_RECORDED").is_some() {
+            fs::write(root().join(&stored), &text).expect("a file to write");
+        }
+        let stored_text = fs::read_to_string(root().join(&stored)).expect("a trace");
+        let mut lines = text.lines().zip(stored_text.lines());
+        if let Some((now, recorded)) = lines.find(|(now, recorded)| now != recorded) {
+            panic!("{name}: recorded\n{recorded}\nnow\n{now}");
+        }
+        assert_eq!(text, stored_text, "{name}");
+        let replay = elbowroom(&["run", "--replay", &stored]);
+        assert_eq!(replay.status.code(), Some(0), "{name}: {replay:?}");
+    }
+}

@@ -42,8 +42,8 @@ fn the_example_world_delivers_the_parcel() {
     fs::remove_file(trace).expect("the trace is there");
 }
 
-/// What a command leads to is told in the next answer, at once. The example once let all the
-/// patience with a cancelled action pass instead: 600 seconds.
+/// The result of a command is reported in the next answer, immediately. An earlier version of the example
+/// waited 600 seconds for the cancelled action instead.
 #[test]
 fn the_example_world_reports_a_cancel_at_once() {
     if Command::new("python3").arg("--version").output().is_err() {
@@ -51,7 +51,7 @@ fn the_example_world_reports_a_cancel_at_once() {
         return;
     }
     let mut run = vec!["run", DELIVERY[0], DELIVERY[1], "--json"];
-    run.extend(["--executor", "fixed:0", "--max-replans", "1"]);
+    run.extend(["--executor", "fixed:0", "--max-replans", "0"]);
     run.extend(["--world-process", "python3 examples/world.py"]);
     let output = elbowroom(&run);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a document");
@@ -283,7 +283,7 @@ fn planning_takes_time_on_a_wall_clock() {
         let trace = temporary("wall-clock.jsonl");
         let run = ["run", DELIVERY[0], DELIVERY[1], "--planner", &command];
         let files = ["--trace", &trace, "--world", &world];
-        let output = elbowroom(&[&run[..], &files, options].concat());
+        let output = elbowroom(&[&run[..], &files, &["--executor", "guarded"], options].concat());
         let text = fs::read_to_string(&trace).expect("a trace");
         let entries = text
             .lines()
@@ -413,10 +413,10 @@ fn what_is_late_and_may_still_end_in_time_is_waited_for() {
     assert!(!text.contains("slide"), "{text}");
 }
 
-/// It is given up when no plan can bear that it goes on, about 16 seconds after its start, and not after
-/// minutes of silence.
+/// With more than 16 seconds no plan is left, but climbing may still take less than planned. After 21 seconds it would
+/// have to take less than half, and walking is cancelled.
 #[test]
-fn what_no_plan_can_bear_has_failed_and_the_next_plan_does_without() {
+fn overdue_action_is_cancelled_if_the_rest_would_have_to_take_less_than_half() {
     if Command::new("python3").arg("--version").output().is_err() {
         skipped("there is no python3");
         return;
@@ -428,7 +428,7 @@ fn what_no_plan_can_bear_has_failed_and_the_next_plan_does_without() {
         .find_map(|line| line.split_once("(walk) [")?.1.split_once(']'));
     let (seconds, outcome) = walked.expect("walking is what was done first");
     let seconds: f64 = seconds.parse().expect("a number");
-    assert!((15.0..17.0).contains(&seconds), "{text}");
+    assert!((20.9..22.0).contains(&seconds), "{text}");
     assert_eq!(outcome, " cancelled", "{text}");
     assert!(text.contains("(slide) [3]"), "{text}");
 }

@@ -68,6 +68,50 @@ fn scripts_that_look_for_vals_words_come_to_vals_recorded_verdicts() {
     assert!(judged > 150, "{judged} plans");
 }
 
+/// Plans of planners and of this program keep interfering happenings 0.001 apart.
+#[test]
+fn valid_plans_of_all_cases_are_accepted_by_default() {
+    let files = |folder: PathBuf| {
+        let entries = std::fs::read_dir(folder).expect("a folder");
+        entries.filter_map(|entry| Some(entry.ok()?.path()))
+    };
+    let cases = files(command::root().join("cases"));
+    let plans = cases
+        .flat_map(files)
+        .filter(|path| path.extension().is_some_and(|it| it == "plan"));
+    let mut accepted = 0;
+    for plan in plans {
+        let [domain, problem] =
+            ["domain.pddl", "problem.pddl"].map(|it| plan.with_file_name(it).display().to_string());
+        let plan = plan.display().to_string();
+        let is_valid = elbowroom(&["check", &domain, &problem, &plan])
+            .status
+            .success();
+        let answer = elbowroom(&["val", &domain, &problem, &plan]);
+        let text = String::from_utf8_lossy(&answer.stdout);
+        assert_eq!(text.contains("Plan valid"), is_valid, "{plan}: {text}");
+        accepted += usize::from(is_valid);
+    }
+    assert!(accepted >= 9, "{accepted} plans are valid");
+}
+
+#[test]
+fn times_that_the_tolerance_makes_equal_are_named() {
+    let case =
+        ["domain.pddl", "problem.pddl", "plan.plan"].map(|it| format!("cases/delivery/{it}"));
+    let said = |tolerance: &str| {
+        let answer = elbowroom(&["val", "-t", tolerance, &case[0], &case[1], &case[2]]);
+        String::from_utf8_lossy(&answer.stderr).into_owned()
+    };
+    let coarse = said("0.01");
+    assert!(
+        coarse.contains("times 10 and 10.001 count as equal at -t 0.01"),
+        "{coarse}"
+    );
+    assert!(coarse.contains("try -t 0.001"), "{coarse}");
+    assert_eq!(said("0.001"), "");
+}
+
 #[cfg(unix)]
 #[test]
 fn under_vals_name_the_command_takes_vals_arguments() {
@@ -78,13 +122,19 @@ fn under_vals_name_the_command_takes_vals_arguments() {
         let _ = std::fs::remove_file(&link);
         std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_elbowroom"), &link).expect("a link");
         let case = |file: &str| format!("cases/delivery/{file}");
-        let answer = Command::new(&link)
-            .current_dir(command::root())
-            .args(["-v", "-t", "0.001"])
-            .args(["domain.pddl", "problem.pddl", "plan.plan"].map(case))
-            .output()
-            .expect("the command can be started");
-        let text = String::from_utf8_lossy(&answer.stdout);
+        let judged = |options: &[&str]| {
+            let answer = Command::new(&link)
+                .current_dir(command::root())
+                .args(options)
+                .args(["domain.pddl", "problem.pddl", "plan.plan"].map(case))
+                .output()
+                .expect("the command can be started");
+            String::from_utf8_lossy(&answer.stdout).into_owned()
+        };
+        // 10 and 10.001 count as equal at VAL's default tolerance.
+        let text = judged(&[]);
+        assert!(text.contains("Plan failed to execute"), "{text}");
+        let text = judged(&["-v", "-t", "0.001"]);
         assert!(text.contains("Plan valid"), "{text}");
         assert!(
             text.contains("Checking next happening (time 10.001)"),

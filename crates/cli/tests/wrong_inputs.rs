@@ -159,7 +159,7 @@ fn what_is_read_leniently_in_a_plan_is_a_warning() {
         (
             "no-brackets",
             "0: (fill barrel) 15\n15.001: (drain barrel) [10]\n",
-            "`15` is ignored",
+            "read as the terminal of PlanSys2 prints plans",
         ),
         (
             "no-times",

@@ -21,6 +21,7 @@ pub mod rewrite;
 mod rollouts;
 mod spec;
 mod spoiling;
+mod validated;
 mod vary;
 
 pub use action_sets::ActionSets;
@@ -34,13 +35,16 @@ pub use first_plan::{Choice, Chooser, Choosing, FirstPlan, Known, UnknownFirstPl
 pub use likeliest::{Likeliest, SharedLikeliest};
 pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use misfit::misfit;
-pub use planners::{Clockless, Embedded};
+pub use planners::{Clockless, Embedded, PLANNING_BUDGET, planning_work};
+pub(crate) use planners::{WITHOUT_SELF_OVERLAP, exhausted};
 pub(crate) use race::is_behind;
 pub use rehearse::{Rehearse, SharedRehearse};
 pub use rollouts::{Replanning, Rollouts, Tryout};
-pub(crate) use spec::listed;
 pub use spec::{
-    EMBEDDED, FirstPlanError, NOBODY, NamedText, RunSpec, SpecError, Spoiler, SpoilerError,
+    EMBEDDED, FirstPlanError, MOST_STATES, NOBODY, NamedText, RunSpec, SpecError, Spoiler,
+    SpoilerError,
 };
+pub(crate) use spec::{as_text, listed};
 pub use spoiling::Spoiling;
+pub use validated::{Findings, Validated};
 pub use vary::check_vary;

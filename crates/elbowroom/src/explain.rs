@@ -19,6 +19,10 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 
+/// The reason given for an end that nothing limits, although it is finite.
+pub const ANY_FINITE: &str = "every greater finite deviation is inside as well, but no times \
+    fixed in advance suit all of them";
+
 /// Says in words what was found out about one plan.
 #[derive(Clone, Copy, Debug)]
 pub struct Explainer<'a> {
@@ -135,6 +139,7 @@ impl<'a> Explainer<'a> {
     ) -> Option<String> {
         match limit {
             Limit::Unbounded => None,
+            Limit::AnyFinite => Some(ANY_FINITE.to_owned()),
             Limit::Range => Some(self.range(id, side)),
             Limit::Undecided => Some("there are too many cases to tell apart".to_owned()),
             Limit::Objection(objection) => Some(match objection {
@@ -296,9 +301,9 @@ impl<'a> Explainer<'a> {
                 "an amount is at least 0".to_owned()
             }
             (Some(end), _) if side == Side::Lower => {
-                format!("its range: at least {}", end.to_decimal(6))
+                format!("the domain or --vary allows at least {}", end.to_decimal(6))
             }
-            (Some(end), _) => format!("its range: at most {}", end.to_decimal(6)),
+            (Some(end), _) => format!("the domain or --vary allows at most {}", end.to_decimal(6)),
             (None, _) => String::new(),
         }
     }

@@ -14,7 +14,7 @@
 //! ```
 //! use std::sync::Arc;
 //!
-//! use elbowroom::answers::{EnvelopeRequest, Unwatched};
+//! use elbowroom::answers::EnvelopeRequest;
 //! use elbowroom::envelope::Guarantee;
 //! use elbowroom::export::{box_check, opened};
 //! use elbowroom::model::Task;
@@ -36,7 +36,7 @@
 //! );
 //! let task = Arc::new(Task::new(pddl::read_problem(&domain, &problem)?.0));
 //! let (plan, _) = pddl::read_plan(&Source::new("plan", "0: (deliver) [10]"), &task)?;
-//! let plan = opened(&EnvelopeRequest::new(&task, plan), &mut Unwatched)?;
+//! let plan = opened(&EnvelopeRequest::new(&task, plan))?;
 //! let envelope = parse_box("dur_0=[5,28]", &plan)?;
 //! let text = box_check(&task, &plan, &envelope, Guarantee::Weak)?;
 //! assert_eq!(text.matches("(check-sat)").count(), 2);
@@ -57,7 +57,7 @@ use elbowroom_plan::{
 };
 
 use crate::answers::envelope::{self, EnvelopeFinding, Range};
-use crate::answers::{EnvelopeAnswer, EnvelopeRequest, Watcher};
+use crate::answers::{EnvelopeAnswer, EnvelopeRequest};
 use crate::flow::FlowError;
 use crate::linear_form::LinearForm;
 
@@ -105,11 +105,8 @@ pub enum ExportError {
 ///
 /// # Errors
 /// When the judge rejects the plan, or the request names what the plan does not have.
-pub fn opened(
-    request: &EnvelopeRequest,
-    watcher: &mut dyn Watcher,
-) -> Result<ParametrizedPlan, FlowError> {
-    Ok(envelope::opened(request, watcher)?.0)
+pub fn opened(request: &EnvelopeRequest) -> Result<ParametrizedPlan, FlowError> {
+    Ok(envelope::opened(request)?.0)
 }
 
 /// The box that an answer is about: the envelope that was found, or the box that was asked about.

@@ -3,8 +3,9 @@
 
 use std::sync::Arc;
 
+use elbowroom_envelope::Guarantee;
 use elbowroom_envelope::obligations::Refusal;
-use elbowroom_envelope::{Guarantee, Objective};
+use elbowroom_execution::run::TimeoutRule;
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_plan::deorder::{DeorderError, Deordered, deorder, deorder_the_plan_alone};
@@ -24,24 +25,23 @@ pub struct Settings {
     pub vary: Vec<VarySpec>,
     /// The guarantee inside the envelope.
     pub guarantee: Guarantee,
-    /// How to search.
-    pub search: elbowroom_envelope::Settings,
-    /// What the box is to be the best of; without one, it is IRR's.
-    pub objective: Option<Objective>,
+    /// The rule that sets the time-out of each action.
+    pub timeout: TimeoutRule,
+    /// Parameters of the search for the box.
+    pub search: Search,
     /// The world in which durations are to stay inside most likely, with
-    /// [`Objective::Probability`].
+    /// [`Objective::Probability`](elbowroom_envelope::Objective::Probability).
     pub world: Option<Arc<WorldModel>>,
 }
 
 impl Default for Settings {
-    /// All durations that the domain fixes, the dynamic guarantee, precision a hundredth of each
-    /// nominal value.
+    /// All durations that the domain fixes, the dynamic guarantee, and the default search.
     fn default() -> Self {
         Self {
             vary: Vec::new(),
             guarantee: Guarantee::default(),
-            search: Search::default().settings(),
-            objective: None,
+            timeout: TimeoutRule::default(),
+            search: Search::default(),
             world: None,
         }
     }
@@ -82,39 +82,16 @@ pub fn robust_plan(
     envelope(&request, &mut Unwatched)
 }
 
-/// A plan with only the orderings and bounds that it needs.
-#[derive(Clone, Debug)]
-pub struct Freed {
-    /// The plan, and a schedule of it.
-    pub deordered: Deordered,
-    /// What the judge objects to in the times of the original plan, if the schedule is not the
-    /// original one but close to it.
-    pub repaired: Option<Box<validate::Violation>>,
-}
-
-/// The plan with only the orderings and bounds that it needs.
-///
-/// Planners round their times, and the judge forgives nothing. If it rejects the plan, but the
-/// plan's order leaves a schedule that it accepts, that schedule is taken in place of the plan's.
+/// The plan with only the orderings and bounds that it needs, and a schedule of it.
 ///
 /// # Errors
-/// When the judge rejects the plan.
-pub fn free(task: &Task, time_triggered: &TimeTriggeredPlan) -> Result<Freed, FlowError> {
-    let Verdict::Invalid(violation) = judge(task, time_triggered) else {
-        return Ok(Freed {
-            deordered: deorder(task, time_triggered)?,
-            repaired: None,
-        });
-    };
-    let violation = Box::new(violation);
-    let works = |d: &Deordered| judge(task, &d.plan.scheduled(&d.nominal)).is_valid();
-    match deorder(task, time_triggered) {
-        Ok(deordered) if works(&deordered) => Ok(Freed {
-            deordered,
-            repaired: Some(violation),
-        }),
-        _ => Err(FlowError::Invalid(violation)),
+/// When the validator rejects the plan. [`RoundingRule`](crate::RoundingRule) reads plans with
+/// rounded numbers.
+pub fn free(task: &Task, time_triggered: &TimeTriggeredPlan) -> Result<Deordered, FlowError> {
+    if let Verdict::Invalid(violation) = judge(task, time_triggered) {
+        return Err(FlowError::Invalid(Box::new(violation)));
     }
+    Ok(deorder(task, time_triggered)?)
 }
 
 /// [`free`], and the quantities left open as by [`open`], also of a plan with processes and events:
@@ -128,14 +105,9 @@ pub(crate) fn free_and_open(
     task: &Task,
     time_triggered: &TimeTriggeredPlan,
     specs: &[VarySpec],
-    repaired: &mut dyn FnMut(&validate::Violation),
 ) -> Result<ParametrizedPlan, FlowError> {
     if task.autonomous().is_empty() {
-        let freed = free(task, time_triggered)?;
-        if let Some(violation) = &freed.repaired {
-            repaired(violation);
-        }
-        return open(task, freed, specs);
+        return open(task, free(task, time_triggered)?, specs);
     }
     if let Verdict::Invalid(violation) = judge(task, time_triggered) {
         return Err(FlowError::Invalid(Box::new(violation)));
@@ -145,11 +117,31 @@ pub(crate) fn free_and_open(
     Ok(room::in_order(task, plan, &nominal))
 }
 
-/// A plan like the one given, with other times, if the judge rejects it but accepts those: what
-/// [`external`](elbowroom_external) asks for where a planner's times are rounded.
+/// [`free`] for plans whose own times may be out of date, such as the rest of a plan that is
+/// executed late: if the validator rejects them, but accepts other times in the same order, the
+/// schedule has those.
+///
+/// # Errors
+/// When the validator rejects the plan.
+pub(crate) fn free_or_retimed(
+    task: &Task,
+    time_triggered: &TimeTriggeredPlan,
+) -> Result<Deordered, FlowError> {
+    let invalid = match free(task, time_triggered) {
+        Err(FlowError::Invalid(violation)) => FlowError::Invalid(violation),
+        other => return other,
+    };
+    let works = |d: &Deordered| judge(task, &d.plan.scheduled(&d.nominal)).is_valid();
+    match deorder(task, time_triggered) {
+        Ok(deordered) if works(&deordered) => Ok(deordered),
+        _ => Err(invalid),
+    }
+}
+
+/// Returns the plan in the same order with other times, if the validator accepts it. It is the fallback of
+/// [`external`](elbowroom_external) for plans with invalid times.
 pub fn repaired(task: &Task, time_triggered: &TimeTriggeredPlan) -> Option<TimeTriggeredPlan> {
-    let freed = free(task, time_triggered).ok()?;
-    let Deordered { plan, nominal, .. } = freed.deordered;
+    let Deordered { plan, nominal, .. } = free_or_retimed(task, time_triggered).ok()?;
     Some(plan.scheduled(&nominal))
 }
 
@@ -159,16 +151,20 @@ pub fn repaired(task: &Task, time_triggered: &TimeTriggeredPlan) -> Option<TimeT
 ///
 /// # Errors
 /// When `specs` names what the plan does not have.
-pub fn open(task: &Task, freed: Freed, specs: &[VarySpec]) -> Result<ParametrizedPlan, FlowError> {
-    let Deordered { plan, nominal, .. } = freed.deordered;
+pub fn open(
+    task: &Task,
+    freed: Deordered,
+    specs: &[VarySpec],
+) -> Result<ParametrizedPlan, FlowError> {
+    let Deordered { plan, nominal, .. } = freed;
     let plan = parametrize(task, plan, &nominal, specs)?;
     Ok(room::of_deordered(task, plan, &nominal))
 }
 
 /// The plan with nothing left open. Where needed, differences of times are kept near the plan's own
 /// so that every schedule works.
-pub fn closed(task: &Task, freed: Freed) -> ParametrizedPlan {
-    let Deordered { plan, nominal, .. } = freed.deordered;
+pub fn closed(task: &Task, freed: Deordered) -> ParametrizedPlan {
+    let Deordered { plan, nominal, .. } = freed;
     let plan = ParametrizedPlan::closed(task, plan);
     room::of_deordered(task, plan, &nominal)
 }

@@ -33,7 +33,11 @@ pub fn to_dot(task: &Task, plan: &ParametrizedPlan) -> String {
     for constraint in &network.constraints {
         let style = match constraint.reason {
             Reason::Duration(_) => "bold",
-            Reason::Interference | Reason::OverAll | Reason::Side | Reason::Course => "dashed",
+            Reason::Interference
+            | Reason::SelfOverlap
+            | Reason::OverAll
+            | Reason::Side
+            | Reason::Course => "dashed",
             Reason::Given | Reason::Timed(_) | Reason::Pinned => "solid",
         };
         let label = label(plan, constraint);
@@ -57,6 +61,7 @@ pub fn reason(reason: &Reason) -> &'static str {
         Reason::Timed(_) => "timed",
         Reason::Interference => "interference",
         Reason::OverAll | Reason::Side => "over all",
+        Reason::SelfOverlap => "self-overlap",
         Reason::Course => "course",
         Reason::Pinned => "pinned",
     }

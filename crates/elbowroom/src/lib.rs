@@ -29,7 +29,7 @@
 //! let (problem, _warnings) = pddl::read_problem(&domain, &problem)?;
 //! let task = Task::new(problem);
 //!
-//! let mut request = PlanRequest { task: &task, first_plan_only: true, most_memory: None, threads: 1 };
+//! let mut request = PlanRequest { task: &task, first_plan_only: true, most_memory: None, self_overlap: false, threads: 1 };
 //! let plan = plan(&mut request, &mut Unwatched)?.plan.expect("there is a plan");
 //! assert_eq!(plan.steps.len(), 1);
 //! # Ok(())
@@ -128,6 +128,7 @@
 //! - [`execute`](mod@execute): executes plans.
 //! - [`export`]: what other programs can check: a plan's network as an STNU, a box or the region as
 //!   SMT-LIB.
+//! - [`no_plan`]: certificates that no plan exists.
 //! - [`graph`]: networks as graphs for Graphviz.
 //! - [`timed`]: what the best of all executors could reach on a clock, and the policy that reaches
 //!   it.
@@ -166,12 +167,16 @@ pub mod executive;
 mod explain;
 pub mod export;
 pub mod flow;
+mod given_plan;
 pub mod graph;
 mod linear_form;
 mod makespan;
 pub mod network;
+pub mod no_plan;
 mod plan_file;
+mod plan_text;
 mod room;
+mod rounding;
 pub mod timed;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
@@ -192,9 +197,12 @@ pub use elbowroom_stn as stn;
 pub use elbowroom_text as text;
 pub use elbowroom_verify as verify;
 pub use execute::execute;
-pub use explain::{Explainer, Explanation, Shortfall};
+pub use explain::{ANY_FINITE, Explainer, Explanation, Shortfall};
+pub use given_plan::given_plan;
 pub use makespan::earliest_end;
 pub use plan_file::{AnyPlan, PlanKind};
+pub use plan_text::plan_text;
+pub use rounding::{Accepted, RoundingRule};
 
 /// Longer reading. Its code is compiled and run with the tests.
 pub mod tutorial {

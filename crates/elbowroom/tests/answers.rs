@@ -7,13 +7,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, check};
-use elbowroom::answers::envelope::{EnvelopeFinding, Failing, Stop, envelope};
+use elbowroom::answers::envelope::{EnvelopeFinding, Failing, Search, Stop, envelope};
 use elbowroom::answers::plan as planning;
 use elbowroom::answers::plan::{PlanFinding, PlanOutcome, PlanRequest, PlanStop};
 use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
 use elbowroom::answers::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest, Exact};
 use elbowroom::answers::{Event, Halt, Unwatched, Watcher};
 use elbowroom::execute::Analyst;
+use elbowroom::execution::run::TimeoutRule;
 use elbowroom::execution::{Need, Preparer};
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -72,8 +73,10 @@ fn answers_can_be_stored_and_read_again() {
         assert_stored(&found.answer);
         let opened = found.plan.expect("a valid plan");
         let boxed = elbowroom::write_box(&found.envelope.expect("room"), &opened);
+        // Infinite ends are beyond every time-out.
         let inside = EnvelopeRequest {
             contains: Some(boxed),
+            timeout: TimeoutRule::Off,
             ..request.clone()
         };
         let inside = asked(&inside);
@@ -158,6 +161,7 @@ fn planned(task: &Task, watcher: &mut dyn Watcher) -> PlanOutcome {
         task,
         first_plan_only: true,
         most_memory: None,
+        self_overlap: false,
         threads: 1,
     };
     planning::plan(&mut request, watcher).expect("supported")
@@ -231,7 +235,7 @@ fn an_answer_without_a_plan_carries_a_proof_or_says_why_not() {
     let asked = |goal: &str| {
         let task = fuses(goal);
         let mut found = planned(&task, &mut Unwatched).answer;
-        planning::certify(&mut found, &task, ["d", "p"], &mut Unwatched);
+        found.name_files(["d", "p"]);
         let written = assert_stored(&found);
         (task, certificate_of(&written))
     };
@@ -301,8 +305,12 @@ fn an_envelope_computed_in_mid_execution_can_be_cut_short() {
         let envelope = prepared.expect("a valid plan").envelope;
         envelope.expect("it was asked for")
     };
-    let whole = prepared(Analyst::new(flow::Settings::default()));
-    let cut = Analyst::new(flow::Settings::default()).until(|| ControlFlow::Break(()));
+    let analyst = Analyst::new(flow::Settings {
+        search: Search::irr(),
+        ..flow::Settings::default()
+    });
+    let whole = prepared(analyst.clone());
+    let cut = analyst.until(|| ControlFlow::Break(()));
     let cut = prepared(cut);
     assert!(whole.includes(&cut) && whole != cut, "{cut:?}");
 }

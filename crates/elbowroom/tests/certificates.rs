@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Relax, envelope};
+use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Relax, Search, envelope};
 use elbowroom::answers::{EnvelopeOutcome, Halt, Unwatched, Watcher};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::Task;
@@ -41,7 +41,7 @@ fn largest(
 ) -> EnvelopeOutcome {
     let mut request = EnvelopeRequest::new(task, plan.clone());
     request.guarantee = guarantee;
-    request.search.method = Method::Best;
+    request.search.method = Some(Method::Best);
     request.search.best = BestSettings {
         objective,
         symmetric,
@@ -279,6 +279,45 @@ fn a_claim_that_says_more_than_is_proved_is_refused() {
     }
 }
 
+/// The places of all decimals beside an exact number.
+fn decimals(value: &Value, place: &str, found: &mut Vec<String>) {
+    match value {
+        Value::Array(items) => {
+            for (index, item) in items.iter().enumerate() {
+                decimals(item, &format!("{place}/{index}"), found);
+            }
+        }
+        Value::Object(members) => {
+            if members.contains_key("exact") && members.get("decimal").is_some_and(Value::is_f64) {
+                found.push(format!("{place}/decimal"));
+            }
+            for (name, member) in members {
+                let name = name.replace('~', "~0").replace('/', "~1");
+                decimals(member, &format!("{place}/{name}"), found);
+            }
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn wrong_decimal_or_version_anywhere_in_the_answer_is_refused() {
+    let (task, plan) = case("delivery");
+    let outcome = largest(&task, &plan, GUARANTEES[1], OBJECTIVES[0], false);
+    let right: Value = serde_json::from_str(&written(&outcome)).expect("a document");
+    let mut places = Vec::new();
+    decimals(&right, "", &mut places);
+    assert!(places.len() > 50, "{}", places.len());
+    for place in places {
+        let mut wrong = right.clone();
+        *wrong.pointer_mut(&place).expect("a decimal") = Value::from(1234.5);
+        assert!(verify_answer(&wrong.to_string()).is_err(), "{place}");
+    }
+    let mut wrong = right;
+    wrong["version"] = Value::from(2);
+    assert!(verify_answer(&wrong.to_string()).is_err());
+}
+
 #[test]
 fn a_bound_is_worth_what_is_gained_when_it_is_relaxed() {
     let relaxed = |closing: &str, objective| {
@@ -325,8 +364,7 @@ fn told_box(
         .map(|own| own.parse().expect("what varies"))
         .collect();
     request.guarantee = guarantee;
-    request.search.method = Method::Best;
-    request.search.best.objective = Objective::Widths;
+    request.search = Search::best(Objective::Widths);
     let outcome = envelope(&request, &mut Unwatched).expect("within exact reasoning");
     let text = written(&outcome);
     let verified = verify_answer(&text).expect("a certificate");
@@ -458,7 +496,7 @@ fn of_published(
     let plan = ParametrizedPlan::clone(&case.plan);
     let mut request = EnvelopeRequest::new(&case.task, plan);
     request.guarantee = guarantee;
-    request.search.method = Method::Best;
+    request.search.method = Some(Method::Best);
     request.search.best.objective = objective;
     let outcome = envelope(&request, &mut Patience(2_000)).expect("within exact reasoning");
     let text = written(&outcome);

@@ -18,7 +18,7 @@ use elbowroom::execute::{
     Replanning, Rollouts, RunSpec, Value,
 };
 use elbowroom::execution::run::{PlanningTime, RunSettings, Verdict};
-use elbowroom::execution::{Entry, Recorder};
+use elbowroom::execution::{Entry, Planner, Recorder};
 use elbowroom::flow;
 use elbowroom::model::validate::{Settings, validate};
 use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
@@ -54,11 +54,23 @@ fn settings() -> RunSettings {
 
 /// The choice for an executor in a world of `experiments`.
 fn chosen(name: &str, executor: &str) -> (Arc<Task>, WorldModel, Choice) {
+    chosen_within(u64::MAX, 1, name, executor)
+}
+
+/// The same with a planning budget, and with this number of threads.
+fn chosen_within(
+    work: u64,
+    threads: usize,
+    name: &str,
+    executor: &str,
+) -> (Arc<Task>, WorldModel, Choice) {
     let folder = format!("experiments/{name}");
     let task = task(&folder);
     let world = world(&folder, &task);
-    let planner = Embedded::default();
+    let mut planner = Embedded::default();
+    planner.settings.threads = threads;
     let chooser = Chooser {
+        work,
         settings: planner.settings.clone(),
         most_states: planner.most_states,
         improve_states: planner.improve_states,
@@ -97,6 +109,56 @@ fn starts(plan: &TimeTriggeredPlan) -> Vec<String> {
 }
 
 #[test]
+fn choice_within_a_small_budget_is_the_shortest_plan() {
+    let (_, _, unlimited) = chosen("detour", "guarded");
+    let (_, _, limited) = chosen_within(1, 1, "detour", "guarded");
+    assert!(unlimited.plans > 1, "{unlimited}");
+    assert_eq!(limited.plans, 1, "{limited}");
+    assert!(limited.made_for.is_empty(), "{limited}");
+}
+
+#[test]
+fn choice_within_a_budget_does_not_depend_on_the_number_of_threads() {
+    for work in [1_000_000, 10_000_000, 100_000_000] {
+        let (_, _, alone) = chosen_within(work, 1, "detour", "guarded");
+        let (_, _, several) = chosen_within(work, 3, "detour", "guarded");
+        assert_eq!(alone, several, "{work}");
+    }
+}
+
+/// The number of states is infinite, and no plan exists: only a budget ends the search.
+#[test]
+fn search_ends_with_its_budget_and_names_the_option() {
+    let domain = "(define (domain parity) (:requirements :durative-actions :numeric-fluents)
+        (:functions (n))
+        (:durative-action step :parameters () :duration (= ?duration 1) :condition ()
+          :effect (at end (increase (n) 2)))
+        (:durative-action back :parameters () :duration (= ?duration 1) :condition ()
+          :effect (at end (decrease (n) 4))))";
+    let problem = "(define (problem odd) (:domain parity) (:init (= (n) 0)) (:goal (= (n) 1001)))";
+    let (domain, problem) = (
+        Source::new("domain", domain),
+        Source::new("problem", problem),
+    );
+    let task = Task::new(pddl::read_problem(&domain, &problem).unwrap().0);
+    let why = |work: u64, threads: usize| {
+        let mut planner = Embedded {
+            most_states: u64::MAX,
+            work,
+            ..Embedded::default()
+        };
+        planner.settings.threads = threads;
+        let answer = planner.plan(&task, &Situation::initial(&task)).answer;
+        answer.why_not().expect("there is no plan").to_owned()
+    };
+    let little = why(1_000_000, 1);
+    assert!(little.contains("--planning-budget"), "{little}");
+    let more = why(100_000_000, 1);
+    assert_ne!(little, more, "the number of states");
+    assert_eq!(more, why(100_000_000, 3));
+}
+
+#[test]
 fn candidates_are_valid_differ_from_each_other_and_are_the_same_each_time() {
     let folders = WORLDS.map(|name| (format!("experiments/{name}"), true));
     let cases = ["crossing", "errand", "delivery"].map(|name| (format!("cases/{name}"), false));
@@ -106,6 +168,8 @@ fn candidates_are_valid_differ_from_each_other_and_are_the_same_each_time() {
             let world = has_world.then(|| world(&folder, &task));
             let situation = Situation::initial(&task);
             let limits = Limits {
+                work: u64::MAX,
+                patience: 1,
                 most_states: 20_000,
                 improve_states: 500,
                 other_states: 20_000,
@@ -154,6 +218,8 @@ fn where_amounts_vary_a_plan_is_made_for_less_than_planned() {
     let world = WorldModel::read(source, task.problem()).unwrap();
     let situation = Situation::initial(&task);
     let limits = Limits {
+        work: u64::MAX,
+        patience: 1,
         most_states: 2_000,
         improve_states: 256,
         other_states: 10_000,
@@ -279,6 +345,7 @@ fn without_a_clock_the_choice_is_by_the_exact_probability() {
     let likelihoods = Arc::new(likelihoods::read(likely, &task).unwrap());
     let planner = Embedded::default();
     let chooser = Chooser {
+        work: u64::MAX,
         settings: planner.settings.clone(),
         most_states: planner.most_states,
         improve_states: planner.improve_states,
@@ -328,6 +395,7 @@ fn best(task: &Arc<Task>, aim: PlanAim<'_>, watcher: &mut dyn Watcher) -> PlanOu
         task,
         aim,
         most_searches: Some(12),
+        self_overlap: false,
         most_memory: None,
     };
     best_plan(&request, watcher).unwrap()

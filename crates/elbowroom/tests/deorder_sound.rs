@@ -13,16 +13,16 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use elbowroom::answers::envelope::Search;
 use elbowroom::execute::Analyst;
 use elbowroom::execution::{Need, Preparer};
-use elbowroom::flow;
+use elbowroom::{RoundingRule, flow};
 use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::soundness::broken_in;
 use elbowroom_envelope::{Guarantee, IrrRun, Oracle, irr};
 use elbowroom_model::validate::Settings;
 use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
-use elbowroom_pddl::read_plan;
 use elbowroom_plan::deorder::{Deordered, keeps_all_that_is_read, pinned_to};
 use elbowroom_plan::parametrize::parametrize;
 use elbowroom_plan::{DecoupledEnvelope, NodeId, Schedule, StnPlan, Valuation, network_node};
@@ -140,14 +140,18 @@ fn same_envelope(task: &Task, plan: &TimeTriggeredPlan, name: &str) -> bool {
     /// Looking at each condition takes time that grows with the square.
     const LONG: usize = 60;
     let task = Arc::new(task.clone());
-    let mut analyst = Analyst::new(flow::Settings::default());
+    let settings = flow::Settings {
+        search: Search::irr(),
+        ..flow::Settings::default()
+    };
+    let mut analyst = Analyst::new(settings.clone());
     let ready = (plan.steps.len() <= LONG).then(|| analyst.prepare(&task, plan, Need::Envelope));
     let Some(Ok(ready)) = ready else { return false };
     if !keeps_all_that_is_read(&task, &ready.plan, &ready.nominal) {
         return false;
     }
     let open = Arc::new(ready.plan);
-    let settings = flow::Settings::default().search;
+    let settings = settings.search.settings();
     let search = |oracle: Result<Oracle, Refusal>| {
         irr(&mut oracle?, &settings, &mut |_| ControlFlow::Continue(()))
     };
@@ -192,7 +196,8 @@ fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, co
         count.unsupported += 1;
         return;
     };
-    let (plan, _) = read_plan(&shared::source(plan_file), &task)
+    let (plan, _) = RoundingRule::default()
+        .read_plan(&shared::source(plan_file), &task)
         .unwrap_or_else(|error| panic!("{}", error.render(false)));
     let freed = match flow::free(&task, &plan) {
         Ok(freed) => freed,
@@ -204,8 +209,8 @@ fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, co
     };
     count.plans += 1;
     count.made_ready += usize::from(same_envelope(&task, &plan, &name.to_string()));
-    assert_parametrized(&task, &freed.deordered);
-    let nominal = freed.deordered.nominal.clone();
+    assert_parametrized(&task, &freed);
+    let nominal = freed.nominal.clone();
     let closed = flow::closed(&task, freed);
     let network = closed.plan.network(&Valuation::default());
     assert!(

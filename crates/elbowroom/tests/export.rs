@@ -201,7 +201,7 @@ impl Tally {
 /// The plan of a request and its envelope.
 fn found(request: &EnvelopeRequest) -> Option<(Arc<ParametrizedPlan>, DecoupledEnvelope)> {
     let outcome = envelope(request, &mut Unwatched).expect("within exact reasoning");
-    let plan = opened(request, &mut Unwatched).expect("a plan");
+    let plan = opened(request).expect("a plan");
     let envelope = outcome.envelope?;
     assert_eq!(box_of(&outcome.answer, &plan), Ok(envelope.clone()));
     Some((Arc::new(plan), envelope))
@@ -333,7 +333,7 @@ fn the_region_has_a_point_exactly_if_the_plan_works_there() {
     let mut counts = [0; 3];
     for name in CASES {
         let (task, plan) = case(name);
-        let plan = opened(&EnvelopeRequest::new(&task, plan), &mut Unwatched);
+        let plan = opened(&EnvelopeRequest::new(&task, plan));
         let plan = Arc::new(plan.expect("a plan"));
         sum(&mut counts, points_agree(name, (&task, &plan), 10));
     }
@@ -372,7 +372,7 @@ fn the_box_of_an_answer_about_another_plan_is_refused() {
     let outcome = envelope(&EnvelopeRequest::new(&task, plan), &mut Unwatched);
     let answer = outcome.expect("within exact reasoning").answer;
     let (other_task, other) = case("hatchery");
-    let other = opened(&EnvelopeRequest::new(&other_task, other), &mut Unwatched);
+    let other = opened(&EnvelopeRequest::new(&other_task, other));
     let refused = box_of(&answer, &other.expect("a plan"));
     assert!(
         matches!(refused, Err(ExportError::OtherParameters { .. })),

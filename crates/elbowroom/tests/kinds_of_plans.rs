@@ -26,8 +26,7 @@ fn judge(task: &Task, plan: &TimeTriggeredPlan) -> Verdict {
 /// The plan with all durations left open, and its nominal schedule.
 fn opened(task: &Task, plan: &TimeTriggeredPlan) -> (Arc<ParametrizedPlan>, Schedule) {
     let freed = flow::free(task, plan).expect("a valid plan");
-    assert!(freed.repaired.is_none());
-    let nominal = freed.deordered.nominal.clone();
+    let nominal = freed.nominal.clone();
     let open = flow::open(task, freed, &[]).expect("durations");
     (Arc::new(open), nominal)
 }
@@ -87,7 +86,7 @@ fn the_plans_are_valid_and_so_is_their_nominal_schedule() {
         let (task, plan) = kind.read();
         assert!(judge(&task, &plan).is_valid(), "{}", kind.name);
         let freed = flow::free(&task, &plan).expect("a valid plan");
-        let nominal = freed.deordered.nominal.clone();
+        let nominal = freed.nominal.clone();
         let closed = Arc::new(flow::closed(&task, freed));
         let schedule = elbowroom::stn::Schedule::from(nominal);
         assert!(

@@ -57,7 +57,7 @@ fn world(sections: &str, task: &Task) -> Arc<WorldModel> {
 fn request(task: &Arc<Task>, plan: impl Into<AnyPlan>, sections: &str) -> EnvelopeRequest {
     let mut request = EnvelopeRequest::new(task, plan);
     request.world = Some(world(sections, task));
-    request.search.method = Method::Best;
+    request.search.method = Some(Method::Best);
     request.search.best = BestSettings {
         objective: Objective::Probability,
         ..BestSettings::default()
@@ -165,7 +165,7 @@ fn no_other_box_is_more_likely_and_irr_has_less() {
     let resolution = Rational::new(1, 1000);
     for method in [Method::Irr, Method::Best] {
         let mut other = request(&task, plan.clone(), AROUND);
-        other.search.method = method;
+        other.search.method = Some(method);
         other.search.best.objective = Objective::Volume;
         let outcome = answered(&other);
         let found = outcome.envelope.expect("an envelope");

@@ -121,7 +121,7 @@ fn who_wants_no_more_is_not_asked_for_long_and_gets_what_has_been_found() {
     ] {
         let (task, plan) = read(2, 10, needs);
         let mut request = EnvelopeRequest::new(&task, AnyPlan::TimeTriggered(plan));
-        request.search.method = method;
+        request.search.method = Some(method);
         let mut widest = Rational::ZERO;
         for left in [1, 2, 5, 20, 60, 100, 200, 500, 2_000, usize::MAX] {
             let mut patience = Patience { left, after: 0 };

@@ -289,3 +289,32 @@ fn what_is_no_plan_has_no_odds() {
     let never = Scene::new(LAMP, EVENING, &never).ask(OddsSettings::default());
     assert!(matches!(never.finding, OddsFinding::NoOrder), "{never:?}");
 }
+
+#[test]
+fn starts_that_need_each_other_at_one_moment_succeed_together() {
+    let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (x) (y) (g))
+      (:durative-action a :parameters () :duration (= ?duration 2) :condition (over all (y))
+        :effect (and (at start (x)) (at end (not (x)))))
+      (:durative-action b :parameters () :duration (= ?duration 2) :condition (over all (x))
+        :effect (and (at start (y)) (at end (g)))))";
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (g)))";
+    let likely = "format = \"elbowroom-likelihoods\"\nversion = 1\n[defaults]\nbecomes_true = 0.0\n\
+                  becomes_false = 0.0\nstart = 0.9\neffect = 1.0\n";
+    let without = Scene::new(domain, problem, likely);
+    let with = Scene::new(domain, problem, likely).with_plan("0: (a) [2]\n0: (b) [2]");
+    for scene in [without, with] {
+        let answer = scene.ask(OddsSettings::default());
+        let OddsFinding::Odds(odds) = &answer.finding else {
+            panic!("{answer:?}");
+        };
+        assert!((odds.order.probability - 0.81).abs() < 1e-12, "{odds:?}");
+        let happenings = odds.order.happenings.iter();
+        let together: Vec<bool> = happenings.map(|it| it.together).collect();
+        assert_eq!(together, [false, true, false, false], "{odds:?}");
+        // A single attempt that is repeated would lack the other one.
+        assert!(
+            matches!(odds.gains.any_action, ValueAnswer::Unknown(_)),
+            "{odds:?}"
+        );
+    }
+}

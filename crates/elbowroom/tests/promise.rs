@@ -31,7 +31,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use elbowroom::execution::Cause;
-use elbowroom::execution::run::Report;
+use elbowroom::execution::run::{Report, TimeoutRule};
 use elbowroom::plan::{BoxEnd, Side};
 use sources::Origin;
 use subject::{Planning, Subject};
@@ -264,7 +264,7 @@ fn the_spoiler_beats_whoever_relies_on_a_box_that_is_weak_only() {
             if is_won && !["guarded", "live"].contains(&executor) {
                 continue;
             }
-            let mut world = worlds.spoiled().expect("a network");
+            let mut world = worlds.spoiled(&TimeoutRule::Off).expect("a network");
             let outcome = nominal.run(executor, &mut world);
             assert_eq!(
                 outcome.failure.is_none(),

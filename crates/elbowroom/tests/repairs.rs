@@ -76,7 +76,7 @@ fn said(request: &RepairRequest) -> String {
             });
             changes.collect::<Vec<_>>().join("\n")
         }
-        RepairFinding::Impossible { because } => because.join("\n"),
+        RepairFinding::Impossible { because, .. } => because.join("\n"),
         RepairFinding::None { reason, .. } => panic!("{reason}"),
     }
 }
@@ -287,7 +287,7 @@ fn deliveries_with_deadlines_at_half_their_times_are_repaired() {
                     changes.len()
                 );
             }
-            RepairFinding::Impossible { because } => {
+            RepairFinding::Impossible { because, .. } => {
                 assert!(
                     because
                         .iter()
@@ -360,7 +360,7 @@ fn every_plan_of_the_benchmarks_that_does_not_work_is_repaired_or_says_why_not()
                         );
                         continue;
                     }
-                    RepairFinding::Impossible { because } => {
+                    RepairFinding::Impossible { because, .. } => {
                         assert!(!because.is_empty(), "{name}: no reason");
                         because.join("; ")
                     }

@@ -314,6 +314,20 @@ impl Variables {
         .collect()
     }
 
+    /// The least slack of a box, up to what counts.
+    fn least_slack(
+        &self,
+        nominal: &DecoupledEnvelope,
+        envelope: &DecoupledEnvelope,
+    ) -> Option<Rational> {
+        let moved = self.moved(nominal, envelope);
+        let slacks = moved.iter().filter_map(|own| {
+            let far = own.value.clone().min(own.most.clone());
+            far.checked_div(&own.scale)
+        });
+        slacks.min()
+    }
+
     pub(crate) fn count(&self) -> usize {
         self.ends.len()
     }
@@ -399,6 +413,17 @@ pub fn best(
             branch::branch(oracle, &plan, &variables, goal, start, on_step)?
         }
     };
+    if run.is_cancelled && settings.objective == Objective::LeastSlack && !settings.symmetric {
+        // A search that ends early may know less than it began with.
+        if let (Some(start), Ok(envelope)) = (start, &mut run.envelope)
+            && let Some(slack) = variables.least_slack(&nominal, start)
+            && slack >= run.value
+        {
+            envelope.clone_from(start);
+            run.bound = run.bound.max(slack.clone());
+            run.value = slack;
+        }
+    }
     if let Ok(envelope) = &mut run.envelope {
         run.proof.variables = variables.moved(&nominal, envelope);
         *envelope = let_go(oracle, &plan, envelope, &variables)?;

@@ -7,7 +7,7 @@
 
 use std::fmt;
 
-use elbowroom_num::Interval;
+use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::uncertain::{Impossible, PlanNetwork};
 use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
 use elbowroom_stn::Weight;
@@ -192,6 +192,27 @@ pub(crate) fn strong_conflict(
     };
     let StrongConflict { grounds, .. } = network.network.strong().err()?;
     Some(in_the_plan(plan, &network, &grounds))
+}
+
+/// A number greater than the finite bounds on any cycle of the network for times fixed in advance
+/// add up to. `None` if nothing satisfies the network.
+pub(crate) fn beyond_all_bounds(
+    plan: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+) -> Option<Rational> {
+    let PlanNetwork { network, .. } = plan.uncertain_network(envelope).ok()?;
+    let links = network.link_ids().map(|id| {
+        let link = network.link(id);
+        let upper = link.upper.as_ref().map(Rational::abs);
+        link.lower.abs() + upper.unwrap_or_default()
+    });
+    let links: Rational = links.fold(Rational::ZERO, |sum, own| sum + own);
+    // Each requirement occurs on a simple cycle at most once, with each link at most once.
+    let bounds = network.requirements().constraints().iter();
+    let all = bounds.fold(Rational::ONE, |sum, own| {
+        sum + own.bound.abs() + links.clone()
+    });
+    Some(all)
 }
 
 fn unsatisfiable(Impossible(index): Impossible) -> ControlConflict {

@@ -111,6 +111,8 @@ pub(crate) fn farthest(parameter: &Parameter) -> Rational {
 pub enum Limit {
     /// Nothing: the end is infinite.
     Unbounded,
+    /// Nothing limits finite values, but no schedule fixed in advance works for all of them.
+    AnyFinite,
     /// The parameter's natural range.
     Range,
     /// The box with this end moved out is not inside the envelope, because of this.
@@ -234,8 +236,15 @@ fn limit(
     let target = &reach + step;
     let target = border.map_or(target.clone(), |border| border.min(target));
     match oracle.objection_beside(envelope, end, Some(target)) {
-        Ok(None) => None,
+        Ok(None) => {
+            let is_far = &reach * &Rational::from(FAR) > farthest(parameter);
+            let is_any = is_far && oracle.accepts_all_finite(envelope, end).unwrap_or(false);
+            is_any.then_some(Limit::AnyFinite)
+        }
         Ok(Some(objection)) => Some(Limit::Objection(objection)),
         Err(_) => Some(Limit::Undecided),
     }
 }
+
+/// An end that lies beyond this part of the [`farthest`] value may have no limit.
+const FAR: i64 = 4;

@@ -102,6 +102,6 @@ pub use proved::{
     ConditionProof, ControlProof, Impossible, Refutation, ScheduleCase, Strategy, Summand,
     TimeRule, Unfailing,
 };
-pub use repair::{Changeable, Hindrance, Repair, RepairRun, repair};
+pub use repair::{Changeable, Hindrance, Repair, RepairLimits, RepairRun, repair};
 pub use row::Row;
 pub use sharpen::sharpen;

@@ -9,6 +9,7 @@ use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan, Valuation};
 
+use crate::control::{beyond_all_bounds, strong_conflict};
 use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
 use crate::known::Known;
 use crate::objection::Objection;
@@ -228,6 +229,41 @@ impl Oracle {
             self.remembers_accepted = self.accepted.as_ref() == Some(envelope);
         }
         Ok(reason.map(|reason| self.objection_of(envelope, reason)))
+    }
+
+    /// Returns `true` if it is proved that the box, with this end at any finite value further out, is
+    /// inside the envelope. Only for the strong guarantee, which no box with an infinite duration has.
+    ///
+    /// The conditions are checked with an infinite end, which covers all finite values. Times fixed in
+    /// advance exist for all greater values if they exist for one value that exceeds the sum of all
+    /// other numbers of the network. A cycle of the network contains that value a whole number of
+    /// times, so a cycle that contains it negatively has a negative length.
+    ///
+    /// # Errors
+    /// When there are too many cases to distinguish.
+    pub fn accepts_all_finite(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        end: BoxEnd,
+    ) -> Result<bool, Refusal> {
+        if self.guarantee != Guarantee::Strong {
+            return Ok(false);
+        }
+        let plan = Arc::clone(&self.plan);
+        self.remembers_accepted = false;
+        self.proofs_hold_in_last = false;
+        if self.asked == Asked::All
+            && self
+                .unsound(&end.with_reach(envelope, None), None)?
+                .is_some()
+        {
+            return Ok(false);
+        }
+        let Some(far) = beyond_all_bounds(&plan, envelope) else {
+            return Ok(false);
+        };
+        let far = end.with_reach(envelope, Some(far));
+        Ok(strong_conflict(&plan, &far).is_none())
     }
 
     /// Values and a schedule in the box that break the obligation by as much as any do. Two

@@ -111,8 +111,23 @@ pub enum RepairRun {
     },
 }
 
-/// How many linear programs are solved before the search gives up.
-const MOST_CASES: usize = 4_000;
+/// Limits of a search.
+#[derive(Clone, Debug)]
+pub struct RepairLimits {
+    /// The search is stopped after this number of linear programs.
+    pub cases: usize,
+    /// The search is stopped once it is known that no repair costs less than this.
+    pub below: Option<Rational>,
+}
+
+impl Default for RepairLimits {
+    fn default() -> Self {
+        Self {
+            cases: 4_000,
+            below: None,
+        }
+    }
+}
 
 /// A case that has been solved and not yet been looked at.
 struct Open {
@@ -126,7 +141,8 @@ struct Open {
 /// Looks for the cheapest values of some parameters with which the plan has a valid schedule.
 ///
 /// `order`, if there is one, gives each node a time: interfering actions keep the order that they
-/// have there. Parameters that are not among `changeable` keep their nominal values. `judge` says
+/// have there. Without it they keep the order that the plan's bounds give them, and all orders that
+/// these leave open are searched. Parameters that are not among `changeable` keep their nominal values. `judge` says
 /// whether the plan with these values and times is valid; `flow`, asked between linear programs,
 /// whether to go on.
 ///
@@ -137,6 +153,7 @@ pub fn repair(
     plan: &ParametrizedPlan,
     order: Option<&Schedule>,
     changeable: &[Changeable],
+    limits: &RepairLimits,
     judge: &mut dyn FnMut(&Valuation, &Schedule) -> bool,
     flow: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<RepairRun, Refusal> {
@@ -173,10 +190,13 @@ pub fn repair(
     // What stood in the way in the case that was given up first: the one with the least change.
     let mut hopeless: Option<Vec<Hindrance>> = None;
     while let Some(case) = take_cheapest(&mut open) {
-        if cases > MOST_CASES || flow().is_break() {
+        let cost = &case.solved.cost.real;
+        let is_dear = limits.below.as_ref().is_some_and(|below| cost >= below);
+        let is_over = is_dear || cases > limits.cases;
+        if is_over || flow().is_break() {
             return Ok(RepairRun::Stopped {
-                is_cancelled: cases <= MOST_CASES,
-                bound: case.solved.cost.real,
+                is_cancelled: !is_over,
+                bound: cost.clone(),
             });
         }
         let Solved {

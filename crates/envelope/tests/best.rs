@@ -281,6 +281,54 @@ fn no_box_on_a_grid_has_more_volume_than_the_best_one() {
     assert!(unproved * 10 < proved, "{proved} {unproved}");
 }
 
+/// A search for the least slack that is ended knows at least the box with which it began.
+#[test]
+fn search_that_is_ended_is_no_worse_than_its_beginning() {
+    let mut dice = Dice(11);
+    let (mut ended, mut kept) = (0, 0);
+    while ended < 60 {
+        let given = Given {
+            domain: DOMAIN,
+            plan: &problem(&dice.bounds()),
+            ..Given::default()
+        };
+        let (task, plan) = given.task_and_plan();
+        let mut oracle = Oracle::new(&task, &plan, Guarantee::Dynamic).expect("three actions");
+        let settings = Settings::default();
+        let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(()));
+        let run = run.expect("three actions");
+        let Ok(start) = run.envelope else { continue };
+        let mut left = dice.below(4);
+        let run = best(
+            &mut oracle,
+            &BestSettings::default(),
+            Some(&start),
+            &mut |_| {
+                let flow = match left {
+                    0 => ControlFlow::Break(()),
+                    _ => ControlFlow::Continue(()),
+                };
+                left = left.saturating_sub(1);
+                flow
+            },
+        );
+        let run = run.expect("three actions");
+        if !run.is_cancelled {
+            continue;
+        }
+        ended += 1;
+        let envelope = run.envelope.expect("the plan works");
+        kept += usize::from(envelope == start);
+        assert!(
+            slacks(&envelope)[0] >= slacks(&start)[0],
+            "{envelope:?}, {start:?}"
+        );
+        assert!(run.bound >= run.value && !run.is_proved);
+        assert!(matches!(oracle.objection(&envelope), Ok(None)));
+    }
+    assert!(kept > 0, "no search kept the box with which it began");
+}
+
 #[test]
 fn everything_may_deviate_by_exactly_what_fits() {
     for unit in [Rational::ONE, Rational::new(1, 3600)] {

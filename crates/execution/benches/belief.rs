@@ -80,6 +80,7 @@ fn action(index: usize, needed: FactId, changed: FactId) -> Action {
             over_all: Condition::Fact(needed),
             end: snap(Condition::TRUE, vec![effect]),
             continuous: Vec::new(),
+            is_under_way: false,
         }),
     }
 }

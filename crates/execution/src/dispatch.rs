@@ -5,6 +5,7 @@
 //! have happened are fixed in the network, and with a whole [`Horizon`] that moves the windows of
 //! all others, deadlines included. Work per event is in proportion to the windows that move.
 
+mod apart;
 mod explain;
 mod news;
 mod overrun;
@@ -31,6 +32,7 @@ use elbowroom_stn::{ConsistentNetwork, Network};
 use crate::executor::{Mission, Planned, StepId};
 use crate::horizon::{Horizon, NetworkLimit, grounds};
 use crate::reason::{About, Behind, Cause, Reason};
+use crate::separation::Separation;
 use overrun::Strain;
 use progress::Progress;
 use retry::Retry;
@@ -102,6 +104,8 @@ pub(crate) struct Dispatch {
     retries: BTreeMap<NodeId, Retry>,
     /// What has happened outside the network's bounds since it was last known to work.
     strain: Strain,
+    /// The happenings that starts are separated from; `None` if the network orders all interfering happenings.
+    separation: Option<Separation>,
 }
 
 impl Dispatch {
@@ -249,15 +253,37 @@ impl Dispatch {
         })
     }
 
-    /// The latest time at which an action under way can end so that there are times for all the rest, the world's links
-    /// being as long as somebody likes within these readings; on the world's clock. `None` if there is no limit, or if
-    /// there are no such times. Takes time in proportion to the plan.
+    /// The latest time at which a running action can end so that there are times for all the rest, on the world's clock.
+    /// Each contingent link takes any time within its reading. `None` if there is no limit, or if there are no such
+    /// times. Takes time in proportion to the plan.
     pub(crate) fn latest_end(
         &self,
         id: InstanceId,
         now: &Rational,
         reading: &dyn Fn(&Constraint) -> Reading,
     ) -> Option<Rational> {
+        self.latest_end_in(&self.possible_times(now, reading)?, id)
+    }
+
+    /// The same in a network that [`Dispatch::possible_times`] returned.
+    pub(crate) fn latest_end_in(
+        &self,
+        network: &ConsistentNetwork,
+        id: InstanceId,
+    ) -> Option<Rational> {
+        let origin = network_node(NodeId::ZERO);
+        let end = network_node(self.ends[id.index()][1]);
+        let latest = network.distance(origin, end)?;
+        Some(self.world(&latest))
+    }
+
+    /// The possible times of the rest of the plan, where each contingent link takes any time within its reading; `None`
+    /// if there are none.
+    pub(crate) fn possible_times(
+        &self,
+        now: &Rational,
+        reading: &dyn Fn(&Constraint) -> Reading,
+    ) -> Option<ConsistentNetwork> {
         let rest = self.rest(&self.local(now), reading).ok()?.network;
         let mut network = rest.requirements().clone();
         for link in rest.links() {
@@ -271,11 +297,7 @@ impl Dispatch {
                 network.add(elbowroom_stn::Constraint::at_most(from, to, upper.clone()));
             }
         }
-        let network = ConsistentNetwork::try_from(network).ok()?;
-        let origin = network_node(NodeId::ZERO);
-        let end = network_node(self.ends[id.index()][1]);
-        let latest = network.distance(origin, end)?;
-        Some(self.world(&latest))
+        ConsistentNetwork::try_from(network).ok()
     }
 
     fn with_horizon(
@@ -313,6 +335,7 @@ impl Dispatch {
             resumed: mission.running.keys().map(|step| step.instance()).collect(),
             retries: BTreeMap::new(),
             strain: Strain::default(),
+            separation: None,
         };
         dispatch.begin(&mission.running);
         dispatch

@@ -66,7 +66,7 @@ pub enum Event {
         /// By how much its end really changed fluents, where that was measured.
         measured: Vec<Measured>,
     },
-    /// A running action says how far it has come. It changes nothing, but is a sign of life.
+    /// A running action reports the part of it that is done. If that is more than before, its time-out counts from then on.
     Feedback {
         /// The ticket of its start.
         ticket: Ticket,

@@ -68,6 +68,17 @@ pub trait Executor: Send {
     /// only once.
     fn decide(&mut self, moment: &Moment<'_>) -> Decided;
 
+    /// Returns whether the plan for which it last requested another one ([`Decision::Replan`]) has a fair chance to work,
+    /// so that it is better to [carry on](Executor::carry_on) than to cancel overdue actions.
+    fn may_carry_on(&self) -> bool {
+        false
+    }
+
+    /// Continues with that plan, without any guarantee, because no other one was found. Returns whether it does.
+    fn carry_on(&mut self, _now: &Rational) -> bool {
+        false
+    }
+
     /// The window of a time point of a step at present, for the record; in the world's time.
     fn window(&self, _step: StepId, _is_end: bool) -> Option<Planned> {
         None

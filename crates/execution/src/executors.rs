@@ -33,6 +33,10 @@ use crate::preparation::Region;
 use crate::reason::{About, Cause, Reason};
 use crate::rehearsal::Rehearsal;
 
+/// The executor that is used where none is named. It gives a plan up only where the rest of it does not work even if
+/// nothing deviates any more; `docs/executors.md` compares it with the baselines.
+pub const DEFAULT_EXECUTOR: &str = live::REGISTERED.name;
+
 /// Every executor, in the order in which help and reports list them.
 pub const EXECUTORS: &[Registered] = &[
     fixed::REGISTERED,
@@ -168,10 +172,10 @@ impl PartialEq for ExecutorSpec {
 }
 
 impl Default for ExecutorSpec {
-    /// `guarded`.
+    /// [`DEFAULT_EXECUTOR`].
     fn default() -> Self {
         Self {
-            registered: &guarded::REGISTERED,
+            registered: &live::REGISTERED,
             argument: None,
         }
     }

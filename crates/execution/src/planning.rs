@@ -101,7 +101,7 @@ impl From<PlanAnswer> for Planned {
 pub enum PlanAnswer {
     /// A plan.
     Plan(TimeTriggeredPlan),
-    /// There is no plan.
+    /// No plan exists, with a certificate that the verifier of such claims accepts.
     Unsolvable,
     /// No plan has been found; there may be one.
     NotFound {
@@ -113,6 +113,8 @@ pub enum PlanAnswer {
         /// How.
         why: String,
     },
+    /// There is no planner to ask.
+    NoPlanner,
 }
 
 impl PlanAnswer {
@@ -122,6 +124,7 @@ impl PlanAnswer {
             Self::Plan(_) => None,
             Self::Unsolvable => Some("no plan reaches the goal from here"),
             Self::NotFound { why } | Self::Failed { why } => Some(why),
+            Self::NoPlanner => Some("there is no planner in this run"),
         }
     }
 
@@ -129,7 +132,9 @@ impl PlanAnswer {
     pub fn plan(&self) -> Option<&TimeTriggeredPlan> {
         match self {
             Self::Plan(plan) => Some(plan),
-            Self::Unsolvable | Self::NotFound { .. } | Self::Failed { .. } => None,
+            Self::Unsolvable | Self::NotFound { .. } | Self::Failed { .. } | Self::NoPlanner => {
+                None
+            }
         }
     }
 }
@@ -140,8 +145,6 @@ pub struct NoPlanner;
 
 impl Planner for NoPlanner {
     fn plan(&mut self, _task: &Task, _situation: &Situation) -> Planned {
-        Planned::from(PlanAnswer::NotFound {
-            why: "there is no planner in this run".to_owned(),
-        })
+        Planned::from(PlanAnswer::NoPlanner)
     }
 }

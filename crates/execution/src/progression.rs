@@ -44,10 +44,10 @@ pub struct Progression {
     facts_on_arrival: BTreeMap<FactId, bool>,
     /// The values on arrival, likewise.
     values_on_arrival: BTreeMap<FluentId, Option<Rational>>,
-    /// Facts about which reports contradict each other.
-    doubtful_facts: BTreeSet<FactId>,
-    /// Fluents about which reports contradict each other.
-    doubtful_values: BTreeSet<FluentId>,
+    /// Facts that an action may have changed: see [`Progression::doubt`].
+    doubtful_facts: BTreeMap<FactId, Vec<Doubt>>,
+    /// Fluents that an action may have changed.
+    doubtful_values: BTreeMap<FluentId, Vec<Doubt>>,
     /// How many groups of timed initials have happened.
     timed: usize,
     running: BTreeMap<Ticket, Underway>,
@@ -68,6 +68,17 @@ pub struct Underway {
     continuous: Vec<bool>,
     /// The conjuncts of the over-all condition that have not held at some moment since the start.
     broken: BTreeSet<usize>,
+}
+
+/// The reason why facts or values are in doubt.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Doubt {
+    /// Since when.
+    pub since: Rational,
+    /// The start of the action.
+    pub ticket: Ticket,
+    /// The name of the action that may or may not have come to its end.
+    pub action: String,
 }
 
 impl Underway {
@@ -101,8 +112,8 @@ impl Progression {
             group: Rational::ZERO,
             facts_on_arrival: BTreeMap::new(),
             values_on_arrival: BTreeMap::new(),
-            doubtful_facts: BTreeSet::new(),
-            doubtful_values: BTreeSet::new(),
+            doubtful_facts: BTreeMap::new(),
+            doubtful_values: BTreeMap::new(),
             timed: 0,
             running: BTreeMap::new(),
         }
@@ -145,7 +156,18 @@ impl Progression {
 
     /// Whether a basic fact is true.
     pub fn fact(&self, fact: FactId) -> bool {
-        self.facts.get(fact.index()).copied().unwrap_or(false)
+        let truth = self.facts.get(fact.index()).copied().unwrap_or(false);
+        truth && !self.doubtful_facts.contains_key(&fact)
+    }
+
+    /// Returns the facts that are in doubt.
+    pub fn doubtful_facts(&self) -> &BTreeMap<FactId, Vec<Doubt>> {
+        &self.doubtful_facts
+    }
+
+    /// Returns the fluents whose values are in doubt.
+    pub fn doubtful_values(&self) -> &BTreeMap<FluentId, Vec<Doubt>> {
+        &self.doubtful_values
     }
 
     /// A fluent's value.
@@ -163,10 +185,10 @@ impl Progression {
 
     /// Facts and values as the model knows them.
     pub fn state(&self) -> State {
-        let facts = self.facts.iter().enumerate().filter(|(_, truth)| **truth);
+        let facts = (0..self.facts.len()).map(|index| FactId(narrow(index)));
         let values = self.values.iter().enumerate();
         State {
-            facts: facts.map(|(index, _)| FactId(narrow(index))).collect(),
+            facts: facts.filter(|fact| self.fact(*fact)).collect(),
             values: values
                 .filter_map(|(index, value)| Some((FluentId(narrow(index)), value.clone()?)))
                 .collect(),
@@ -285,7 +307,7 @@ impl Progression {
 
     /// A fact is seen; whether that is news. It counts as having been so on arrival.
     pub fn see_fact(&mut self, fact: FactId, truth: bool) -> bool {
-        let was_doubtful = self.doubtful_facts.remove(&fact);
+        let was_doubtful = self.doubtful_facts.remove(&fact).is_some();
         let is_news = self.fact(fact) != truth;
         self.set_fact(fact, truth);
         self.facts_on_arrival.remove(&fact);
@@ -294,7 +316,7 @@ impl Progression {
 
     /// A value is seen; whether that is news. It counts as having been so on arrival.
     pub fn see_value(&mut self, fluent: FluentId, value: &Rational) -> bool {
-        let was_doubtful = self.doubtful_values.remove(&fluent);
+        let was_doubtful = self.doubtful_values.remove(&fluent).is_some();
         let is_news = self.value(fluent) != Some(value);
         self.set_value(fluent, Some(value.clone()));
         self.values_on_arrival.remove(&fluent);
@@ -312,19 +334,60 @@ impl Progression {
         self.set_value(fluent, Some(value.clone()));
     }
 
-    /// Nobody knows any more what these effects have done: what they write says nothing until it
-    /// is seen.
-    pub fn doubt(&mut self, snap: &SnapAction) {
+    /// It is unknown whether these effects have taken place. Until that is known, the facts that they write count as
+    /// false, for planners as for executors, and the fluents keep their values; a goal that reads them is not reached.
+    pub fn doubt(&mut self, snap: &SnapAction, doubt: &Doubt) {
         for effect in &snap.effects {
             match effect.change {
                 Change::Add(fact) | Change::Delete(fact) => {
-                    self.doubtful_facts.insert(fact);
+                    let doubts = self.doubtful_facts.entry(fact).or_default();
+                    doubts.push(doubt.clone());
                 }
                 Change::Update { fluent, .. } => {
-                    self.doubtful_values.insert(fluent);
+                    let doubts = self.doubtful_values.entry(fluent).or_default();
+                    doubts.push(doubt.clone());
                 }
             }
         }
+    }
+
+    /// Returns the number of doubts about facts and fluents.
+    pub fn doubt_count(&self) -> usize {
+        let facts = self.doubtful_facts.values().map(Vec::len);
+        let values = self.doubtful_values.values().map(Vec::len);
+        facts.chain(values).sum()
+    }
+
+    /// Ends the doubts about an action's end: it has not taken place. Returns the facts and fluents that were in doubt
+    /// because of it.
+    pub fn settle(&mut self, ticket: Ticket) -> (Vec<FactId>, Vec<FluentId>) {
+        let facts = without_doubts(&mut self.doubtful_facts, ticket);
+        let fluents = without_doubts(&mut self.doubtful_values, ticket);
+        (facts, fluents)
+    }
+
+    /// Ends the doubts about an action: these effects have taken place. Facts and values that have been seen since stay, and
+    /// other doubts remain.
+    pub fn settle_happened(
+        &mut self,
+        ticket: Ticket,
+        effects: &[&SnapAction],
+        duration: &Rational,
+        measured: &[Measured],
+    ) -> (Vec<FactId>, Vec<FluentId>) {
+        let (facts, fluents) = self.settle(ticket);
+        let others = (self.doubtful_facts.clone(), self.doubtful_values.clone());
+        for &snap in effects {
+            let mut snap = snap.clone();
+            snap.effects.retain(|effect| match &effect.change {
+                Change::Add(fact) | Change::Delete(fact) => facts.contains(fact),
+                Change::Update { fluent, .. } => fluents.contains(fluent),
+            });
+            // An effect that cannot be computed leaves its fluent as it was.
+            let _ = self.happen(&snap, Some(duration), None, measured);
+        }
+        (self.doubtful_facts, self.doubtful_values) = others;
+        (facts, fluents)
     }
 
     /// The first running action whose over-all condition has not held at some moment that has
@@ -337,9 +400,11 @@ impl Progression {
             .map(|(ticket, underway)| (*ticket, underway))
     }
 
-    /// A running action as the model knows it, with its guards decided.
+    /// Returns a running action as the model knows it, with its guards decided. Before its end, it reads
+    /// the planned duration.
     pub fn running_action(&self, underway: &Underway, duration: Interval) -> RunningAction {
-        let mut action = Action::clone(&underway.action);
+        let planned = underway.action.with_planned_duration(&underway.planned);
+        let mut action = planned.unwrap_or_else(|| Action::clone(&underway.action));
         if let Body::Durative(body) = &mut action.body {
             decide_guards(body, &underway.end_guards, &underway.continuous);
         }
@@ -427,4 +492,18 @@ fn decide_guards(body: &mut DurativeBody, at_end: &[bool], continuous: &[bool]) 
 
 fn narrow(index: usize) -> u32 {
     u32::try_from(index).expect("fewer than 2^32 facts and fluents")
+}
+
+/// Removes the doubts about an action, and returns the facts and fluents.
+fn without_doubts<T: Copy + Ord>(doubts: &mut BTreeMap<T, Vec<Doubt>>, ticket: Ticket) -> Vec<T> {
+    let mut found = Vec::new();
+    doubts.retain(|&about, doubts| {
+        let before = doubts.len();
+        doubts.retain(|doubt| doubt.ticket != ticket);
+        if doubts.len() < before {
+            found.push(about);
+        }
+        !doubts.is_empty()
+    });
+    found
 }

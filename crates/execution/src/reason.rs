@@ -85,7 +85,7 @@ pub enum Cause {
     Contradiction,
     /// Something else than believed was seen, and the plan does not work with it.
     Surprise,
-    /// Nothing has been heard of an action for too long.
+    /// An action has reached its time-out.
     Silence,
     /// The rest of the plan is no longer guaranteed to work.
     GuaranteeLost,
@@ -232,7 +232,7 @@ impl Reason {
             Cause::Surprise => {
                 format!("{about} was not expected, and {action} needs it to be otherwise")
             }
-            Cause::Silence => format!("nothing has been heard of {action} for too long"),
+            Cause::Silence => format!("{action} timed out"),
             Cause::GuaranteeLost => {
                 format!("the rest of the plan is no longer guaranteed: {about}")
             }

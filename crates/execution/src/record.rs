@@ -8,6 +8,15 @@ use crate::executor::{Decided, Mission, Planned};
 use crate::reason::Reason;
 use crate::run::{Report, Stand, Verdict};
 
+/// The cause of a warning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WarningCause {
+    /// The plan will soon be infeasible unless the action ends.
+    Slack,
+    /// The action will soon time out.
+    Timeout,
+}
+
 /// Takes the record of a run as it comes about.
 pub trait Recorder: Send {
     /// One entry. What is kept must be kept before this returns, so that a run that is cut short
@@ -29,6 +38,20 @@ pub trait Recorder: Send {
 }
 
 impl<R: Recorder + ?Sized> Recorder for &mut R {
+    fn record(&mut self, entry: &Entry<'_>) {
+        (**self).record(entry);
+    }
+
+    fn commit(&mut self) {
+        (**self).commit();
+    }
+
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        (**self).begin_anew(stand)
+    }
+}
+
+impl<R: Recorder + ?Sized> Recorder for Box<R> {
     fn record(&mut self, entry: &Entry<'_>) {
         (**self).record(entry);
     }
@@ -70,6 +93,8 @@ pub enum Entry<'a> {
         command: &'a Command,
         /// When that was planned.
         planned: &'a Planned,
+        /// The time-out of an action that is started; `None` if time-outs are off.
+        timeout: Option<&'a Rational>,
     },
     /// Time has passed, up to `now`, which `until` would have been the end of.
     Passed {
@@ -124,7 +149,7 @@ pub enum Entry<'a> {
         /// What the planner has to say about it.
         remark: Option<&'a str>,
     },
-    /// An action has used most of the time that the plan can bear.
+    /// An action has used most of the time that the plan tolerates, or most of its time-out.
     Warning {
         /// The time.
         now: &'a Rational,
@@ -132,15 +157,17 @@ pub enum Entry<'a> {
         ticket: Ticket,
         /// Its name.
         action: &'a str,
-        /// From when on a new plan is needed if it has not ended.
+        /// When a new plan is needed, or when the action times out, if it has not ended.
         until: &'a Rational,
+        /// The cause of the warning.
+        cause: WarningCause,
     },
-    /// The goals have changed, and the rest of the running plan reaches these, too: it is gone on
-    /// with, and taken up anew.
+    /// The present plan continues: the goals have changed, and its rest reaches these, too; or it was given up, and no
+    /// other plan was found.
     Kept {
         /// The time.
         now: &'a Rational,
-        /// How the goals have changed.
+        /// How the goals have changed, or why the plan was given up.
         reason: &'a Reason,
     },
     /// A lasting run has nothing to do, or cannot do it, and waits for a change.

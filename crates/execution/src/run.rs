@@ -1,9 +1,10 @@
 //! A run: a plan is executed in a world, watched, and replaced when it no longer works.
 //!
-//! A [`Run`] is a state machine. [`Run::next`] says what it needs of the world: a command carried
-//! out, time, or a look at something; [`Run::observe`] and [`Run::see`] take the answers. Whoever
-//! drives it decides how to wait, so that an event loop can. [`Run::go`] is the loop for a
-//! [`World`] that blocks.
+//! A [`Run`] is a state machine. [`Run::next`] returns its next request to the driver. Requests to the world are
+//! commands, waits and looks: [`Run::observe`] and [`Run::see`] take the answers. Other requests are for plans, and for
+//! plans prepared for the executor: [`Run::planned`] and [`Run::prepared`] take these answers, at once or while the run
+//! continues. The driver implements waiting and planning, as an event loop or otherwise. [`Run::go`] is the loop for a
+//! [`World`] that blocks, with [`Workers`] that plan and prepare.
 //!
 //! What happens when reports are wrong is defined here, so that no executor needs to know:
 //!
@@ -18,10 +19,10 @@
 //! | a report with a time in the future, or before the action's start | its time is taken as the nearest possible one |
 //! | a report that comes late | it counts from its own time on for durations, from its arrival on for the state |
 //! | a refusal, again and again, and nothing else | plans beside the run are asked for later and later ([`Refusals`]) |
-//! | feedback | a sign of life: silence counts from then on |
+//! | feedback | if more is done than before, the time-out counts from then on |
 //! | a report that cannot be understood, or names what the problem does not have | nothing; the record has it |
 //! | answers without end while the clock stands still, or creeps | the world is broken ([`Verdict::WorldFailed`]) |
-//! | no report at all | when the action should have ended [`Patience`] ago, and the plan does not allow it to run any longer, it is given up: it is cancelled and counts as failed. Where the room of what is under way is watched ([`RunSettings::watches_room`]), so is what no plan can bear any longer |
+//! | no report at all | a warning ([`Entry::Warning`]), and at its time-out ([`TimeoutRule`]) the action is cancelled and counts as failed. Where the slack of running actions is watched ([`RunSettings::watches_room`]), so is an action that no plan tolerates any longer |
 //! | a fact or value other than believed | believed; the executor is told, and plays the rest of its plan through |
 //!
 //! A run may also outlast its goal ([`Run::lasting`]): goals are given and abandoned while it goes
@@ -74,7 +75,9 @@ mod account;
 mod agenda;
 mod amid;
 mod beginning;
+mod carrying_on;
 mod dead_end;
+mod doubts;
 mod drive;
 mod expectation;
 mod farewell;
@@ -85,17 +88,20 @@ pub mod here;
 mod intake;
 mod lasting;
 mod oblivion;
+mod pending;
 mod progress;
 mod refusals;
 mod room;
 mod search;
 mod settings;
 mod stand;
+mod timeout;
 mod waits;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
-use elbowroom_model::{Footprint, Task, TimeTriggeredPlan};
+use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 pub use account::{Account, ExecutedStep, KnownStart};
@@ -105,32 +111,29 @@ pub use farewell::FAREWELL;
 pub use lasting::{FIRST_GOAL, GoalReader};
 pub use refusals::Refusals;
 pub use settings::{
-    Patience, PlanningTime, Report, RunSettings, RunningRule, UnknownSetting, Verdict,
+    MissingPlan, PlanningTime, Report, RunSettings, RunningRule, UnknownSetting, Verdict,
 };
 pub use stand::{Doing, Goals, Stand, TakesUp};
+pub use timeout::TimeoutRule;
 
 use crate::event::{Command, Ticket};
 use crate::executor::{Decided, Decision, Executor, Moment, News, Order, Planned};
-use crate::planning::Planner;
-use crate::preparation::Preparer;
 use crate::progression::{Outlook, Progression};
 use crate::reason::{About, Cause, Reason};
 use crate::record::{Entry, Recorder};
+use crate::request::Workers;
 use crate::world::{World, WorldError};
 use agenda::Todo;
 use dead_end::Happened;
 use farewell::Closing;
 use foresight::Foreseen;
 use lasting::Lasting;
+use pending::Pending;
 use progress::Progress;
 use search::{Lost, Search};
 
-/// The components of a run, except for the world.
+/// The components that a run calls itself.
 pub struct Ports<'a> {
-    /// Where plans come from.
-    pub planner: Box<dyn Planner + 'a>,
-    /// Prepares plans for the executor.
-    pub preparer: Box<dyn Preparer + 'a>,
     /// The executor.
     pub executor: Box<dyn Executor + 'a>,
     /// The recorder.
@@ -154,6 +157,9 @@ pub struct Run<'a> {
     reasons: Vec<Reason>,
     /// The expected planning time.
     allowance: Rational,
+    /// The task with its goals, the situation and the guess of the last request that was answered by a plan while the
+    /// run waited.
+    planned_for: Option<(Arc<Task>, Situation, here::Guess)>,
     /// All that was observed and believed, in order.
     history: Vec<Happened>,
     /// Asked whether to end.
@@ -169,8 +175,14 @@ pub struct Run<'a> {
     lasting: Option<Lasting<'a>>,
     /// The tasks before the executor is asked again; the next one is last.
     agenda: Vec<Todo>,
-    /// The question that the world has not answered.
+    /// The question that has not been answered.
     asked: Option<Next>,
+    /// Requests for the driver without an awaited answer.
+    outbox: VecDeque<Next>,
+    /// Number of requests for plans and prepared plans so far.
+    requests: u64,
+    /// Continuation at the answer for which the run waits.
+    pending: Option<Pending>,
     /// The plan that is made beside the run.
     search: Option<Search>,
     /// The task with the goals that the present plan is for, while plans are made beside the run.
@@ -202,9 +214,10 @@ pub fn run(
     first: Option<&TimeTriggeredPlan>,
     settings: &RunSettings,
     ports: Ports<'_>,
+    workers: &mut dyn Workers,
     world: &mut dyn World,
 ) -> Report {
-    Run::new(task, first.cloned(), settings.clone(), ports).go(world)
+    Run::new(task, first.cloned(), settings.clone(), ports).go(world, workers)
 }
 
 impl<'a> Run<'a> {
@@ -237,11 +250,15 @@ impl<'a> Run<'a> {
             replans: 0,
             reasons: Vec::new(),
             allowance,
+            planned_for: None,
             history: Vec::new(),
             is_to_end: Box::new(|| false),
             is_explaining: false,
             agenda: vec![Todo::Begin(first)],
             asked: None,
+            outbox: VecDeque::new(),
+            requests: 0,
+            pending: None,
             search: None,
             plan_task: None,
             lost: Lost::default(),
@@ -318,6 +335,7 @@ impl<'a> Run<'a> {
             Decision::Wait { until } => self.wait(until)?,
             Decision::Replan => {
                 self.give_up_search();
+                self.note_abandoned(&decided.reason);
                 self.replan(&decided.reason)?;
             }
             // The plan has done what it was made for, and another one is in the making.
@@ -335,6 +353,8 @@ impl<'a> Run<'a> {
         let mut commands = Vec::with_capacity(orders.len());
         for order in orders {
             let ticket = self.account.open(&order, &self.now);
+            let planned = order.duration.clone().unwrap_or_default();
+            let timeout = self.settings.timeout.of(&planned);
             let command = Command::Start {
                 ticket,
                 action: order.action,
@@ -344,6 +364,7 @@ impl<'a> Run<'a> {
                 now: &self.now,
                 command: &command,
                 planned: &order.planned,
+                timeout: timeout.as_ref(),
             });
             commands.push(command);
         }
@@ -359,6 +380,7 @@ impl<'a> Run<'a> {
                 now: &self.now,
                 command: &command,
                 planned: &Planned::default(),
+                timeout: None,
             });
             self.account.note_cancel(ticket, &self.now);
             commands.push(command);
@@ -373,22 +395,22 @@ impl<'a> Run<'a> {
             .extend(commands.into_iter().rev().map(Todo::Send));
     }
 
-    /// Waits until the executor's next decision time, or until the patience with an action ends.
+    /// Waits until the executor's next decision time, or until a warning or a time-out is due.
     fn wait(&mut self, until: Option<Rational>) -> Result<(), Stop> {
-        let silence = self.next_silence();
+        let timeout = self.next_timeout();
         // More of what happens now may still come in; if not, some condition has failed.
-        let breaking =
-            (!self.belief.breaking().is_empty()).then(|| &self.now + self.task.epsilon());
+        let breaking = self.belief.is_breaking();
+        let breaking = breaking.then(|| &self.now + self.task.epsilon());
         let warning = self.warn();
         let doubt = self.tend_foresight();
-        let until = until.into_iter().chain(silence).chain(breaking);
+        let until = until.into_iter().chain(timeout).chain(breaking);
         let taking_over = self.next_of_search();
         let until = until.chain(warning).chain(doubt).chain(taking_over).min();
         let Some(until) = until.map(|until| until.max(self.now.clone())) else {
             // Nothing is running, nothing is due, and the plan is not done.
             return self.replan(&Reason::new(Cause::Late).about(About::Nothing));
         };
-        self.agenda.push(Todo::GiveUpTheSilent);
+        self.agenda.push(Todo::CheckTimeouts);
         self.agenda.push(Todo::Pass(until));
         Ok(())
     }
@@ -439,11 +461,26 @@ impl<'a> Run<'a> {
             self.replans += 1;
             if self.replans > self.settings.most_replans {
                 self.replans -= 1;
-                return Err(Stop::Over(Verdict::ReplanLimit));
+                let overdue = self.longer_than_planned();
+                if overdue.is_empty() || self.settings.most_replans == 0 {
+                    return self.carry_on_or_stop(Verdict::ReplanLimit);
+                }
+                // Their ends may reach the goal.
+                self.reasons.pop();
+                self.agenda.push(Todo::Replan(reason.clone()));
+                let doubts = self.belief.doubt_count();
+                self.agenda.push(Todo::Linger(overdue, doubts));
+                return Ok(());
             }
         }
         self.lost.plan = true;
         self.agenda.push(Todo::Plan(reason.clone()));
+        if self.replans == self.settings.most_replans {
+            // The last plan is not spent on expecting overdue actions to take longer still.
+            let overdue = self.longer_than_planned();
+            let doubts = self.belief.doubt_count();
+            self.agenda.push(Todo::Linger(overdue, doubts));
+        }
         self.settle();
         Ok(())
     }

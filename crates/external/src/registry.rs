@@ -105,7 +105,11 @@ pub const REGISTRY: &[Registered] = &[
         how_to_get: "`pip install up-lpg` brings the program `up_lpg/lpg`; put its path into \
                      ELBOWROOM_LPG",
         habits: Habits {
-            unsolvable: &["the problem is unsolvable", "no plan will solve it"],
+            unsolvable: &[
+                "the problem is unsolvable",
+                "no plan will solve it",
+                "goals of the planning problem can not be reached",
+            ],
             gave_up: &["search limit exceeded", "max time exceeded", "no solution"],
             unsupported: &["syntax error", "not supported", "not yet handled"],
             missing: &[],

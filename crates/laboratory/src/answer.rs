@@ -275,7 +275,34 @@ impl CompareAnswer {
         }
         found.sort();
         let trials = found.into_iter().map(|(_, trial)| trial);
-        trials.take(most).collect()
+        let mut all = self.invalid_trials();
+        all.extend(trials.take(most));
+        all
+    }
+
+    /// Returns notes on the executions that the validator rejects: bugs of the program. Executions in worlds
+    /// without time are not validated.
+    pub fn invalid_notes(&self) -> Vec<String> {
+        match self {
+            Self::Timed(results) => results.invalid_notes(),
+            Self::Untimed(_) => Vec::new(),
+        }
+    }
+
+    /// The first invalid trial of each cell, as one more kind of failure.
+    fn invalid_trials(&self) -> Vec<FailedTrial> {
+        let Self::Timed(results) = self else {
+            return Vec::new();
+        };
+        let mut found = Vec::new();
+        for (row, cells) in results.cells.iter().enumerate() {
+            for (column, cell) in cells.iter().enumerate() {
+                let place = (row, column, cell.failures.kinds().len());
+                let first = cell.invalid.first.as_ref();
+                found.extend(first.map(|(id, _)| FailedTrial { place, id: *id }));
+            }
+        }
+        found
     }
 
     /// As JSON.

@@ -25,7 +25,7 @@ pub use beginnings::Beginning;
 pub use experiment::{Column, Experiment, ExperimentError, Planning, Published, Together};
 pub use failures::{Failure, Failures, TrialId};
 pub use optimum::ColumnOptimum;
-pub use results::{Cell, Pair, Results, ResultsError};
+pub use results::{Cell, Invalid, Pair, Results, ResultsError};
 
 use parts::Partial;
 use trials::Setting;

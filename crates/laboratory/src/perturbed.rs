@@ -62,6 +62,7 @@ struct Setting<'e> {
     perturbed: Option<PerturbedFacts>,
     foresight: OnceLock<Result<Foresighted, NoForesight>>,
     other_optima: OnceLock<Result<BTreeMap<OptimumRules, f64>, PerturbedError>>,
+    has_first_plan: OnceLock<bool>,
 }
 
 /// Makes the trials of each case, in each world, with each executor. `observe` is told how many are
@@ -216,6 +217,7 @@ impl<'e> Setting<'e> {
             perturbed,
             foresight: OnceLock::new(),
             other_optima: OnceLock::new(),
+            has_first_plan: OnceLock::new(),
         })
     }
 
@@ -249,10 +251,21 @@ impl<'e> Setting<'e> {
                 let actions = self.actions.clone();
                 let found = Foresighted::new(&self.task, actions, &self.likelihoods, settings);
                 let found = found.map_err(|error| self.no_table(&error))?;
-                Ok((rules, results::rounded(found.value())))
+                Ok((rules, results::rounded(self.optimum_of(&found))))
             });
             rules.collect()
         })
+    }
+
+    /// The value of a table at the beginning of a trial. A trial whose planner finds no first plan is lost, so
+    /// its optimum is 0.
+    fn optimum_of(&self, foresight: &Foresighted) -> f64 {
+        let find = || self.plans()(self.task.initial()).is_some();
+        if *self.has_first_plan.get_or_init(find) {
+            foresight.value()
+        } else {
+            0.0
+        }
     }
 
     fn patience(&self) -> DeadEnds {
@@ -372,7 +385,8 @@ impl<'e> Setting<'e> {
             },
             course,
         };
-        let mut row = Row::new(self.case, world, kind, foresight.map(Foresighted::value));
+        let optimum = foresight.map(|foresight| self.optimum_of(foresight));
+        let mut row = Row::new(self.case, world, kind, optimum);
         if world == WorldKind::Sound && !is_for_reading {
             row.other_optima = self.other_optima().clone()?;
         }

@@ -61,6 +61,8 @@ fn logs(experiment: &Experiment, count: u64, first: u64) -> Vec<Log> {
     let task = Arc::new(Task::new(problem));
     let model = WorldModel::read(world.as_str(), task.problem()).expect("it is a world");
     let limits = Limits {
+        work: u64::MAX,
+        patience: 1,
         most_states: 2_000,
         improve_states: 256,
         other_states: 10_000,

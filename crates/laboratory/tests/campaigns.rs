@@ -1,6 +1,7 @@
 //! Experiments: the same result for any number of threads, and parts that add up.
 
 use elbowroom_laboratory::compare::{Experiment, Part, Results, run};
+use elbowroom_num::Rational;
 
 /// A file of the project, by its path from the root.
 fn read(path: &str) -> String {
@@ -152,6 +153,7 @@ fn the_fingerprint_of_an_experiment_depends_on_what_it_says_and_stays() {
         made(&|experiment| experiment.columns.reverse()),
         made(&|experiment| experiment.settings.most_replans += 1),
         made(&|experiment| experiment.planner_states += 1),
+        made(&|experiment| experiment.planning_budget = 3.into()),
     ];
     let different: std::collections::BTreeSet<_> = others.iter().chain([&same]).collect();
     assert_eq!(different.len(), others.len() + 1);
@@ -168,4 +170,85 @@ fn who_is_interrupted_while_getting_ready_makes_no_trial() {
     assert!(results.is_interrupted);
     let mut cells = results.cells.iter().flatten();
     assert!(cells.all(|cell| cell.runs == 0), "{:?}", results.cells);
+}
+
+/// The towers of Hanoi with seven discs, which take more than a few states.
+const HANOI: &str = "(define (domain hanoi) (:requirements :durative-actions)
+  (:predicates (clear ?x) (on ?x ?y) (fits ?x ?y) (hand))
+  (:durative-action move :parameters (?disc ?from ?to) :duration (= ?duration 1)
+    :condition (and (at start (hand)) (at start (clear ?disc)) (at start (clear ?to))
+      (at start (on ?disc ?from)) (at start (fits ?disc ?to)))
+    :effect (and (at start (not (hand))) (at end (hand)) (at start (not (on ?disc ?from)))
+      (at end (clear ?from)) (at start (not (clear ?to))) (at end (on ?disc ?to)))))";
+
+/// The problem of [`HANOI`]: all discs lie on `p`, and belong on `r`.
+fn hanoi() -> String {
+    let smaller_on_larger = |disc: u32| format!("(on d{disc} d{})", disc + 1);
+    let tower: Vec<String> = (1..7).map(smaller_on_larger).collect();
+    let fits = |disc: u32| {
+        let places = ["p", "q", "r"].map(str::to_owned).into_iter();
+        let supports = places.chain((disc + 1..=7).map(|larger| format!("d{larger}")));
+        supports.map(move |support| format!("(fits d{disc} {support})"))
+    };
+    let fits: Vec<String> = (1..=7).flat_map(fits).collect();
+    let (tower, fits) = (tower.join(" "), fits.join(" "));
+    format!(
+        "(define (problem seven) (:domain hanoi) (:objects p q r d1 d2 d3 d4 d5 d6 d7)
+         (:init (hand) (clear d1) (clear q) (clear r) (on d7 p) {tower} {fits})
+         (:goal (and (on d7 r) {tower})))"
+    )
+}
+
+#[test]
+fn missing_first_plan_names_the_limit_as_the_file_does() {
+    let with = |change: &dyn Fn(&mut Experiment)| {
+        let mut experiment = experiment();
+        HANOI.clone_into(&mut experiment.domain);
+        experiment.problem = hanoi();
+        experiment.blanks.clear();
+        change(&mut experiment);
+        match run(&experiment, WHOLE, &|_| true) {
+            Ok(_) => panic!("there is a plan"),
+            Err(error) => error.to_string(),
+        }
+    };
+    let states = with(&|experiment| experiment.planner_states = 2);
+    assert!(states.contains("(`planner_states`)"), "{states}");
+    let budget = with(&|experiment| experiment.planning_budget = Rational::new(1, 1_000_000));
+    assert!(budget.contains("(`planning_budget`)"), "{budget}");
+}
+
+/// After an interruption, a search for a plan ends without one, which says nothing about executors.
+#[test]
+fn interrupted_trial_does_not_count() {
+    let experiment = experiment();
+    let successes = |part, goes_on: &(dyn Fn(u64) -> bool + Sync)| {
+        let results = run(&experiment, part, goes_on).expect("a correct test");
+        let cells = results.cells.into_iter().flatten();
+        let counts: Vec<_> = cells.map(|cell| (cell.runs, cell.successes)).collect();
+        (counts, results.is_interrupted)
+    };
+    let whole: Vec<_> = (1..=WHOLE.trials)
+        .map(|trials| successes(Part { trials, ..WHOLE }, &|_| true).0)
+        .collect();
+    let mut runs = std::collections::BTreeSet::new();
+    let mut most = 100;
+    loop {
+        let asked = std::sync::atomic::AtomicU64::new(0);
+        let for_a_while = |_| asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < most;
+        let (counts, is_interrupted) = successes(WHOLE, &for_a_while);
+        for (place, count) in counts.iter().enumerate() {
+            runs.insert(count.0);
+            let trials = usize::try_from(count.0).expect("few trials");
+            if trials > 0 {
+                let uninterrupted = whole[trials - 1][place];
+                assert_eq!(*count, uninterrupted, "after {most} questions");
+            }
+        }
+        if !is_interrupted {
+            break;
+        }
+        most += most / 3;
+    }
+    assert!(runs.len() > 2, "{runs:?}");
 }

@@ -88,3 +88,63 @@ fn choices_do_not_depend_on_the_number_of_threads() {
     let (one, many) = (results(&read, 1, 12), results(&read, 5, 12));
     assert_eq!(one.cells, many.cells);
 }
+
+const DOMAIN: &str = "
+    (define (domain d) (:requirements :durative-actions)
+      (:predicates (done))
+      (:durative-action quick :parameters () :duration (= ?duration 1) :condition () :effect (at end (done)))
+      (:durative-action slow :parameters () :duration (= ?duration 5) :condition () :effect (at end (done))))";
+const EXPERIMENT: &str = r#"
+    format = "elbowroom-experiment"
+    version = 1
+    title = "Given plan"
+    domain = "d"
+    problem = "p"
+    trials = 3
+    max_replans = 0
+    executors = ["guarded", "live", "stn"]
+    plan = "x"
+    [[column]]
+    name = "w"
+    world = "w"
+"#;
+
+/// The experiment with this plan: `quick` always fails.
+fn with_plan(plan: &str) -> Experiment {
+    let file = |name: &str| {
+        Ok(match name {
+            "d" => DOMAIN,
+            "p" => "(define (problem p) (:domain d) (:init) (:goal (done)))",
+            "x" => plan,
+            _ => {
+                "format = \"elbowroom-world\"\nversion = 1\n[[failure]]\naction = \"quick\"\nprobability = 1.0\n"
+            }
+        }
+        .to_owned())
+    };
+    Experiment::read(Source::new("given", EXPERIMENT), &file).expect("it is an experiment")
+}
+
+#[test]
+fn every_executor_begins_with_the_plan_that_the_experiment_names() {
+    for (plan, successes) in [("0: (slow) [5]", 3), ("0: (quick) [1]", 0)] {
+        let results = results(&with_plan(plan), 1, 3);
+        assert!(
+            (results.cells.iter().flatten()).all(|cell| cell.successes == successes),
+            "{plan}"
+        );
+    }
+}
+
+#[test]
+fn plan_that_is_not_valid_for_the_problem_is_refused() {
+    let part = Part {
+        trials: 1,
+        shard: 0,
+        shards: 1,
+        jobs: 1,
+    };
+    let refused = run(&with_plan("0: (slow) [4]"), part, &|_| true);
+    let error = refused.expect_err("the duration is wrong").to_string();
+    assert!(error.contains("`plan` is not valid"), "{error}");
+}

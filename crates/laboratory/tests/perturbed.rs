@@ -343,3 +343,44 @@ fn kinds_of_failure_are_the_same_whether_an_experiment_is_made_at_once_or_in_par
         .collect();
     assert_eq!(PerturbedResults::merged(&parts).unwrap(), whole);
 }
+
+#[test]
+fn optimum_is_0_where_the_trials_find_no_first_plan() {
+    let text = r#"
+        format = "elbowroom-perturbed-experiment"
+        version = 1
+        title = "No first plan"
+        domain = "d"
+        problem = "p"
+        trials = 5
+        seed = 1
+        rounds = 10
+        worlds = ["sound"]
+        executors = ["lookahead"]
+        [optimum]
+        [[case]]
+        name = "c"
+        likelihoods = "l"
+    "#;
+    let file = |name: &str| {
+        Ok(match name {
+            "d" => {
+                "(define (domain d) (:requirements :durative-actions) (:predicates (ready) (done))
+                   (:durative-action work :parameters () :duration (= ?duration 1)
+                     :condition (at start (ready)) :effect (at end (done))))"
+            }
+            "p" => "(define (problem p) (:domain d) (:init) (:goal (done)))",
+            // The facts change by themselves, so an agent that waits may be lucky.
+            _ => {
+                "format = \"elbowroom-likelihoods\"\nversion = 1\n[defaults]\nbecomes_true = 0.1\n\
+                 becomes_false = 0.1\nstart = 1.0\neffect = 1.0\nend = 1.0\n"
+            }
+        }
+        .to_owned())
+    };
+    let experiment = PerturbedExperiment::read(text, &file).unwrap();
+    let results = perturbed::run(&experiment, part(5, 1), &|_| true).unwrap();
+    for row in &results.rows {
+        assert_eq!(row.optimum, Some(0.0), "{row:?}");
+    }
+}

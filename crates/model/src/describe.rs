@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 use elbowroom_num::Rational;
 
 use crate::constraint::Modal;
-use crate::ground::{Condition, Expression};
-use crate::problem::Unknown;
+use crate::ground::{Action, Condition, Expression};
+use crate::problem::{self, ObjectId, Unknown, Variable};
 use crate::task::Task;
+use crate::terms::resolve;
 
 impl Task {
     /// The condition as PDDL writes it: `(and (at r a) (>= (charge r) 5))`.
@@ -15,6 +16,109 @@ impl Task {
         let mut text = String::new();
         self.write_condition(condition, &mut text);
         text
+    }
+
+    /// A conjunct of an action's condition, or of the goal (`None`), as PDDL writes it, equalities
+    /// of objects included: `(not (= a a))`. Instantiation decides these, so a ground condition has
+    /// only their truth, and their names come from the domain.
+    pub fn describe_condition_of(&self, action: Option<&Action>, conjunct: &Condition) -> String {
+        let problem = self.problem();
+        let lifted: Vec<&problem::Condition> = match action {
+            None => vec![&problem.goal],
+            Some(action) => match &problem.schemas[action.schema.index()].body {
+                problem::Body::Instantaneous { condition, .. } => vec![condition],
+                problem::Body::Durative {
+                    at_start,
+                    over_all,
+                    at_end,
+                    ..
+                } => vec![at_start, over_all, at_end],
+            },
+        };
+        let arguments = action.map_or(&[][..], |action| &action.arguments);
+        let written = || {
+            let mut lifted = lifted.into_iter();
+            lifted.find_map(|part| self.written(part, &mut arguments.to_vec(), conjunct))
+        };
+        let is_decided = is_partly_decided(conjunct);
+        let written = is_decided.then(written).flatten();
+        written.unwrap_or_else(|| self.describe_condition(conjunct))
+    }
+
+    /// The text of the conjunct of `lifted` whose ground form is `wanted`.
+    fn written(
+        &self,
+        lifted: &problem::Condition,
+        binding: &mut Vec<ObjectId>,
+        wanted: &Condition,
+    ) -> Option<String> {
+        match lifted {
+            problem::Condition::And(parts) => {
+                let mut parts = parts.iter();
+                parts.find_map(|part| self.written(part, binding, wanted))
+            }
+            problem::Condition::Forall(variables, part) => {
+                let mut bindings = self.bindings(variables, binding).into_iter();
+                bindings.find_map(|mut binding| self.written(part, &mut binding, wanted))
+            }
+            _ => (self.ground(lifted, binding) == *wanted).then(|| {
+                let mut text = String::new();
+                self.write_lifted(lifted, binding, &mut text);
+                text
+            }),
+        }
+    }
+
+    fn ground(&self, lifted: &problem::Condition, binding: &mut Vec<ObjectId>) -> Condition {
+        self.grounding(|grounder| grounder.ground_condition(lifted, binding))
+    }
+
+    /// The binding with objects for these variables appended, in each possible way.
+    fn bindings(&self, variables: &[Variable], binding: &mut Vec<ObjectId>) -> Vec<Vec<ObjectId>> {
+        let mut bindings = Vec::new();
+        self.grounding(|grounder| {
+            grounder.for_all(variables, binding, &mut |_, binding| {
+                bindings.push(binding.clone());
+            });
+        });
+        bindings
+    }
+
+    fn write_lifted(
+        &self,
+        lifted: &problem::Condition,
+        binding: &mut Vec<ObjectId>,
+        text: &mut String,
+    ) {
+        use problem::Condition as Lifted;
+        let parts: Vec<(&Lifted, Vec<ObjectId>)> = match lifted {
+            Lifted::Atom(_) | Lifted::Compare(..) => {
+                return self.write_condition(&self.ground(lifted, binding), text);
+            }
+            Lifted::Equal(left, right) => {
+                let objects = [resolve(*left, binding), resolve(*right, binding)];
+                text.push_str(&self.problem().apply_name("=", &objects));
+                return;
+            }
+            Lifted::Not(part) => vec![(part, binding.clone())],
+            Lifted::And(parts) | Lifted::Or(parts) => {
+                parts.iter().map(|part| (part, binding.clone())).collect()
+            }
+            Lifted::Forall(variables, part) | Lifted::Exists(variables, part) => {
+                let bindings = self.bindings(variables, binding).into_iter();
+                bindings.map(|binding| (&**part, binding)).collect()
+            }
+        };
+        text.push_str(match lifted {
+            Lifted::Not(_) => "(not",
+            Lifted::And(_) | Lifted::Forall(..) => "(and",
+            _ => "(or",
+        });
+        for (part, mut binding) in parts {
+            text.push(' ');
+            self.write_lifted(part, &mut binding, text);
+        }
+        text.push(')');
     }
 
     /// The expression as PDDL writes it: `(* (rate r) ?duration)`.
@@ -117,6 +221,17 @@ impl Task {
                 .unwrap_or_else(|| format!("?unknown{position}")),
             Unknown::Action(position) => format!("?unknown{position}"),
             Unknown::Parameter(position) => format!("?parameter{position}"),
+        }
+    }
+}
+
+/// Returns `true` if a part of the condition has been decided when it was instantiated.
+fn is_partly_decided(condition: &Condition) -> bool {
+    match condition {
+        Condition::Fact(_) | Condition::Compare(..) => false,
+        Condition::Not(part) => is_partly_decided(part),
+        Condition::And(parts) | Condition::Or(parts) => {
+            parts.is_empty() || parts.iter().any(is_partly_decided)
         }
     }
 }

@@ -4,6 +4,8 @@
 
 use std::sync::Arc;
 
+use elbowroom_num::Rational;
+
 use crate::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
 
 /// A ground atom, as a position in its task's table.
@@ -223,6 +225,24 @@ pub struct DurativeBody {
     pub end: Arc<SnapAction>,
     /// Change while it runs.
     pub continuous: Vec<ContinuousEffect>,
+    /// Whether this is the rest of an action that began before time 0 ([`RunningAction::rest`]). Its start is time 0 then,
+    /// and nobody chooses another.
+    ///
+    /// [`RunningAction::rest`]: crate::RunningAction::rest
+    pub is_under_way: bool,
+}
+
+impl DurativeBody {
+    /// Returns `true` unless a constant bound excludes a duration of 0. With that duration no moment lies
+    /// between start and end, so the over-all condition is vacuous.
+    pub fn may_take_no_time(&self) -> bool {
+        self.duration
+            .iter()
+            .all(|constraint| match &constraint.bound {
+                Expression::Constant(bound) => constraint.comparison.holds(&Rational::ZERO, bound),
+                _ => true,
+            })
+    }
 }
 
 /// `?duration comparison bound`.
@@ -284,6 +304,7 @@ impl Action {
                         rate: effect.rate.map_leaves(replace),
                     })
                     .collect(),
+                is_under_way: body.is_under_way,
             }),
         };
         Self {
@@ -292,6 +313,51 @@ impl Action {
             name: self.name.clone(),
             body,
         }
+    }
+
+    /// Returns the action with its planned duration in place of every `?duration` that is read before
+    /// the end, or `None` if there is none.
+    ///
+    /// The real duration is unknown until the action ends. So start and over-all conditions, start
+    /// effects, rates, and guards that are decided before the end read the planned duration. End
+    /// conditions and end effects read the real one.
+    #[must_use]
+    pub fn with_planned_duration(&self, planned: &elbowroom_num::Rational) -> Option<Self> {
+        let Body::Durative(body) = &self.body else {
+            return None;
+        };
+        let mut is_read = false;
+        let mut replace = |leaf: &Expression| match leaf {
+            Expression::Duration => {
+                is_read = true;
+                Some(Expression::Constant(planned.clone()))
+            }
+            _ => None,
+        };
+        let start = body.start.map_leaves(&mut replace);
+        let over_all = body.over_all.map_leaves(&mut replace);
+        let mut end = SnapAction::clone(&body.end);
+        for effect in &mut end.effects {
+            effect.guard.at_start = effect.guard.at_start.map_leaves(&mut replace);
+            effect.guard.over_all = effect.guard.over_all.map_leaves(&mut replace);
+        }
+        let continuous = body.continuous.iter().map(|effect| ContinuousEffect {
+            guard: effect.guard.map_leaves(&mut replace),
+            fluent: effect.fluent,
+            rate: effect.rate.map_leaves(&mut replace),
+        });
+        let continuous = continuous.collect();
+        is_read.then(|| Self {
+            body: Body::Durative(DurativeBody {
+                duration: body.duration.clone(),
+                start: Arc::new(start),
+                over_all,
+                end: Arc::new(end),
+                continuous,
+                is_under_way: body.is_under_way,
+            }),
+            ..self.clone()
+        })
     }
 }
 

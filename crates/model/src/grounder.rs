@@ -127,6 +127,7 @@ impl<'a> Grounder<'a> {
                 over_all: self.expand(over_all, binding, known),
                 end: Arc::new(self.ground_snap(at_end, end_effects, binding, known)),
                 continuous: self.ground_continuous(continuous, binding, known),
+                is_under_way: false,
             }),
         };
         let name = problem.apply_name(&problem.schemas[schema.index()].name, arguments);

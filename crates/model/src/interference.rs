@@ -92,6 +92,16 @@ impl Footprint {
         footprint
     }
 
+    /// Adds all that another happening reads and writes.
+    pub fn include(&mut self, other: Self) {
+        self.reads.extend(other.reads);
+        self.adds.extend(other.adds);
+        self.deletes.extend(other.deletes);
+        self.reads_fluents.extend(other.reads_fluents);
+        self.shifts.extend(other.shifts);
+        self.assigns.extend(other.assigns);
+    }
+
     /// Whether the two must not happen at the same time.
     pub fn interferes_with(&self, other: &Self) -> bool {
         self.disturbs(other) || other.disturbs(self)
@@ -100,12 +110,6 @@ impl Footprint {
     /// Whether this writes what `other` reads, or writes the opposite of what `other` writes.
     fn disturbs(&self, other: &Self) -> bool {
         self.writes_what_is_read_by(other) || self.contradicts(other)
-    }
-
-    /// Whether the two write the opposite of each other, or what does not commute, whatever they
-    /// read.
-    pub fn overwrites(&self, other: &Self) -> bool {
-        self.contradicts(other) || other.contradicts(self)
     }
 
     /// Whether this writes the opposite of what `other` writes.

@@ -5,11 +5,16 @@ use crate::problem::{ObjectId, Problem, Variable};
 use crate::task::Task;
 
 impl Task {
-    /// The fact that `(predicate object …)` names, in any letter case. `None` if the problem has no
-    /// such predicate or objects, or their types do not fit.
+    /// The fact that `(predicate object …)` names, or `(= (function object …) object)` for a function whose values
+    /// are objects, in any letter case. `None` if the problem has no such predicate or objects, or their types do not
+    /// fit.
     pub fn fact_named(&self, name: &str) -> Option<FactId> {
-        let (name, objects) = words(name, &self.problem)?;
+        let equation = equation(name);
+        let (name, objects) = words(equation.as_deref().unwrap_or(name), &self.problem)?;
         let predicate = self.problem.predicate(&name)?;
+        if equation.is_some() && !self.problem.object_functions.contains(&predicate) {
+            return None;
+        }
         let parameters = &self.problem.predicates[predicate.index()].parameters;
         fit(&objects, parameters, &self.problem)
             .then(|| self.grounding(|grounder| grounder.fact(predicate, &objects)))
@@ -23,6 +28,14 @@ impl Task {
         fit(&objects, parameters, &self.problem)
             .then(|| self.grounding(|grounder| grounder.fluent(function, &objects)))
     }
+}
+
+/// Returns `function object … value` for `(= (function object …) value)`, and `None` for anything else.
+fn equation(name: &str) -> Option<String> {
+    let inside = name.trim().strip_prefix('(')?.strip_suffix(')')?;
+    let (application, value) = inside.trim().strip_prefix('=')?.split_once(')')?;
+    let application = application.trim().strip_prefix('(')?;
+    Some(format!("{application} {value}"))
 }
 
 /// The first word, and the objects that the others name.
@@ -45,7 +58,7 @@ mod tests {
     use std::thread;
 
     use super::Task;
-    use crate::problem::{Object, Predicate, Problem, Type, TypeId, Variable};
+    use crate::problem::{Object, Predicate, PredicateId, Problem, Type, TypeId, Variable};
 
     /// A predicate of two objects, and a hundred objects; nothing holds.
     fn task() -> Task {
@@ -86,6 +99,25 @@ mod tests {
         assert_eq!(task.fact_named("(near o1 o2)"), Some(first));
         assert_eq!(clone.fact_name(second), "(near o2 o1)");
         assert_eq!((task.fact_count(), clone.fact_count()), (2, 2));
+    }
+
+    #[test]
+    fn fact_of_a_function_with_objects_as_values_is_found_by_its_own_name() {
+        let mut problem = task().problem().clone();
+        problem.object_functions = [PredicateId::from(0)].into();
+        let task = Task::new(problem);
+        let fact = task.fact_named("(= (NEAR o1) o2)");
+        let fact = fact.expect("objects of the problem");
+        assert_eq!(task.fact_name(fact), "(= (near o1) o2)");
+        for name in [
+            "(= near o1 o2)",
+            "(= (near o1))",
+            "(= (near) o1)",
+            "(= (near o1) o100)",
+            "(= (far o1) o2)",
+        ] {
+            assert_eq!(task.fact_named(name), None, "{name}");
+        }
     }
 
     #[test]

@@ -1,10 +1,13 @@
 //! Plans with fixed times, as planners print them.
 
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_num::Rational;
 
 use crate::ground::Action;
+use crate::problem::{ObjectId, SchemaId};
 
 /// Actions with start times and durations.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,6 +41,14 @@ impl Step {
         steps.sort_by(|one, other| one.start.cmp(&other.start));
     }
 
+    /// Compares two steps by start, then by name, then by duration.
+    pub fn order(&self, other: &Self) -> Ordering {
+        let by_start = self.start.cmp(&other.start);
+        by_start
+            .then_with(|| self.action.name.cmp(&other.action.name))
+            .then_with(|| self.duration.cmp(&other.duration))
+    }
+
     /// The end time; its start, for an instantaneous action.
     pub fn end(&self) -> Rational {
         match &self.duration {
@@ -52,13 +63,37 @@ impl TimeTriggeredPlan {
     /// which a file lists those says nothing.
     #[must_use]
     pub fn in_order(mut self) -> Self {
-        self.steps.sort_by(|one, other| {
-            let by_name = || one.action.name.cmp(&other.action.name);
-            let by_duration = || one.duration.cmp(&other.duration);
-            let by_start = one.start.cmp(&other.start);
-            by_start.then_with(by_name).then_with(by_duration)
-        });
+        self.steps.sort_by(Step::order);
         self
+    }
+
+    /// Returns two steps of one ground action that overlap, by position, or `None` if no action overlaps
+    /// itself.
+    ///
+    /// Two steps overlap if each of them starts before the other one has ended. One that starts when the
+    /// other one ends does not overlap it, and neither does an instantaneous action. Of all such pairs, the
+    /// one is returned whose later step starts first.
+    pub fn self_overlap(&self) -> Option<[usize; 2]> {
+        let mut order: Vec<usize> = (0..self.steps.len()).collect();
+        order.sort_by(|&one, &other| self.steps[one].start.cmp(&self.steps[other].start));
+        // For each action, the earlier step that ends last.
+        let mut last: BTreeMap<(SchemaId, &[ObjectId]), usize> = BTreeMap::new();
+        for later in order {
+            let step = &self.steps[later];
+            if step.duration.is_none() {
+                continue;
+            }
+            let key = (step.action.schema, step.action.arguments.as_slice());
+            let earlier = last.entry(key).or_insert(later);
+            let other = &self.steps[*earlier];
+            if *earlier != later && step.start < other.end() && other.start < step.end() {
+                return Some([*earlier, later]);
+            }
+            if other.end() < step.end() {
+                *earlier = later;
+            }
+        }
+        None
     }
 
     /// The time of the last happening of the plan's actions; 0 for an empty plan.

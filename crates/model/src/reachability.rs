@@ -7,6 +7,7 @@
 //! An instantaneous action is reached when its condition is possible; a durative action starts
 //! when its condition at start and its duration are, and is reached when the conditions over all
 //! and at end are possible too, which may take what its own start or other actions bring about.
+//! The condition over all need not be possible if the duration may be 0.
 //! A condition is possible when each fact that it reads has the truth value asked for at some
 //! time, by the initial state, timed initials or reached actions; comparisons of numbers that
 //! nothing reached changes are evaluated, others count as possible. An action that can start but

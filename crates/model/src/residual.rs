@@ -91,6 +91,7 @@ impl RunningAction {
                 over_all: body.over_all,
                 end: body.end,
                 continuous: body.continuous,
+                is_under_way: true,
             }),
             ..action
         }

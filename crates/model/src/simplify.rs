@@ -161,13 +161,16 @@ impl Action {
         self
     }
 
-    /// Whether some condition of the action is the empty disjunction.
+    /// Returns `true` if a condition of the action is the empty disjunction. An over-all condition does
+    /// not count where the duration may be 0.
     pub fn is_contradiction(&self) -> bool {
         match &self.body {
             Body::Instantaneous(snap) => snap.condition.is_contradiction(),
-            Body::Durative(body) => [&body.start.condition, &body.over_all, &body.end.condition]
-                .into_iter()
-                .any(Condition::is_contradiction),
+            Body::Durative(body) => {
+                body.start.condition.is_contradiction()
+                    || body.end.condition.is_contradiction()
+                    || body.over_all.is_contradiction() && !body.may_take_no_time()
+            }
         }
     }
 }

@@ -40,6 +40,7 @@ mod autonomous;
 mod cells;
 mod display;
 mod effects;
+mod execution;
 mod explain;
 mod instant;
 mod interference;
@@ -62,6 +63,7 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
+pub use execution::{Execution, MeasuredAmount};
 pub use margin::Margin;
 pub use preferences::{Preferences, ViolatedPreference};
 pub use violation::{
@@ -76,6 +78,10 @@ use crate::state::State;
 use crate::task::Task;
 
 /// Settings of the validator.
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a rule of its own, on or off"
+)]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Whether interfering happenings must be [`Task::epsilon`] apart. If not, they only must not
@@ -85,18 +91,23 @@ pub struct Settings {
     /// that group, and happen at its time; durations may miss their bounds by it, strict bounds
     /// excepted.
     pub tolerance: Rational,
-    /// By how much comparisons of numbers may fail, strict ones by less. VAL allows a
-    /// ten-thousandth, whatever its `-t`.
+    /// Tolerance of numeric comparisons in conditions of one moment. Strict comparisons fail at exactly
+    /// the slack. Under `not` it makes the condition harder to satisfy. Over-all conditions have no
+    /// slack. VAL uses 0.0001 for each `-t`.
     pub slack: Rational,
     /// Whether timed initials after the last happening of the plan's actions count, so that the
     /// goal holds after all of them. That is the meaning in the field (VAL, unified-planning and
     /// Tamer agree), and what networks, envelopes, planner and executors rely on. Without it, the
     /// goal is read after the last happening of the plan's actions.
     pub counts_later_timed: bool,
-    /// Whether happenings of one time interfere only if they write the same. Their conditions read
-    /// the state before in any case; with this, another happening of that time may change what they
-    /// read, as unified-planning has it for problems without an ε.
+    /// Allows happenings of one time to change facts and numbers that others of that time read. All conditions
+    /// read the state before. Contradictory writes are refused by
+    /// [`refuses_equal_writes`](Self::refuses_equal_writes). This is the rule of unified-planning for problems
+    /// without an ε.
     pub allows_simultaneous_reads: bool,
+    /// Refuses that two steps, or a step and a timed initial, write the same fact at one time, even the same
+    /// value. This is the rule of unified-planning; PDDL 2.1 allows equal writes.
+    pub refuses_equal_writes: bool,
 }
 
 impl Default for Settings {
@@ -109,6 +120,7 @@ impl Default for Settings {
             slack: Rational::ZERO,
             counts_later_timed: true,
             allows_simultaneous_reads: false,
+            refuses_equal_writes: false,
         }
     }
 }
@@ -125,13 +137,19 @@ impl Settings {
     }
 
     /// What unified-planning does with a problem without an ε: what happens at one time reads the
-    /// state before, and nothing needs to be apart.
+    /// state before, nothing needs to be apart, and no two steps write the same fact at one time.
     pub fn like_unified_planning() -> Self {
         Self {
             needs_separation: false,
             allows_simultaneous_reads: true,
+            refuses_equal_writes: true,
             ..Self::default()
         }
+    }
+
+    /// Returns `true` if a happening at `later` belongs to the group that begins at `first`.
+    pub fn counts_as_equal(&self, first: &Rational, later: &Rational) -> bool {
+        later - first <= self.group_width()
     }
 
     /// How much later than the first of its group a happening can be.

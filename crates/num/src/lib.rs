@@ -13,6 +13,7 @@
 //! - [`chance`]: how likely a random number lies in an interval, and linear bounds on the logarithm
 //!   of that.
 //! - [`simplex`]: systems of linear inequalities, decided and optimised exactly, with proofs.
+//! - [`work`]: how much work was done, counted in the same way on every machine.
 //!
 //! No planning word occurs in this crate.
 //!
@@ -34,6 +35,7 @@ mod interval;
 mod rational;
 pub mod simplex;
 mod total;
+pub mod work;
 
 pub use delta::Delta;
 pub use denominator::CommonDenominator;

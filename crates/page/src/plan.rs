@@ -11,6 +11,7 @@ use elbowroom::answers::envelope::{
     Counterexample, EnvelopeAnswer, EnvelopeFinding, Failing, Room, Stop,
 };
 use elbowroom::answers::plan::{PlanAnswer, PlanFinding};
+use elbowroom::execution::run::TimeoutRule;
 use elbowroom::report::short::nearest;
 
 use crate::document::{
@@ -31,6 +32,7 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
         ("plan".to_owned(), answer.plan.clone()),
         ("guarantee".to_owned(), word(&answer.settings.guarantee)),
         ("epsilon".to_owned(), nearest(&answer.settings.epsilon)),
+        ("time-out".to_owned(), answer.settings.timeout.in_words()),
     ];
     let mut sections = Vec::new();
     let verdict = match &answer.finding {
@@ -58,13 +60,19 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
                     .as_ref()
                     .map(|it| Section::Table(times(it, "in the envelope"))),
             );
-            good(match stop {
-                Stop::Converged => {
-                    "The plan works as long as each quantity stays inside its interval, whatever the others do in theirs."
-                }
-                _ => {
-                    "The plan works as long as each quantity stays inside its interval. The search was ended early: wider intervals may do, too."
-                }
+            let has_timeouts = answer.settings.timeout != TimeoutRule::Off;
+            let before = if has_timeouts {
+                " and each action ends before its time-out"
+            } else {
+                ""
+            };
+            good(&match stop {
+                Stop::Converged => format!(
+                    "The plan works as long as each quantity stays inside its interval{before}, whatever the others do in theirs."
+                ),
+                _ => format!(
+                    "The plan works as long as each quantity stays inside its interval{before}. The search was ended early: wider intervals may also do."
+                ),
             })
         }
         EnvelopeFinding::Inside { parameters } => {
@@ -147,7 +155,7 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
             ))
         }
         PlanFinding::NoPlan { reason, .. } => bad(&format!("There is no plan: {reason}")),
-        PlanFinding::None { reason } => Verdict {
+        PlanFinding::None { reason, .. } => Verdict {
             tone: Tone::Plain,
             words: format!("It is not known whether there is a plan: {reason}"),
         },
@@ -351,6 +359,9 @@ fn details(
         "may take",
         format!("{lower} to {upper} ({})", room.range.quantity.name).into(),
     ));
+    if let Some(timeout) = &room.range.timeout {
+        details.push(("times out after", nearest(timeout).into()));
+    }
     let limits = [
         ("not less, because", &room.lower_limit),
         ("not more, because", &room.upper_limit),

@@ -41,6 +41,7 @@ pub(crate) enum Record {
 ///
 /// The problem is read for types of objects, deadlines and the values of numbers; if it cannot be,
 /// the page does without them.
+#[allow(clippy::too_many_lines, reason = "the page from top to bottom")]
 pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record) -> Document {
     let mut texts = Texts::default();
     let task = task(spec).map(Arc::new);
@@ -124,6 +125,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         ("executor".to_owned(), spec.executor.to_string()),
         ("seed".to_owned(), spec.seed.to_string()),
         ("planner".to_owned(), spec.planner.clone()),
+        ("time-out".to_owned(), spec.timeout.in_words()),
         ("trace".to_owned(), name.to_owned()),
     ];
     let not_shown = not_shown(stored, left_out);

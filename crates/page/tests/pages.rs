@@ -113,7 +113,7 @@ fn the_page_of_an_envelope_has_each_action_and_each_interval() {
             for end in [cell(3), cell(4)].into_iter().flatten() {
                 assert!(interval.contains(&end), "{case}: {end} is rounded outwards");
             }
-            let limit = words(&document, &row[6]);
+            let limit = words(&document, &row[7]);
             assert_eq!(limit, room.upper_limit.as_deref().unwrap_or_default());
         }
     }
@@ -261,11 +261,15 @@ fn a_journal_that_begins_anew_has_a_page_with_the_starts_from_before() {
         ordered: exact(began),
         started: Some(exact(began)),
         heard: None,
+        completion: None,
+        timed_out: None,
+        in_doubt: false,
         ended: None,
         outcome: None,
         why: None,
         cancelled: None,
         warned: None,
+        warned_timeout: None,
         measured_at_start: IndexMap::new(),
         measured_at_end: IndexMap::new(),
     };

@@ -53,5 +53,8 @@ mod syntax;
 pub use elbowroom_text::{Diagnostic, Diagnostics, Label, Severity, Source};
 pub use feature::{Feature, is_unsupported};
 pub use lower::{read_goal, read_problem};
-pub use plan_text::{LineKind, read_plan, write_plan};
+pub use plan_text::{
+    LineKind, PrintedPlan, PrintedStep, read_plan, read_printed_plan, write_plan,
+    write_rounded_plan,
+};
 pub use problem_text::{ProblemText, WriteProblemError, end_times, write_problem};

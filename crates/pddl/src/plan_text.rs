@@ -1,10 +1,18 @@
 //! Plans as planners print them.
 
 mod duration;
+mod form;
 mod line;
+mod lines;
+mod near;
+mod printed;
 mod read;
+mod step;
+mod timing;
+mod vocabulary;
 mod write;
 
 pub use line::LineKind;
-pub use read::read_plan;
-pub use write::write_plan;
+pub use printed::{PrintedPlan, PrintedStep};
+pub use read::{read_plan, read_printed_plan};
+pub use write::{write_plan, write_rounded_plan};

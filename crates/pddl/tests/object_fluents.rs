@@ -3,7 +3,7 @@
 mod reading;
 
 use elbowroom_model::validate::{Settings, Verdict, validate};
-use elbowroom_model::{Situation, Task};
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_pddl::{ProblemText, Source, read_plan, read_problem, write_problem};
 use insta::assert_snapshot;
 use reading::{mistakes, task};
@@ -34,7 +34,13 @@ fn said(goal: &str, plan: &str) -> String {
         &Source::new("domain.pddl", DOMAIN),
         &problem(&format!("(:goal {goal})")),
     );
-    let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a plan");
+    let plan = if plan.is_empty() {
+        TimeTriggeredPlan::default()
+    } else {
+        read_plan(&Source::new("plan", plan), &task)
+            .expect("a plan")
+            .0
+    };
     match validate(&task, &plan, &Settings::default()) {
         Verdict::Valid(report) => {
             let facts = report.state.facts.iter().map(|fact| task.fact_name(*fact));

@@ -171,10 +171,10 @@ fn a_wrong_action_is_shown_with_what_is_expected() {
 #[test]
 fn a_broken_line_is_a_mistake_not_noise() {
     assert_snapshot!(
-        mistakes("0.0: (snap b1\n1: snap b1\n2: (wait) [3\n-1: (snap b1)\n4: (wait) [x]\n1e999: (snap b1)"),
+        mistakes("0.0: (snap b1\n1: (snap b1) twice\n2: (wait) [3\n-1: (snap b1)\n4: (wait) [x]\n1e999: (snap b1)"),
         @r"
     plan:1:14: error: this is not an action of a plan; expected `time: (action argument …) [duration]`
-    plan:2:1: error: this is not an action of a plan; expected `time: (action argument …) [duration]`
+    plan:2:14: error: this is not an action of a plan; expected `time: (action argument …) [duration]`
     plan:3:13: error: this is not an action of a plan; expected `time: (action argument …) [duration]`
     plan:4:1: error: a negative time; times and durations are at least 0
     plan:5:12: error: `x` is not a number: write a decimal such as 12.5 or a fraction such as 25/2
@@ -223,14 +223,11 @@ fn what_is_read_leniently_is_said() {
     // A unit of time.
     assert_snapshot!(remarks("0: (wait) [9 min]"), @"plan:1:14: warning: `min` is ignored; a duration is a number in brackets, in the domain's unit: `[10.000]`");
     // No brackets.
-    assert_snapshot!(remarks("0: (walk hall kitchen) 4"), @r"
-    plan:1:24: warning: `4` is ignored; a duration is a number in brackets, in the domain's unit: `[10.000]`
-    plan:1:5: warning: `walk` has no duration here: 4 is taken, as the domain says; write it behind the action, as in `[10.000]`; this is said once for all
-    ");
+    assert_snapshot!(remarks("0: (walk hall kitchen) 4"), @"plan:1:5: warning: read as the terminal of PlanSys2 prints plans: time, action, duration; the usual form is `0.000: (action argument …) [10.000]`");
     // No duration at all, said once.
     assert_snapshot!(remarks("0: (walk hall kitchen)\n9: (walk kitchen hall)"), @"plan:1:5: warning: `walk` has no duration here: 4 is taken, as the domain says; write it behind the action, as in `[10.000]`; this is said once for all");
     // No times.
-    assert_snapshot!(remarks("(snap b1)\n(snap b2)"), @"plan:1:2: warning: no action has a time: they are taken to start at 0, 1, 2, …; write the time before the action: `0.000: (action argument …) [10.000]`");
+    assert_snapshot!(remarks("(snap b1)\n(snap b2)"), @"plan:1:2: warning: no action has a time: each starts when the one before it has ended, and 1 later if that takes no time; write the time before the action: `0.000: (action argument …) [10.000]`");
     assert_eq!(
         remarks("0: (wait) [9]\n1: (snap b1)\n2: (wait) [D:2.0; C:0.1]"),
         ""

@@ -14,5 +14,7 @@ mod skipped;
 mod cases;
 #[path = "val_program/course.rs"]
 mod course;
+#[path = "val_program/equal.rs"]
+mod equal;
 #[path = "val_program/program.rs"]
 mod program;

@@ -19,6 +19,8 @@
 //!   own: what writes a fact or fluent last does so in every schedule.
 //! - What changes the facts that a constraint on the plan's course reads keeps its order, and
 //!   bounds on the times of such changes are bounds between happenings.
+//! - Instances of one ground action that do not overlap in the plan do not overlap in any schedule. No
+//!   condition needs this; planners and performers do.
 //! - A duration obeys its domain rather than the planner's number; where the domain's bounds
 //!   depend on values that depend on the schedule, it stays as it was.
 //!
@@ -38,9 +40,10 @@ mod kept;
 mod order;
 mod over_all;
 mod pin;
+mod self_overlap;
 
 use elbowroom_model::{Footprint, Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
+use elbowroom_num::{Interval, Rational};
 use elbowroom_stn::ConsistentNetwork;
 
 pub use implied::without_implied;
@@ -148,6 +151,7 @@ pub fn deorder_the_plan_alone(
             second: stn_plan.node_words(task, second),
             time: times[first].to_decimal(6),
         })?;
+    self_overlap::order(&stn_plan, &times, &mut order);
     let mut sides = Order::default();
     over_all::order(task, &stn_plan, &timeline, &mut order, &mut sides);
     stn_plan
@@ -165,6 +169,19 @@ pub fn deorder_the_plan_alone(
         instances,
         nominal,
     })
+}
+
+/// The durations that the domain allows each step of a plan, where the order of the plan decides
+/// them; `None` where they depend on the times.
+pub fn allowed_durations(task: &Task, plan: &TimeTriggeredPlan) -> Vec<Option<Interval>> {
+    let Labelled {
+        plan,
+        instances,
+        times,
+    } = labelled(task, plan);
+    let intervals = durations::intervals(task, &plan, &times);
+    let own = instances.iter().map(|id| intervals[id.index()].clone());
+    own.collect()
 }
 
 /// A plan in which nothing is ordered yet.

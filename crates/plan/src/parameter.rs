@@ -1,6 +1,7 @@
 //! What is left open in a plan.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Body, Condition, Expression, FluentId};
@@ -83,6 +84,33 @@ impl ParametrizedPlan {
             told: BTreeMap::new(),
             goal: task.goal().clone(),
         }
+    }
+
+    /// The instances whose durations are parameters, also where one parameter is the duration of
+    /// several.
+    pub fn open_durations(&self) -> impl Iterator<Item = (InstanceId, ParameterId)> + '_ {
+        let constraints = self.plan.constraints.iter();
+        constraints.filter_map(|constraint| {
+            let id = constraint.lower.parameter()?;
+            let is_set = constraint.upper.parameter() == Some(id);
+            let instance = self.plan.duration_of(constraint).filter(|_| is_set)?;
+            Some((instance, id))
+        })
+    }
+
+    /// Returns the plan with planned durations in place of each `?duration` that an action reads before
+    /// its end, if its duration is a parameter. The real duration is unknown then
+    /// ([`Action::with_planned_duration`]).
+    pub(crate) fn with_planned_durations(mut self) -> Self {
+        let open: BTreeMap<InstanceId, ParameterId> = self.open_durations().collect();
+        for (instance, id) in open {
+            let planned = &self.parameters[id.index()].nominal;
+            let action = &mut self.plan.instances[instance.index()].action;
+            if let Some(known) = action.with_planned_duration(planned) {
+                *action = Arc::new(known);
+            }
+        }
+        self
     }
 
     /// The parameter of that id.

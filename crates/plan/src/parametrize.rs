@@ -13,8 +13,9 @@
 //! | `timed (NAME object …)` | when timed initials change the fact or fluent in any way |
 //! | `?s=VALUE`, `n0.?r=VALUE` | a `:synth-parameters` number, nominally `VALUE` |
 //!
-//! If nothing is specified, those durations are left open that the domain fixes: where it leaves an
-//! interval, the executor chooses.
+//! If nothing is specified, all durations are left open. Where the domain gives an interval for a duration, it
+//! can take the values of that interval; otherwise any. Those of actions of which the executor chooses the
+//! durations (`controllable ACTIONS`) are not left open.
 //!
 //! `ACTIONS` is the name of an action (all its instances), a label (that instance), or
 //! `(NAME object …)`: every instance with these arguments, where `_` stands for any object. A
@@ -53,8 +54,8 @@ use opening::Opening;
 
 /// Leaves quantities of a plan open.
 ///
-/// Without specifications, these are all durations but those that the domain leaves to the executor
-/// ([`ParametrizedPlan::told`]). Numbers that the domain itself leaves open become parameters in
+/// Without specifications of quantities, these are all durations but those that
+/// [`Target::Controllable`] names. Numbers that the domain itself leaves open become parameters in
 /// any case. `nominal` is a schedule of the plan; it says how long things take nominally.
 ///
 /// # Errors
@@ -78,7 +79,6 @@ pub fn parametrize(
     }
     let all = [durations].into_iter().chain(specs.iter().cloned());
     let mut opening = Opening::new(task, plan, nominal)?;
-    opening.leave_to_executor();
     opening.apply_all(&all.collect::<Vec<_>>())?;
     opening.finish()
 }

@@ -21,7 +21,7 @@ use elbowroom_model::{Footprint, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use crate::deorder::{Labelled, durations, labelled};
-use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
+use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, StnPlan};
 
 /// Actions, and the few orderings among their happenings that are kept whatever is skipped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -76,17 +76,14 @@ impl PartialOrderPlan {
         let Labelled {
             plan: stn_plan,
             instances,
-            times,
+            ..
         } = labelled(task, &plan);
-        let constraints = durations::constraints(task, &stn_plan, &times);
-        let is_known = |reason: &Reason| matches!(reason, Reason::Duration(_));
-        let links = constraints.into_iter().map(|mut constraint| {
-            if !is_known(&constraint.reason) {
-                // The number of the plan, which there is none of.
-                (constraint.lower, constraint.upper) = (Bound::Infinite, Bound::Infinite);
-            }
-            duration_link(constraint)
-        });
+        let nodes = stn_plan.nodes();
+        let footprints: Vec<Footprint> = nodes
+            .map(|(node, _)| stn_plan.footprint(task, node))
+            .collect();
+        let constraints = durations::steady(task, &stn_plan, &footprints);
+        let links = constraints.into_iter().map(duration_link);
         Self {
             links: links.collect(),
             instance_of_step: instances,

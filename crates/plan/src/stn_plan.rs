@@ -132,6 +132,8 @@ pub enum Reason {
     Timed(usize),
     /// The two happenings interfere and keep their order.
     Interference,
+    /// Two instances of one ground action do not overlap, and keep their order.
+    SelfOverlap,
     /// One of the happenings writes what an over-all condition of the other's action reads.
     OverAll,
     /// The same, where the condition compares numbers and the happening increases or decreases

@@ -39,6 +39,7 @@ mod relevance;
 mod root;
 mod run;
 mod search;
+mod self_overlap;
 mod spans;
 mod state;
 mod step_costs;
@@ -53,6 +54,7 @@ use std::ops::ControlFlow;
 
 use elbowroom_model::reachability::{self, Grounding};
 use elbowroom_model::{Situation, Task};
+use elbowroom_num::work;
 
 pub use answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Settings, Stopped};
 pub use compile::Unsupported;
@@ -62,6 +64,9 @@ use compile::{Failure, Wanted};
 use reasons::Names;
 use run::{Frame, Planner, none_found};
 use symmetry::Symmetry;
+
+/// Work that is counted for grounding and compiling an action.
+const ACTION_WORK: u64 = 20_000;
 
 /// Finds a plan from `situation`.
 ///
@@ -81,20 +86,30 @@ pub fn plan(
             place: format!("domain {}", task.problem().domain),
         });
     }
-    if course::concerns(task, situation, settings) {
-        return course::plan(task, situation, settings, observe);
-    }
-    search_for_plans(task, situation, settings, observe)
+    // Threads of this search count for this one.
+    work::counted_as(
+        || {
+            if course::concerns(task, situation, settings) {
+                course::plan(task, situation, settings, observe)
+            } else {
+                search_for_plans(task, None, situation, settings, observe)
+            }
+        },
+        |answer| answer.counts().map_or(0, |counts| counts.work),
+    )
 }
 
-/// As [`plan`], of a task without constraints on the course of its plans.
+/// As [`plan`], of a task without constraints on the course of its plans. `constrained`: the same task with
+/// constraints; only plans that keep them count.
 fn search_for_plans(
     task: &Task,
+    constrained: Option<&Task>,
     situation: &Situation,
     settings: &Settings,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Answer {
     let mut progress = Progress::default();
+    let begin = work::spent();
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }
@@ -121,6 +136,7 @@ fn search_for_plans(
         }
     };
     progress.counts.actions = grounding.actions.len() as u64;
+    work::spend(ACTION_WORK.saturating_mul(progress.counts.actions));
     if let Some(proof) = unreachable(grounded, &grounding) {
         return Answer::Unsolvable {
             proof,
@@ -141,11 +157,14 @@ fn search_for_plans(
         tuning,
         metric: !settings.first_plan_only && settings.objective == Objective::Metric,
     };
-    let compiled = match compile::compile(grounded, &grounding, wanted, &mut goes_on) {
+    let mut compiled = match compile::compile(grounded, &grounding, wanted, &mut goes_on) {
         Ok(compiled) => compiled,
         Err(Failure::Unsupported(unsupported)) => return Answer::Unsupported(unsupported),
         Err(Failure::Stopped) => return none_found(Stopped::Interrupted, progress.counts),
     };
+    if !settings.self_overlap {
+        self_overlap::keep_apart(&mut compiled);
+    }
     let names = Names::of(grounded, &compiled);
     if compiled.is_relaxation_exact()
         && let Some(proof) = reasons::relaxed_proof(&names, &compiled)
@@ -169,10 +188,12 @@ fn search_for_plans(
     }
     let frame = Frame {
         task,
+        constrained,
         situation,
         settings,
         compiled: &compiled,
     };
+    progress.counts.work = work::spent() - begin;
     Planner::new(frame, (&names, &symmetry), progress, observe).run()
 }
 

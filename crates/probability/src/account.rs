@@ -19,7 +19,7 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 use crate::circumstances::Circumstances;
 use crate::likelihoods::{Flip, Rate};
 use crate::model::{Model, is_fact};
-use crate::network::{Loss, PrunedNetwork, TooCoupled};
+use crate::network::{Happenings, Loss, PrunedNetwork, TooCoupled};
 
 /// Limit on the number of failed attempts that are counted.
 const MOST_ATTEMPTS: usize = 1000;
@@ -77,16 +77,17 @@ impl Account {
     ///
     /// # Errors
     /// When a condition couples too many uncertain facts.
-    pub fn of(
+    pub fn of<'a>(
         model: &Model,
         circumstances: &Circumstances,
-        sequence: &[NodeId],
+        happenings: impl Into<Happenings<'a>>,
     ) -> Result<Self, TooCoupled> {
-        let (actions_probability, probability) = probabilities(model, circumstances, sequence)?;
-        let losses = PrunedNetwork::losses(model, circumstances, sequence)?;
-        let retries = Retries::of(model, circumstances, sequence);
+        let happenings = happenings.into();
+        let (actions_probability, probability) = probabilities(model, circumstances, happenings)?;
+        let losses = PrunedNetwork::losses(model, circumstances, happenings)?;
+        let retries = Retries::of(model, circumstances, happenings);
         let mut actions = Vec::new();
-        for (at, &node) in sequence.iter().enumerate() {
+        for (at, &node) in happenings.sequence.iter().enumerate() {
             let (Node::Start(instance) | Node::Instant(instance)) =
                 model.plan().nodes[node.index()]
             else {
@@ -95,7 +96,7 @@ impl Account {
             let certain = model.with_certain(instance);
             actions.push(ActionShare {
                 instance,
-                if_certain: probabilities(&certain, circumstances, sequence)?.1,
+                if_certain: probabilities(&certain, circumstances, happenings)?.1,
                 if_retried: match &retries {
                     Some(retries) => Some(retries.at(at)?),
                     None => None,
@@ -111,7 +112,7 @@ impl Account {
             let Some(steady) = model.with_steady(fact) else {
                 continue;
             };
-            let if_steady = probabilities(&steady, circumstances, sequence)?.1;
+            let if_steady = probabilities(&steady, circumstances, happenings)?.1;
             if if_steady > probability {
                 facts.push(FactShare { fact, if_steady });
             }
@@ -131,12 +132,10 @@ impl Account {
 fn probabilities(
     model: &Model,
     circumstances: &Circumstances,
-    sequence: &[NodeId],
+    happenings: Happenings<'_>,
 ) -> Result<(f64, f64), TooCoupled> {
     let mut network = PrunedNetwork::new(model, circumstances)?;
-    for &node in sequence {
-        network.push(node)?;
-    }
+    network.push_all(happenings)?;
     let probability = network.success_probability()?;
     Ok((network.actions_probability(), probability))
 }
@@ -145,7 +144,7 @@ fn probabilities(
 struct Retries<'a> {
     model: &'a Model,
     circumstances: &'a Circumstances,
-    sequence: &'a [NodeId],
+    happenings: Happenings<'a>,
 }
 
 impl<'a> Retries<'a> {
@@ -153,8 +152,9 @@ impl<'a> Retries<'a> {
     fn of(
         model: &'a Model,
         circumstances: &'a Circumstances,
-        sequence: &'a [NodeId],
+        happenings: Happenings<'a>,
     ) -> Option<Self> {
+        let sequence = happenings.sequence;
         let length = sequence.len();
         let attempts = |node: &NodeId| {
             let success = model.event(*node).success;
@@ -175,24 +175,28 @@ impl<'a> Retries<'a> {
         (all.saturating_mul(length) <= MOST_HAPPENINGS).then_some(Self {
             model,
             circumstances,
-            sequence,
+            happenings,
         })
+    }
+
+    /// The network with the happenings before a position.
+    fn before(&self, position: usize) -> Result<PrunedNetwork<'a>, TooCoupled> {
+        let mut network = PrunedNetwork::new(self.model, self.circumstances)?;
+        for (node, is_open) in self.happenings.each().take(position) {
+            network.push_as(node, is_open)?;
+        }
+        Ok(network)
     }
 
     /// P(A ∩ G) if the attempt at this position is repeated until it succeeds.
     fn at(&self, position: usize) -> Result<f64, TooCoupled> {
-        let mut before = PrunedNetwork::new(self.model, self.circumstances)?;
-        for &node in &self.sequence[..position] {
-            before.push(node)?;
-        }
+        let mut before = self.before(position)?;
         let mut whole = 0.0;
         for _ in 0..=MOST_ATTEMPTS {
             let mut rest = before.clone();
-            for &node in &self.sequence[position..] {
-                rest.push(node)?;
-            }
+            rest.push_all(self.happenings.rest(position))?;
             whole += rest.success_probability()?;
-            if before.fail(self.sequence[position])? <= NEGLIGIBLE {
+            if before.fail(self.happenings.sequence[position])? <= NEGLIGIBLE {
                 break;
             }
         }
@@ -204,7 +208,12 @@ impl<'a> Retries<'a> {
     fn done_again(&self, instance: InstanceId, start: usize) -> Result<Option<f64>, TooCoupled> {
         let end = self.model.end(instance);
         let can_fail = self.model.event(end).success < 1.0;
-        let after = &self.sequence[start..];
+        // With others at the same moment it cannot be started again.
+        let joined = self.happenings.joined;
+        if joined.get(start) == Some(&true) || joined.get(start + 1) == Some(&true) {
+            return Ok(None);
+        }
+        let after = &self.happenings.sequence[start..];
         let Some(end) = after
             .iter()
             .position(|node| *node == end)
@@ -213,22 +222,21 @@ impl<'a> Retries<'a> {
             return Ok(None);
         };
         let end = start + end;
-        if self.model.failed_end(self.sequence[end]).is_none() {
+        if self
+            .model
+            .failed_end(self.happenings.sequence[end])
+            .is_none()
+        {
             return Ok(None);
         }
-        let mut before = PrunedNetwork::new(self.model, self.circumstances)?;
-        for &node in &self.sequence[..end] {
-            before.push(node)?;
-        }
+        let mut before = self.before(end)?;
         let mut whole = 0.0;
         for _ in 0..=MOST_ATTEMPTS {
             let mut rest = before.clone();
-            for &node in &self.sequence[end..] {
-                rest.push(node)?;
-            }
+            rest.push_all(self.happenings.rest(end))?;
             whole += rest.success_probability()?;
-            before.fail(self.sequence[end])?;
-            if before.push(self.sequence[start])? <= NEGLIGIBLE {
+            before.fail(self.happenings.sequence[end])?;
+            if before.push(self.happenings.sequence[start])? <= NEGLIGIBLE {
                 break;
             }
         }

@@ -1,8 +1,10 @@
 //! Everything that can be done in a world without time: [`all_actions`].
 
+use std::collections::BTreeSet;
+
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Action, Body, Change, Condition, SnapAction};
-use elbowroom_model::problem::{ObjectId, SchemaId, TimedChange, TimedInitial};
+use elbowroom_model::ground::{Action, Body, Change, Condition, FactId, SnapAction};
+use elbowroom_model::problem::{self, ObjectId, PredicateId, SchemaId, TimedChange, TimedInitial};
 use elbowroom_model::reachability::{self, Answer, Grounding};
 use elbowroom_num::Rational;
 
@@ -27,33 +29,188 @@ pub fn all_actions(task: &Task) -> Result<Vec<Action>, Unsupported> {
     of(task, grounding(task)?.instances())
 }
 
-/// The same, with the actions that can be reached only after a failure, because of what it leaves
-/// behind.
+/// Limit on the number of facts that may change by themselves.
+const MOST_SPONTANEOUS: usize = 100_000;
+
+/// All ground actions that can be started in the world of the likelihoods, in the same order.
+///
+/// In contrast to [`all_actions`], the world may also change facts: by failures of actions, and spontaneously. An
+/// action that can start and never end is included as well, because the agent may abandon it after its start.
 ///
 /// # Errors
-/// As [`all_actions`].
+/// As [`all_actions`], and when too many facts may change by themselves.
 pub fn all_actions_under(
     task: &Task,
     likelihoods: &Likelihoods,
 ) -> Result<Vec<Action>, Unsupported> {
-    let mut actions = all_actions(task)?;
-    if !likelihoods.has_failures() {
-        return Ok(actions);
-    }
-    // What failures leave behind comes about at some time, like what timed initials do.
+    check(task)?;
     let mut problem = task.problem().clone();
+    for schema in &mut problem.schemas {
+        if let problem::Body::Durative {
+            over_all, at_end, ..
+        } = &mut schema.body
+        {
+            *over_all = problem::Condition::TRUE;
+            *at_end = problem::Condition::TRUE;
+        }
+    }
+    // For reachability, a change by the world at any time is the same as a timed initial literal.
+    let mut new = spontaneous(task, likelihoods)?;
     loop {
-        let known = problem.timed.len();
-        for change in left_behind(task, &actions, likelihoods) {
-            if problem.timed.iter().all(|timed| timed.change != change) {
-                let time = Rational::ONE;
-                problem.timed.push(TimedInitial { time, change });
+        let timed = |change| TimedInitial {
+            time: Rational::ONE,
+            change,
+        };
+        problem.timed.extend(new.into_iter().map(timed));
+        let instances = grounding(&Task::new(problem.clone()))?.instances();
+        let actions = of(task, instances)?;
+        new = left_behind(task, &actions, likelihoods);
+        new.retain(|change| problem.timed.iter().all(|timed| timed.change != *change));
+        if new.is_empty() {
+            let world = problem.timed.iter().map(|timed| &timed.change);
+            return Ok(startable(task, actions, world));
+        }
+    }
+}
+
+/// Facts that change by themselves with positive probability.
+fn spontaneous(task: &Task, likelihoods: &Likelihoods) -> Result<Vec<TimedChange>, Unsupported> {
+    let problem = task.problem();
+    let mut changes = Vec::new();
+    for (index, predicate) in problem.predicates.iter().enumerate() {
+        let id = PredicateId::from(index);
+        let mut note = |objects: &[ObjectId]| {
+            let (becomes_true, becomes_false) = likelihoods.may_change(id, objects);
+            if becomes_true {
+                changes.push(TimedChange::Add(id, objects.to_vec()));
+            }
+            if becomes_false {
+                changes.push(TimedChange::Delete(id, objects.to_vec()));
+            }
+            changes.len() <= MOST_SPONTANEOUS
+        };
+        let is_within_limit = if likelihoods.may_change_any(id) {
+            let domains = predicate.parameters.iter();
+            let domains = domains.map(|it| problem.objects_of(&it.types).collect::<Vec<_>>());
+            each_combination(&domains.collect::<Vec<_>>(), &mut note)
+        } else {
+            let own = likelihoods.facts.keys();
+            let mut own = own.filter(|(predicate, _)| *predicate == id);
+            own.all(|(_, objects)| note(objects))
+        };
+        if !is_within_limit {
+            let name = &predicate.name;
+            return Err(Unsupported {
+                what: format!(
+                    "more than {MOST_SPONTANEOUS} facts change by themselves, those of `{name}` among them"
+                ),
+            });
+        }
+    }
+    Ok(changes)
+}
+
+/// Calls `visit` for each choice of one object from each list, as long as it returns `true`. Returns the last
+/// answer.
+fn each_combination(lists: &[Vec<ObjectId>], visit: &mut dyn FnMut(&[ObjectId]) -> bool) -> bool {
+    fn extend(
+        lists: &[Vec<ObjectId>],
+        chosen: &mut Vec<ObjectId>,
+        visit: &mut dyn FnMut(&[ObjectId]) -> bool,
+    ) -> bool {
+        let Some(list) = lists.get(chosen.len()) else {
+            return visit(chosen);
+        };
+        list.iter().all(|object| {
+            chosen.push(*object);
+            let goes_on = extend(lists, chosen, visit);
+            chosen.pop();
+            goes_on
+        })
+    }
+    extend(lists, &mut Vec::new(), visit)
+}
+
+/// The actions whose start condition is possible when each fact keeps every truth value that it can ever have:
+/// initially, by the world, or by the start or end of such an action. An end is possible under the same rule.
+fn startable<'c>(
+    task: &Task,
+    actions: Vec<Action>,
+    world: impl Iterator<Item = &'c TimedChange>,
+) -> Vec<Action> {
+    let mut seen = Seen {
+        initially: &task.initial().facts,
+        changed: BTreeSet::new(),
+    };
+    for change in world {
+        let (fact, truth) = match change {
+            TimedChange::Add(predicate, objects) => (task.find_fact(*predicate, objects), true),
+            TimedChange::Delete(predicate, objects) => (task.find_fact(*predicate, objects), false),
+            TimedChange::Assign(..) => continue,
+        };
+        // A fact without a number is read by none of the actions.
+        seen.changed.extend(fact.map(|fact| (fact, truth)));
+    }
+    let mut starts = vec![false; actions.len()];
+    loop {
+        let before = (seen.changed.len(), starts.iter().filter(|it| **it).count());
+        for (action, starts) in actions.iter().zip(&mut starts) {
+            match &action.body {
+                Body::Instantaneous(snap) => *starts |= seen.happens(snap),
+                Body::Durative(body) => {
+                    *starts |= seen.happens(&body.start);
+                    if *starts {
+                        seen.happens(&body.end);
+                    }
+                }
             }
         }
-        if problem.timed.len() == known {
-            return Ok(actions);
+        if before == (seen.changed.len(), starts.iter().filter(|it| **it).count()) {
+            break;
         }
-        actions = of(task, grounding(&Task::new(problem.clone()))?.instances())?;
+    }
+    let mut starts = starts.into_iter();
+    let mut actions = actions;
+    actions.retain(|_| starts.next() == Some(true));
+    actions
+}
+
+/// The truth values that facts can have.
+struct Seen<'t> {
+    initially: &'t BTreeSet<FactId>,
+    changed: BTreeSet<(FactId, bool)>,
+}
+
+impl Seen<'_> {
+    /// Adds the effects of a snap action if it is possible, and returns whether it is.
+    fn happens(&mut self, snap: &SnapAction) -> bool {
+        let is_possible = self.allows(&snap.condition, true);
+        if is_possible {
+            let effects = snap.effects.iter();
+            self.changed
+                .extend(effects.filter_map(|it| match it.change {
+                    Change::Add(fact) => Some((fact, true)),
+                    Change::Delete(fact) => Some((fact, false)),
+                    Change::Update { .. } => None,
+                }));
+        }
+        is_possible
+    }
+
+    /// Returns `true` if a condition can have this truth value.
+    fn allows(&self, condition: &Condition, truth: bool) -> bool {
+        match condition {
+            Condition::Fact(fact) => {
+                self.initially.contains(fact) == truth || self.changed.contains(&(*fact, truth))
+            }
+            Condition::Compare(..) => true,
+            Condition::Not(part) => self.allows(part, !truth),
+            Condition::And(parts) if truth => parts.iter().all(|it| self.allows(it, true)),
+            Condition::Or(parts) if !truth => parts.iter().all(|it| self.allows(it, false)),
+            Condition::And(parts) | Condition::Or(parts) => {
+                parts.iter().any(|it| self.allows(it, truth))
+            }
+        }
     }
 }
 
@@ -67,11 +224,14 @@ fn left_behind(task: &Task, actions: &[Action], likelihoods: &Likelihoods) -> Ve
         for aftermath in likelihoods.aftermaths(task, action) {
             for (fact, becomes) in aftermath.changes {
                 let (predicate, objects) = task.atom(fact);
-                left.push(if becomes {
+                let change = if becomes {
                     TimedChange::Add(predicate, objects)
                 } else {
                     TimedChange::Delete(predicate, objects)
-                });
+                };
+                if !left.contains(&change) {
+                    left.push(change);
+                }
             }
         }
     }

@@ -15,10 +15,10 @@ mod following;
 use std::ops::ControlFlow;
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{InstanceId, NodeId};
+use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use crate::circumstances::Circumstances;
-use crate::network::TooCoupled;
+use crate::network::{Happenings, TooCoupled};
 use crate::search::{OrderSearch, Progress};
 use crate::total_order::{Slot, TotalOrderPlan};
 use following::Following;
@@ -46,6 +46,8 @@ pub struct NextHappening {
     pub node: NodeId,
     /// Its position in the order.
     pub position: usize,
+    /// The happenings behind it in the order that come at the same moment, because they need each other.
+    pub together: Vec<NodeId>,
     /// The window in which it may happen.
     pub slot: Slot,
     /// Whether the order is new.
@@ -92,6 +94,17 @@ impl LayerDispatch {
         self.order.as_ref()
     }
 
+    /// From now on keeps an order for as long as a layer of it fits. Returns `false` if that was so before.
+    pub fn keep_order(&mut self) -> bool {
+        std::mem::replace(&mut self.reconsider, Reconsider::WhenNoLayerFits) == Reconsider::Always
+    }
+
+    /// Drops the present order, so that the next choice is that of a new search.
+    pub fn drop_order(&mut self) {
+        self.order = None;
+        self.following = None;
+    }
+
     /// The search behind it.
     pub fn search(&self) -> &OrderSearch {
         &self.search
@@ -109,7 +122,15 @@ impl LayerDispatch {
         if circumstances.running.is_empty() && self.holds_goal(circumstances) {
             return Ok(Choice::GoalReached);
         }
-        if self.reconsider == Reconsider::WhenNoLayerFits
+        if let Some(order) = self.order.as_ref().filter(|order| order.has_joined()) {
+            let is_kept = |position: usize| {
+                self.reconsider == Reconsider::WhenNoLayerFits || order.joined[position]
+            };
+            let found = lattermost_layer(&self.search, order, circumstances);
+            if let Some((position, slot)) = found.filter(|(position, _)| is_kept(*position)) {
+                return Ok(next(order, position, slot, false));
+            }
+        } else if self.reconsider == Reconsider::WhenNoLayerFits
             && let Some(order) = &self.order
         {
             let new = || Following::new(&self.search, order, self.passed);
@@ -164,18 +185,40 @@ pub fn lattermost_layer(
     circumstances: &Circumstances,
 ) -> Option<(usize, Slot)> {
     (0..order.sequence.len()).rev().find_map(|position| {
-        if !order.layers[position].fits(search.model(), circumstances) {
+        let happened = |node: &NodeId| has_just_happened(search, *node, circumstances);
+        if !order.layers[position].fits(search.model(), circumstances)
+            || !order.joined_before(position).iter().all(happened)
+        {
             return None;
         }
-        let slots = search.windows(circumstances, &order.sequence[position..])?;
+        let rest = Happenings::from(order).rest(position);
+        let slots = search.windows_of(circumstances, rest)?;
         slots.into_iter().next().map(|slot| (position, slot))
     })
 }
 
+/// Returns `true` if a happening is at this moment.
+fn has_just_happened(search: &OrderSearch, node: NodeId, circumstances: &Circumstances) -> bool {
+    let now = &circumstances.now;
+    let mut recent = circumstances.recent.iter();
+    let mut running = circumstances.running.iter();
+    let start = match search.model().plan().nodes[node.index()] {
+        Node::Start(id) => running.find(|running| running.instance == id),
+        _ => None,
+    };
+    start.is_some_and(|running| running.start == *now)
+        || recent.any(|(other, time)| *other == node && time == now)
+}
+
 fn next(order: &TotalOrderPlan, position: usize, slot: Slot, is_new_order: bool) -> Choice {
+    let node = order.sequence[position];
+    let behind = order.sequence.iter().zip(&order.joined).skip(position + 1);
+    let joined = behind.take_while(|(_, is_joined)| **is_joined);
+    let together = joined.map(|(node, _)| *node);
     Choice::Next(NextHappening {
-        node: order.sequence[position],
+        node,
         position,
+        together: together.collect(),
         slot,
         is_new_order,
     })

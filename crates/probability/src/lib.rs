@@ -80,6 +80,6 @@ pub use circumstances::{Circumstances, Running};
 pub use dispatch::{Choice, LayerDispatch, NextHappening, Reconsider};
 pub use likelihoods::{Flip, Likelihoods, Rate};
 pub use model::{Model, Semantics};
-pub use network::{Loss, LossCause, PrunedNetwork, Reading, TooCoupled};
+pub use network::{Happenings, Loss, LossCause, PrunedNetwork, Reading, TooCoupled};
 pub use search::{Candidates, Found, OrderSearch, SearchSettings, SearchStop};
 pub use total_order::{Layer, Slot, TotalOrderPlan};

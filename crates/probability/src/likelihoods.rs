@@ -234,6 +234,31 @@ impl Likelihoods {
         })
     }
 
+    /// Returns two flags: the fact may become true by itself, and it may become false by itself.
+    pub(crate) fn may_change(
+        &self,
+        predicate: PredicateId,
+        arguments: &[ObjectId],
+    ) -> (bool, bool) {
+        self.possible_changes(self.said_of(predicate, arguments))
+    }
+
+    /// Returns `true` if facts of the predicate without an entry of their own may change by themselves.
+    pub(crate) fn may_change_any(&self, predicate: PredicateId) -> bool {
+        let said = self.predicates.get(&predicate).copied();
+        let (becomes_true, becomes_false) = self.possible_changes(said.unwrap_or_default());
+        becomes_true || becomes_false
+    }
+
+    fn possible_changes(&self, said: PartialFlip) -> (bool, bool) {
+        let some = |p: Option<f64>| p.is_some_and(|p| p > 0.0);
+        let (up, down) = self.rates_of(said);
+        (
+            some(said.becomes_true.or(self.defaults.becomes_true)) || some(up),
+            some(said.becomes_false.or(self.defaults.becomes_false)) || some(down),
+        )
+    }
+
     /// How often a fact changes by itself, per second: not at all, if nothing is said of it.
     pub fn rate(&self, task: &Task, fact: FactId) -> Rate {
         let (predicate, arguments) = task.atom(fact);

@@ -125,6 +125,48 @@ impl Model {
         compile::model(task.into(), plan, likelihoods, semantics)
     }
 
+    /// The same without changes by steps that help: a fact that is only needed true does not become true by itself, one
+    /// that is only needed false does not become false, and one that is needed either way does not change. Changes with
+    /// time stay.
+    ///
+    /// An executor that counts on such changes repeats steps in vain if the world does not have them.
+    #[must_use]
+    pub fn without_luck(mut self) -> Self {
+        let mut needed = vec![[false; 2]; self.facts.len()];
+        let goal = std::iter::once(&self.goal);
+        let events = self.events.iter();
+        let requirements = events.flat_map(|event| [&event.condition, &event.over_all]);
+        for requirement in requirements.chain(goal) {
+            for &(fact, truth) in &requirement.literals {
+                needed[fact][usize::from(truth)] = true;
+            }
+            for &fact in requirement.coupled.iter().flat_map(|it| &it.facts) {
+                needed[fact] = [true; 2];
+            }
+        }
+        let effects = self.events.iter().flat_map(|event| &event.effects);
+        let updates = self.events.iter().flat_map(|event| &event.updates);
+        let guards = effects.map(|it| &it.guard);
+        let guards = guards.chain(updates.map(|it| &it.guard)).flatten();
+        let watched = self.events.iter().flat_map(|event| &event.watches);
+        for condition in guards.chain(watched.map(|(_, condition)| condition)) {
+            visit_facts(&self.task, condition, &mut |fact| {
+                if let Ok(position) = self.facts.binary_search(&fact) {
+                    needed[position] = [true; 2];
+                }
+            });
+        }
+        for (flip, [needed_false, needed_true]) in self.flips.iter_mut().zip(needed) {
+            if needed_true {
+                flip.becomes_true = 0.0;
+            }
+            if needed_false {
+                flip.becomes_false = 0.0;
+            }
+        }
+        self
+    }
+
     /// The task.
     pub fn task(&self) -> &Arc<Task> {
         &self.task
@@ -233,24 +275,26 @@ impl Model {
         nodes_of
     }
 
-    /// The plan's happenings as they are timed; ends before what begins at the same time. `steps`
-    /// are in the order of the plan's instances.
-    pub fn as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
+    /// The plan's happenings as they are timed, moment by moment. `steps` are in the order of the plan's
+    /// instances.
+    pub(crate) fn moments(&self, steps: &[Step]) -> Vec<Vec<NodeId>> {
         let timed = self.task.timed();
         let nodes = self.plan.nodes.iter().enumerate();
         let mut happenings: Vec<_> = nodes
             .filter_map(|(index, node)| {
-                let (time, rank) = match *node {
+                let time = match *node {
                     Node::Zero => return None,
-                    Node::End(id) => (steps[id.index()].end(), 0),
-                    Node::Timed(index) => (timed[index].time.clone(), 1),
-                    Node::Start(id) | Node::Instant(id) => (steps[id.index()].start.clone(), 2),
+                    Node::End(id) => steps[id.index()].end(),
+                    Node::Timed(index) => timed[index].time.clone(),
+                    Node::Start(id) | Node::Instant(id) => steps[id.index()].start.clone(),
                 };
-                Some((time, rank, NodeId::from(index)))
+                Some((time, NodeId::from(index)))
             })
             .collect();
         happenings.sort();
-        happenings.into_iter().map(|(.., node)| node).collect()
+        let moments = happenings.chunk_by(|one, other| one.0 == other.0);
+        let nodes = |moment: &[(Rational, NodeId)]| moment.iter().map(|it| it.1).collect();
+        moments.map(nodes).collect()
     }
 
     /// The happening in words.

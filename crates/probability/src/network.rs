@@ -38,6 +38,49 @@ pub struct TooCoupled {
     pub most: usize,
 }
 
+/// Happenings in a row.
+#[derive(Clone, Copy, Debug)]
+pub struct Happenings<'a> {
+    /// The happenings.
+    pub sequence: &'a [NodeId],
+    /// Of each, whether it comes at the moment of the one before it, so that nothing is required throughout
+    /// actions in between; `false` for those behind the end of this list.
+    pub joined: &'a [bool],
+}
+
+impl<'a> From<&'a [NodeId]> for Happenings<'a> {
+    /// One after another.
+    fn from(sequence: &'a [NodeId]) -> Self {
+        Self {
+            sequence,
+            joined: &[],
+        }
+    }
+}
+
+impl<'a> From<&'a Vec<NodeId>> for Happenings<'a> {
+    fn from(sequence: &'a Vec<NodeId>) -> Self {
+        sequence.as_slice().into()
+    }
+}
+
+impl<'a> Happenings<'a> {
+    /// The happenings from a position on.
+    pub(crate) fn rest(self, position: usize) -> Self {
+        Self {
+            sequence: &self.sequence[position..],
+            joined: self.joined.get(position..).unwrap_or_default(),
+        }
+    }
+
+    /// Each happening, and whether the next one comes at the same moment.
+    pub(crate) fn each(self) -> impl Iterator<Item = (NodeId, bool)> + 'a {
+        let is_open = move |at: usize| self.joined.get(at + 1) == Some(&true);
+        let happenings = self.sequence.iter().enumerate();
+        happenings.map(move |(at, node)| (*node, is_open(at)))
+    }
+}
+
 /// Paper 2's dynamic Bayesian network, pruned, for the order pushed so far.
 ///
 /// [`PrunedNetwork::push`] adds a happening and [`PrunedNetwork::pop`] takes the last one back;
@@ -58,6 +101,8 @@ pub struct PrunedNetwork<'m> {
     /// Numeric conditions taken for granted, as their numbers depend on time.
     assumed: usize,
     sequence: Vec<NodeId>,
+    /// By happening, whether it comes at the same moment as the next one: see [`PrunedNetwork::push_open`].
+    is_open: Vec<bool>,
     marks: Vec<Mark>,
     undo: Vec<Undo>,
     ledger: Ledger,
@@ -105,6 +150,7 @@ impl<'m> PrunedNetwork<'m> {
             probability: 1.0,
             assumed: 0,
             sequence: Vec::new(),
+            is_open: Vec::new(),
             marks: Vec::new(),
             undo: Vec::new(),
             ledger,
@@ -180,12 +226,10 @@ impl<'m> PrunedNetwork<'m> {
     pub fn losses(
         model: &'m Model,
         circumstances: &Circumstances,
-        sequence: &[NodeId],
+        happenings: Happenings<'_>,
     ) -> Result<Vec<Loss>, TooCoupled> {
         let mut network = Self::with(model, circumstances, Ledger::kept())?;
-        for &node in sequence {
-            network.push(node)?;
-        }
+        network.push_all(happenings)?;
         network.require(&model.goal, NodeId::ZERO, Reading::Goal)?;
         Ok(network.ledger.close())
     }
@@ -222,14 +266,74 @@ impl<'m> PrunedNetwork<'m> {
     /// # Errors
     /// When it couples too many facts; then nothing is added.
     pub fn push(&mut self, node: NodeId) -> Result<f64, TooCoupled> {
+        self.push_as(node, false)
+    }
+
+    /// Adds a happening, after which another one comes at the same moment. Over-all conditions of running
+    /// actions are required only after the last happening of the moment.
+    ///
+    /// # Errors
+    /// When it couples too many facts; then nothing is added.
+    pub fn push_open(&mut self, node: NodeId) -> Result<f64, TooCoupled> {
+        self.push_as(node, true)
+    }
+
+    /// Adds happenings.
+    ///
+    /// # Errors
+    /// When one of them couples too many facts.
+    pub fn push_all(&mut self, happenings: Happenings<'_>) -> Result<(), TooCoupled> {
+        for (node, is_open) in happenings.each() {
+            self.push_as(node, is_open)?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn push_as(&mut self, node: NodeId, is_open: bool) -> Result<f64, TooCoupled> {
         let before = self.mark();
-        if let Err(error) = self.try_push(node) {
+        if let Err(error) = self.happen(node, self.model.event(node), is_open) {
             self.go_back_to(before);
             return Err(error);
         }
         self.marks.push(before);
         self.sequence.push(node);
+        self.is_open.push(is_open);
         Ok(self.probability)
+    }
+
+    /// Returns `true` if another happening is to come at the moment of the last one.
+    pub(crate) fn is_open(&self) -> bool {
+        self.is_open.last() == Some(&true)
+    }
+
+    /// The happenings of the last moment: the last one, and those before it that it is joined with.
+    pub(crate) fn moment(&self) -> &[NodeId] {
+        let before = self.is_open.iter().rev().skip(1);
+        let joined = before.take_while(|is_open| **is_open).count();
+        let last = self.sequence.len().saturating_sub(1 + joined);
+        &self.sequence[last..]
+    }
+
+    /// Of each happening, whether it comes at the moment of the one before it.
+    pub(crate) fn joined(&self) -> Vec<bool> {
+        let before = std::iter::once(&false).chain(&self.is_open);
+        before.take(self.is_open.len()).copied().collect()
+    }
+
+    /// Returns `true` if no over-all condition of a running action is certainly false.
+    pub(crate) fn may_be_settled(&mut self) -> bool {
+        let model = self.model;
+        (0..self.running.len()).all(|place| {
+            let over_all = &model.event(model.start(self.running[place])).over_all;
+            let mut literals = over_all.literals.iter();
+            let are_possible = literals.all(|&(fact, truth)| {
+                let p = self.marginal_at(fact);
+                if truth { p > 0.0 } else { p < 1.0 }
+            });
+            let coupled = over_all.coupled.iter().map(|coupled| &coupled.condition);
+            let mut conditions = over_all.numeric.iter().chain(coupled);
+            are_possible && conditions.all(|condition| self.truth(condition) != Some(false))
+        })
     }
 
     /// Adds an attempt to start an action, or an end, that fails, though it could succeed: facts
@@ -247,7 +351,7 @@ impl<'m> PrunedNetwork<'m> {
                 self.probability = 0.0;
                 return Ok(0.0);
             };
-            self.happen(node, &failed)?;
+            self.happen(node, &failed, false)?;
             // Whenever it is started again, it takes as long as it takes.
             self.remaining.retain(|(running, _)| *running != id);
             return Ok(self.probability);
@@ -264,19 +368,17 @@ impl<'m> PrunedNetwork<'m> {
     pub fn pop(&mut self) {
         if let Some(mark) = self.marks.pop() {
             self.sequence.pop();
+            self.is_open.pop();
             self.go_back_to(mark);
         }
     }
 
-    fn try_push(&mut self, node: NodeId) -> Result<(), TooCoupled> {
-        let model = self.model;
-        self.happen(node, model.event(node))
-    }
-
     /// What a happening does, given as an event.
-    fn happen(&mut self, node: NodeId, event: &Event) -> Result<(), TooCoupled> {
+    fn happen(&mut self, node: NodeId, event: &Event, is_open: bool) -> Result<(), TooCoupled> {
         let model = self.model;
-        self.pass(node)?;
+        if !self.is_open() {
+            self.pass(node)?;
+        }
         self.require(&event.condition, node, Reading::OnArrival)?;
         let is_end = matches!(model.plan().nodes[node.index()], Node::End(_));
         self.multiply(event.success, (node, Reading::OnArrival), || {
@@ -305,6 +407,9 @@ impl<'m> PrunedNetwork<'m> {
                 }
             }
             Node::Zero | Node::Instant(_) | Node::Timed(_) => {}
+        }
+        if is_open {
+            return Ok(());
         }
         self.require_throughout(node)
     }

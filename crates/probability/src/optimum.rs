@@ -145,6 +145,7 @@ impl Optimum {
             Move::Do(node) => Choice::Next(NextHappening {
                 node,
                 position: 0,
+                together: Vec::new(),
                 slot: slot(node),
                 is_new_order: false,
             }),

@@ -18,6 +18,7 @@ mod assignment;
 mod bound;
 mod cache;
 mod chain;
+mod coupling;
 mod lattice;
 mod memo;
 mod nominal;
@@ -37,15 +38,16 @@ use elbowroom_plan::{Node, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::model::Model;
-use crate::network::{PrunedNetwork, TooCoupled};
+use crate::network::{Happenings, PrunedNetwork, TooCoupled};
 use crate::total_order::{Slot, TotalOrderPlan};
 use bound::Bounds;
 use cache::Cache;
+use coupling::Couplings;
 pub use lattice::{Lattice, LatticeEdge, LatticeLimits, LatticeNode, TooLarge};
 use nominal::Nominal;
 use room::Rooms;
 pub(crate) use room::{First, Rests};
-use run::Run;
+use run::{Best, Run};
 use separations::Separations;
 use symmetry::Symmetry;
 use timing::Timing;
@@ -79,6 +81,9 @@ impl Default for SearchSettings {
         }
     }
 }
+
+/// Work that is counted for each examined sequence, in units of [`elbowroom_num::work`].
+const SEQUENCE_WORK: u64 = 5_000;
 
 /// The reason why a search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,6 +122,7 @@ pub struct OrderSearch {
     model: Arc<Model>,
     settings: SearchSettings,
     separations: Arc<Separations>,
+    couplings: Arc<Couplings>,
     symmetry: Arc<Symmetry>,
     bounds: Arc<Bounds>,
     cache: Cache,
@@ -129,8 +135,10 @@ impl OrderSearch {
     pub fn new(model: impl Into<Arc<Model>>, settings: SearchSettings) -> Self {
         let model = model.into();
         let separations = Separations::of(&model, settings.keeps_interference);
-        let bounds = Bounds::of(&model, &separations);
+        let couplings = Couplings::of(&model, &separations);
+        let bounds = Bounds::of(&model, &separations, &couplings);
         Self {
+            couplings: Arc::new(couplings),
             symmetry: Arc::new(Symmetry::of(&model, &separations)),
             model,
             settings,
@@ -172,13 +180,28 @@ impl OrderSearch {
         let matters = |node: NodeId| self.separations.timed.iter().any(|(own, _)| *own == node);
         let until_goal = &self.separations.timed[..self.separations.timed_until_goal];
         let is_for_goal = |node: NodeId| until_goal.iter().any(|(own, _)| *own == node);
-        let mut order = self.model.as_timed(steps);
+        let mut order = self.happenings_as_timed(steps);
         order.retain(|&node| !is_timed(node) || matters(node));
         let last = order
             .iter()
             .rposition(|&node| !is_timed(node) || is_for_goal(node));
         order.truncate(last.map_or(0, |last| last + 1));
         order
+    }
+
+    /// All happenings as they are timed. At one moment ends come first, and each comes after those that it needs.
+    fn happenings_as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
+        let mut order = Vec::new();
+        for mut moment in self.model.moments(steps) {
+            self.couplings.sort(&self.model, &mut moment);
+            order.append(&mut moment);
+        }
+        order
+    }
+
+    /// Returns `true` if happenings of this plan may need each other at one moment.
+    pub(crate) fn has_couplings(&self) -> bool {
+        !self.couplings.is_empty()
     }
 
     /// Whether no timed initial after `now` changes what the goal reads. Until then it is not
@@ -255,8 +278,16 @@ impl OrderSearch {
         let (best, sequences) = run.finish();
         let order = match best {
             None => None,
-            Some((probability, sequence)) => {
-                Some(self.order(circumstances, &sequence, probability)?)
+            Some(Best {
+                probability,
+                sequence,
+                joined,
+            }) => {
+                let happenings = Happenings {
+                    sequence: &sequence,
+                    joined: &joined,
+                };
+                Some(self.order(circumstances, happenings, probability)?)
             }
         };
         Ok(Found {
@@ -278,26 +309,57 @@ impl OrderSearch {
         circumstances: &Circumstances,
         sequence: &[NodeId],
     ) -> Result<TotalOrderPlan, TooCoupled> {
+        let joined = self.joined(circumstances, sequence)?;
+        let happenings = Happenings {
+            sequence,
+            joined: &joined,
+        };
         let mut network = PrunedNetwork::new(&self.model, circumstances)?;
-        for &node in sequence {
-            network.push(node)?;
-        }
+        network.push_all(happenings)?;
         let probability = network.success_probability()?;
-        self.order(circumstances, sequence, probability)
+        self.order(circumstances, happenings, probability)
+    }
+
+    /// Of each happening of a sequence, whether it comes at the same moment as the one before it: coupled happenings do
+    /// where they would fail one after the other.
+    fn joined(
+        &self,
+        circumstances: &Circumstances,
+        sequence: &[NodeId],
+    ) -> Result<Vec<bool>, TooCoupled> {
+        if self.couplings.is_empty() {
+            return Ok(vec![false; sequence.len()]);
+        }
+        let model = &*self.model;
+        let mut network = PrunedNetwork::new(model, circumstances)?;
+        let (mut nominal, _) = Nominal::new(model, circumstances);
+        for (at, &node) in sequence.iter().enumerate() {
+            let next = sequence.get(at + 1);
+            let is_coupled = next.is_some_and(|next| self.couplings.are_coupled(node, *next));
+            nominal.apply_open(model, model.event(node));
+            network.push_open(node)?;
+            let is_settled =
+                nominal.is_settled(model, network.running()) && network.may_be_settled();
+            if !is_coupled || is_settled {
+                network.pop();
+                network.push(node)?;
+                nominal.stays_possible(model, network.running());
+            }
+        }
+        Ok(network.joined())
     }
 
     /// The order with its layers and its times.
     fn order(
         &self,
         circumstances: &Circumstances,
-        sequence: &[NodeId],
+        happenings: Happenings<'_>,
         probability: f64,
     ) -> Result<TotalOrderPlan, TooCoupled> {
         let mut network = PrunedNetwork::new(&self.model, circumstances)?;
-        for &node in sequence {
-            network.push(node)?;
-        }
-        let windows = self.windows(circumstances, sequence).unwrap_or_default();
+        network.push_all(happenings)?;
+        let windows = self.windows_of(circumstances, happenings);
+        let windows = windows.unwrap_or_default();
         Ok(TotalOrderPlan::new(
             &self.model,
             circumstances,
@@ -310,10 +372,21 @@ impl OrderSearch {
     /// The time at which each happening of a sequence may and can be, if it begins now; `None` if
     /// there is no time for the sequence.
     pub fn windows(&self, circumstances: &Circumstances, sequence: &[NodeId]) -> Option<Vec<Slot>> {
+        self.windows_of(circumstances, sequence.into())
+    }
+
+    /// The same, with happenings that come at the same moment. A first one that is joined comes now.
+    pub fn windows_of(
+        &self,
+        circumstances: &Circumstances,
+        happenings: Happenings<'_>,
+    ) -> Option<Vec<Slot>> {
+        let Happenings { sequence, joined } = happenings;
         let mut timing = Timing::new(&self.separations, circumstances)?;
         let mut next_timed = self.timed_passed(&circumstances.now);
-        for &node in sequence {
-            timing.push(&self.model, node, next_timed)?;
+        for (at, &node) in sequence.iter().enumerate() {
+            let is_joined = joined.get(at) == Some(&true);
+            timing.push(&self.model, (node, is_joined), next_timed)?;
             let is_timed = matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
             next_timed += usize::from(is_timed);
         }

@@ -8,7 +8,7 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::model::{Model, evaluate};
-use crate::network::PrunedNetwork;
+use crate::network::{Happenings, PrunedNetwork};
 
 /// Happenings in a row, and the layers of the pruned network between them.
 #[doc(alias = "Γ")]
@@ -16,6 +16,8 @@ use crate::network::PrunedNetwork;
 pub struct TotalOrderPlan {
     /// The happenings: nodes of the partially ordered plan.
     pub sequence: Vec<NodeId>,
+    /// Of each happening, whether it comes at the same moment as the one before it, because they need each other.
+    pub joined: Vec<bool>,
     /// One more than happenings: layer `i` is what must hold before `sequence[i]` for the rest to
     /// work if nothing more goes wrong; the last is the goal.
     pub layers: Vec<Layer>,
@@ -52,6 +54,15 @@ pub struct Slot {
     pub latest: Option<Rational>,
 }
 
+impl<'a> From<&'a TotalOrderPlan> for Happenings<'a> {
+    fn from(order: &'a TotalOrderPlan) -> Self {
+        Self {
+            sequence: &order.sequence,
+            joined: &order.joined,
+        }
+    }
+}
+
 impl TotalOrderPlan {
     /// The order that a network has, begun in these circumstances.
     pub(crate) fn new(
@@ -69,14 +80,29 @@ impl TotalOrderPlan {
             step(model, &mut running, node);
             under_way.push(sorted(&running));
         }
+        let joined = network.joined();
         Self {
-            layers: regress::layers(model, &sequence, under_way),
+            layers: regress::layers(model, (&sequence, &joined), under_way),
             sequence,
+            joined,
             slots,
             actions_probability: network.actions_probability(),
             probability,
             assumed_conditions: network.assumed_conditions(),
         }
+    }
+
+    /// Returns `true` if happenings of this order come at the same moment because they need each other.
+    pub fn has_joined(&self) -> bool {
+        self.joined.contains(&true)
+    }
+
+    /// The happenings that come at the same moment as the one at `position`, and before it. Empty unless they need each
+    /// other.
+    pub(crate) fn joined_before(&self, position: usize) -> &[NodeId] {
+        let joined = self.joined[..=position].iter().rev();
+        let count = joined.take_while(|is_joined| **is_joined).count();
+        &self.sequence[position - count..position]
     }
 
     /// The same order, begun so much later.

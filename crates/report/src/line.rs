@@ -29,7 +29,7 @@ pub enum Line {
     Planning(PlanningLine),
     /// A plan has been made, or not.
     Planned(PlannedLine),
-    /// An action has used most of the time that the plan can bear.
+    /// An action has used most of the time that the plan tolerates, or most of its time-out.
     Warning(WarningLine),
     /// The goals have changed, and the rest of the plan is kept.
     Kept(KeptLine),
@@ -230,6 +230,10 @@ pub struct CommandLine {
     pub command: GivenLine,
     /// When that was planned.
     pub planned: WindowLine,
+    /// The time-out of an action that is started, in seconds from its start or its last progress;
+    /// left out if time-outs are off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timeout: Option<Exact>,
 }
 
 /// A command.
@@ -456,7 +460,7 @@ pub struct PlannedLine {
     pub remark: Option<String>,
 }
 
-/// An action has used most of the time that the plan can bear.
+/// An action has used most of the time that the plan tolerates, or most of its time-out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WarningLine {
@@ -466,8 +470,15 @@ pub struct WarningLine {
     pub ticket: u64,
     /// Its name.
     pub action: String,
-    /// From when on a new plan is needed if it has not ended.
+    /// When a new plan is needed, or when the action times out, if it has not ended.
     pub until: Exact,
+    /// `true` if the action times out then; left out where a new plan is needed.
+    #[serde(
+        rename = "timeout",
+        default,
+        skip_serializing_if = "std::ops::Not::not"
+    )]
+    pub is_timeout: bool,
     /// The same in words.
     pub words: String,
 }

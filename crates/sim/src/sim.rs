@@ -228,7 +228,7 @@ impl<'a> SimWorld<'a> {
         if fails == Some(Failure::AtStart) || (is_instantaneous && fails.is_some()) {
             return self.break_down(ticket);
         }
-        let measured = self.measured(&commanded, snap, 0);
+        let measured = self.measured(&commanded, snap, 0, commanded.planned.as_ref());
         let _ = self.truth.start(ticket, action, &planned, &measured);
         self.tell(Event::Started { ticket, measured });
         if is_instantaneous {
@@ -279,7 +279,7 @@ impl<'a> SimWorld<'a> {
             let why = format!("its end needs {}", self.in_words(&unmet));
             return self.fail(ticket, &why);
         }
-        let measured = self.measured(&commanded, &body.end, 1);
+        let measured = self.measured(&commanded, &body.end, 1, Some(&duration));
         let _ = self.truth.end(ticket, &measured);
         self.actions.remove(&ticket);
         self.tell(Event::Ended {
@@ -302,8 +302,15 @@ impl<'a> SimWorld<'a> {
         }
     }
 
-    /// The amounts that the world file has for a happening; the others are the domain's.
-    fn measured(&self, commanded: &Commanded<'_>, snap: &SnapAction, place: u64) -> Vec<Measured> {
+    /// The amounts that the world file has for a happening; the others are the domain's. `?duration` is
+    /// the planned duration at the start, and the real one at the end.
+    fn measured(
+        &self,
+        commanded: &Commanded<'_>,
+        snap: &SnapAction,
+        place: u64,
+        duration: Option<&Rational>,
+    ) -> Vec<Measured> {
         let action = &commanded.action.name;
         let update = |effect: &Effect| match &effect.change {
             Change::Update { fluent, value, .. } => Some((*fluent, value.clone())),
@@ -317,7 +324,7 @@ impl<'a> SimWorld<'a> {
                 elbowroom_model::ground::Expression::Fluent(fluent) => {
                     self.truth.value_on_arrival(*fluent).cloned()
                 }
-                elbowroom_model::ground::Expression::Duration => commanded.planned.clone(),
+                elbowroom_model::ground::Expression::Duration => duration.cloned(),
                 _ => None,
             });
             let instance = format!("{action} {name} {place}");

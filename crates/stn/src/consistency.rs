@@ -5,7 +5,7 @@ use std::fmt;
 
 use elbowroom_num::Rational;
 
-use crate::{ConstraintId, Network, NodeId, Schedule, Weight};
+use crate::{ConstraintId, Network, NodeId, Schedule, Weight, spend_step};
 
 /// Why a network is inconsistent: constraints that follow each other in a circle and sum up to
 /// `0 <= total < 0`.
@@ -54,6 +54,7 @@ impl<W: Weight> Network<W> {
         let mut tree = Tree::star(self.node_count());
         let mut queue: VecDeque<NodeId> = self.late_nodes_first().into();
         while let Some(node) = queue.pop_front() {
+            spend_step();
             if !std::mem::take(&mut tree.is_queued[node.index()]) {
                 continue;
             }

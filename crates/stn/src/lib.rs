@@ -80,3 +80,11 @@ pub use paths::ShortestPaths;
 pub use schedule::Schedule;
 pub use weight::Weight;
 pub use windows::{Window, Windows};
+
+/// Counts a step of a propagation.
+fn spend_step() {
+    elbowroom_num::work::spend(STEP_WORK);
+}
+
+/// Work that is counted for a step, which visits the edges of a node.
+const STEP_WORK: u64 = 200;

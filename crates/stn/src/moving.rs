@@ -9,7 +9,9 @@ use elbowroom_num::Rational;
 
 use crate::direction::Direction;
 use crate::paths::ShortestPaths;
-use crate::{ConsistentNetwork, ConstraintId, Network, NodeId, Schedule, Weight, Window};
+use crate::{
+    ConsistentNetwork, ConstraintId, Network, NodeId, Schedule, Weight, Window, spend_step,
+};
 
 /// A network, and the [`Window`] of each of its nodes seen from an origin, while limits on single
 /// nodes are added: what executing a plan does to its network.
@@ -213,6 +215,7 @@ impl<W: Weight> MovingWindows<W> {
     /// Hands on the distances of all that are queued.
     fn settle(&mut self, direction: Direction) {
         while let Some(Reverse((key, node))) = self.queue.pop() {
+            spend_step();
             let distance = self
                 .distance(direction, node)
                 .expect("queued with a distance");

@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
 use elbowroom_num::Rational;
 
-use crate::{ConsistentNetwork, Constraint, ConstraintId, Direction, NodeId, Schedule, Weight};
+use crate::{
+    ConsistentNetwork, Constraint, ConstraintId, Direction, NodeId, Schedule, Weight, spend_step,
+};
 
 /// The tightest implied bound between one node, the root, and each other node.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -77,6 +79,7 @@ impl<W: Weight> ConsistentNetwork<W> {
         let mut are_final = BTreeSet::new();
         let mut queue = BinaryHeap::from([Reverse((key(&W::zero(), from), from))]);
         while let Some(Reverse((_, node))) = queue.pop() {
+            spend_step();
             let near = distances.get(&node)?.clone();
             if node == to {
                 return Some(near);
@@ -123,6 +126,7 @@ impl<W: Weight> ConsistentNetwork<W> {
             root,
         )));
         while let Some(Reverse((_, node))) = queue.pop() {
+            spend_step();
             if std::mem::replace(&mut is_final[node.index()], true) {
                 continue;
             }

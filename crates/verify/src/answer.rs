@@ -1,12 +1,21 @@
-//! That an answer says what its certificate proves: [`verify_answer`].
+//! Checks that an answer agrees with its certificate ([`verify_answer`]), and that it is about a plan
+//! ([`verify_answer_of`]).
 
+use std::collections::BTreeMap;
+
+use elbowroom_model::ground::FluentId;
+use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde_json::Value;
 
-use crate::certificate::{Certificate, Chance, End as Side, Guarantee, Reasons};
-use crate::check::{Verified, verify};
+use crate::certificate::{Certificate, Chance, End as Side, Guarantee, Parameter, Reasons};
+use crate::check::{Inside, Verified, verify};
+use crate::claim;
+use crate::derive::{self, NotDerived, Plan};
 use crate::flaw::Flaw;
+use crate::given::GivenPlan;
 use crate::number;
 use crate::sound::Endless;
 
@@ -32,6 +41,9 @@ pub enum AnswerError {
     /// Something in it is not so.
     #[error(transparent)]
     Flaw(#[from] Flaw),
+    /// The checker has no rule that derives the certificate from the files.
+    #[error("not derivable here: {0}")]
+    NotDerivable(String),
 }
 
 /// The part that all answers of `elbowroom envelope` have.
@@ -40,11 +52,20 @@ struct AnyAnswer {
     #[allow(dead_code, reason = "read so that nothing else is taken for an answer")]
     format: Format,
     best: Option<IgnoredAny>,
+    #[serde(default)]
+    settings: AnySettings,
+}
+
+#[derive(Default, Deserialize)]
+struct AnySettings {
+    epsilon: Option<Number>,
 }
 
 /// The part of an answer with a largest box that the certificate is about.
 #[derive(Deserialize)]
 struct Answer {
+    domain: Option<String>,
+    problem: Option<String>,
     settings: Settings,
     parameters: Vec<Room>,
     best: Best,
@@ -64,6 +85,9 @@ struct Settings {
 #[derive(Deserialize)]
 struct Room {
     name: String,
+    quantity: Option<String>,
+    kind: Option<String>,
+    action: Option<String>,
     nominal: Number,
     weight: Number,
     lower: End,
@@ -101,6 +125,151 @@ struct Number {
 #[derive(Deserialize)]
 struct End {
     exact: String,
+    decimal: Option<f64>,
+}
+
+/// Returns `true` if `decimal` is the decimal form of `exact`.
+fn is_near(decimal: f64, exact: &Rational) -> bool {
+    let exact = exact.to_f64();
+    (decimal - exact).abs() <= 4.0 * f64::EPSILON * exact.abs()
+}
+
+/// Returns `true` if each decimal anywhere in the answer is the one of the exact number beside it.
+fn are_decimals_right(value: &Value) -> bool {
+    match value {
+        Value::Array(items) => items.iter().all(are_decimals_right),
+        Value::Object(members) => {
+            let exact = members.get("exact").and_then(Value::as_str);
+            let exact = exact.and_then(|text| text.parse::<Rational>().ok());
+            let decimal = members.get("decimal").and_then(Value::as_f64);
+            let is_right = match (exact, decimal) {
+                (Some(exact), Some(decimal)) => is_near(decimal, &exact),
+                // An infinite number has no decimal.
+                (None, Some(_)) => !members.contains_key("exact"),
+                (_, None) => true,
+            };
+            is_right && members.values().all(are_decimals_right)
+        }
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => true,
+    }
+}
+
+/// Returns the ε of an answer, if it has one.
+///
+/// # Errors
+/// When the text is no answer of `elbowroom envelope`.
+pub fn epsilon_of(text: &str) -> Result<Option<Rational>, AnswerError> {
+    let any: AnyAnswer = serde_json::from_str(text)?;
+    Ok(any.settings.epsilon.map(|epsilon| epsilon.exact))
+}
+
+/// Checks an answer as [`verify_answer`] does, and also that the certificate's network and conditions are
+/// those of the problem and the plan. Nothing is assumed then.
+///
+/// The task needs the ε of the answer ([`epsilon_of`]).
+///
+/// # Errors
+/// The errors of [`verify_answer`], a difference from the plan, or a feature that the checker has
+/// [no rule for](AnswerError::NotDerivable).
+pub fn verify_answer_of(
+    text: &str,
+    task: &Task,
+    plan: &TimeTriggeredPlan,
+) -> Result<Verified, AnswerError> {
+    verify_with(text, task, Plan::Times(plan))
+}
+
+/// Checks as [`verify_answer_of`] does, against a plan that is given with constraints.
+///
+/// # Errors
+/// Those of [`verify_answer_of`].
+pub fn verify_answer_of_network(
+    text: &str,
+    task: &Task,
+    plan: &GivenPlan,
+) -> Result<Verified, AnswerError> {
+    verify_with(text, task, Plan::Network(plan))
+}
+
+fn verify_with(text: &str, task: &Task, plan: Plan<'_>) -> Result<Verified, AnswerError> {
+    let mut verified = verify_answer(text)?;
+    let any: AnyAnswer = serde_json::from_str(text)?;
+    let answer: Answer = serde_json::from_str(text)?;
+    let same = |is_same: bool, what: &str| {
+        let differs = || Flaw::Files(what.to_owned());
+        is_same.then_some(()).ok_or_else(differs)
+    };
+    let problem = task.problem();
+    let is_named =
+        |found: &Option<String>, name: &str| found.as_deref().is_none_or(|own| own == name);
+    same(
+        is_named(&answer.domain, &problem.domain),
+        "the domain has another name",
+    )?;
+    same(
+        is_named(&answer.problem, &problem.name),
+        "the problem has another name",
+    )?;
+    let epsilon = any.settings.epsilon.map(|epsilon| epsilon.exact);
+    same(
+        epsilon.is_none_or(|epsilon| epsilon == *task.epsilon()),
+        "it is for another least separation (epsilon)",
+    )?;
+    let certificate = answer.best.certificate.as_ref();
+    let certificate = certificate.ok_or(AnswerError::NoCertificate)?;
+    let initials = match plan {
+        Plan::Times(_) => initials(&answer, task)?,
+        Plan::Network(_) => BTreeMap::new(),
+    };
+    let derived =
+        derive::check(certificate, task, plan, initials).map_err(|error| match error {
+            NotDerived::Flaw(flaw) => AnswerError::Flaw(flaw),
+            NotDerived::Unknown(what) => AnswerError::NotDerivable(what),
+        })?;
+    for quantity in derived.quantities {
+        let room = answer.parameters.get(quantity.parameter);
+        let room = room.ok_or(Flaw::NoSuch("parameter", quantity.parameter))?;
+        let is_kind = room.kind.as_deref().is_none_or(|own| own == quantity.kind);
+        let action = room.action.as_ref().zip(quantity.action.as_ref());
+        let words = room.quantity.as_ref().zip(quantity.words());
+        let is_told = action.is_none_or(|(own, action)| own == action)
+            && words.is_none_or(|(own, words)| *own == words);
+        let what = format!("{} stands for something else", room.name);
+        same(is_kind && is_told, &what)?;
+    }
+    verified.assumes.clear();
+    verified.proves = claim::proves_all(certificate);
+    verified.from_conditions = std::mem::take(&mut verified.assumed);
+    verified.inside = Some(Inside {
+        is_controllable: true,
+        conditions: Some(derived.conditions),
+        assumed: 0,
+    });
+    Ok(verified)
+}
+
+/// Returns the parameters that are initial values, by fluent.
+fn initials(answer: &Answer, task: &Task) -> Result<BTreeMap<FluentId, usize>, AnswerError> {
+    let mut initials = BTreeMap::new();
+    for (parameter, room) in answer.parameters.iter().enumerate() {
+        match room.kind.as_deref() {
+            None | Some("duration" | "timed") => {}
+            Some("initial") => {
+                let quantity = room.quantity.as_deref().unwrap_or_default();
+                let mut fluents = task.initial().values.keys();
+                let fluent =
+                    fluents.find(|own| quantity == format!("initial {}", task.fluent_name(**own)));
+                let what = || Flaw::Files(format!("{} is no initial value", room.name));
+                let known = initials.insert(*fluent.ok_or_else(what)?, parameter);
+                known.map_or(Ok(()), |_| Err(what()))?;
+            }
+            Some(kind) => {
+                let what = format!("{}, a parameter of the kind `{kind}`", room.name);
+                return Err(AnswerError::NotDerivable(what));
+            }
+        }
+    }
+    Ok(initials)
 }
 
 /// Checks the certificate of an answer, and that the answer says what it proves.
@@ -111,14 +280,16 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
     let any: AnyAnswer = serde_json::from_str(text)?;
     any.best.ok_or(AnswerError::NoBox)?;
     let answer: Answer = serde_json::from_str(text)?;
+    let whole: Value = serde_json::from_str(text)?;
+    same(
+        whole.get("version") == Some(&Value::from(1)),
+        "the version, which is 1,",
+    )?;
+    same(are_decimals_right(&whole), "a decimal and its exact number")?;
     let best = &answer.best;
     let certificate = best.certificate.as_ref();
     let certificate = certificate.ok_or(AnswerError::NoCertificate)?;
     let verified = verify(certificate)?;
-    let same = |is_same: bool, what: &str| {
-        let differs = || Flaw::Differs(what.to_owned());
-        is_same.then_some(()).ok_or_else(differs)
-    };
     let objective = match certificate.reasons {
         Reasons::LeastSlack(_) => Objective::LeastSlack,
         Reasons::Widths(_) => Objective::Widths,
@@ -154,59 +325,77 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
         .zip(&certificate.parameters)
         .enumerate()
     {
-        same(
-            room.name == own.name && room.nominal.exact == own.nominal,
-            &format!("parameter {index}"),
-        )?;
-        same(
-            room.weight.exact == own.weight,
-            &format!("the weight of {}", own.name),
-        )?;
-        let size = own.nominal.abs();
-        same(
-            size.is_zero() || own.scale == size,
-            &format!("the scale of {}", own.name),
-        )?;
-        let counted = &own.scale * &best.most.exact;
-        let slack = |side: usize| {
-            let variable = if certificate.symmetric {
-                index
-            } else {
-                2 * index + side
-            };
-            &certificate.slacks[variable].0
-        };
-        let lower = &own.nominal - slack(0);
-        let upper = &own.nominal + slack(1);
-        let sides = [
-            (&room.lower, Side::Lower, lower, slack(0), &own.most_below),
-            (&room.upper, Side::Upper, upper, slack(1), &own.most_above),
-        ];
-        for (end, which, value, slack, most) in sides {
-            let endless = match which {
-                Side::Lower => "-inf",
-                Side::Upper => "inf",
-            };
-            let is_that = end.exact.parse::<Rational>().is_ok_and(|end| end == value);
-            // What reaches as far as counts, and is stopped by nothing, is infinite.
-            let is_endless = end.exact == endless && *slack == counted;
-            let is_end = match &certificate.sound {
-                None => is_that || is_endless,
-                Some(sound)
-                    if sound.endless.contains(&Endless {
-                        parameter: index,
-                        end: which,
-                    }) =>
-                {
-                    is_endless
-                }
-                Some(_) => is_that,
-            };
-            same(
-                is_end && most.as_ref().is_none_or(|most| most.0 <= counted),
-                &format!("the interval of {}", own.name),
-            )?;
-        }
+        check_interval(&answer, certificate, (index, room, own))?;
     }
     Ok(verified)
+}
+
+/// Checks that the interval of a parameter in the answer is the certificate's.
+fn check_interval(
+    answer: &Answer,
+    certificate: &Certificate,
+    (index, room, own): (usize, &Room, &Parameter),
+) -> Result<(), Flaw> {
+    same(
+        room.name == own.name && room.nominal.exact == own.nominal,
+        &format!("parameter {index}"),
+    )?;
+    same(
+        room.weight.exact == own.weight,
+        &format!("the weight of {}", own.name),
+    )?;
+    let size = own.nominal.abs();
+    same(
+        size.is_zero() || own.scale == size,
+        &format!("the scale of {}", own.name),
+    )?;
+    let counted = &own.scale * &answer.best.most.exact;
+    let slack = |side: usize| {
+        let variable = if certificate.symmetric {
+            index
+        } else {
+            2 * index + side
+        };
+        &certificate.slacks[variable].0
+    };
+    let lower = &own.nominal - slack(0);
+    let upper = &own.nominal + slack(1);
+    let sides = [
+        (&room.lower, Side::Lower, lower, slack(0), &own.most_below),
+        (&room.upper, Side::Upper, upper, slack(1), &own.most_above),
+    ];
+    for (end, which, value, slack, most) in sides {
+        let endless = match which {
+            Side::Lower => "-inf",
+            Side::Upper => "inf",
+        };
+        let is_that = end.exact.parse::<Rational>().is_ok_and(|own| {
+            own == value && end.decimal.is_none_or(|decimal| is_near(decimal, &value))
+        });
+        // What reaches as far as counts, and is stopped by nothing, is infinite.
+        let is_endless = end.exact == endless && *slack == counted;
+        let is_end = match &certificate.sound {
+            None => is_that || is_endless,
+            Some(sound)
+                if sound.endless.contains(&Endless {
+                    parameter: index,
+                    end: which,
+                }) =>
+            {
+                is_endless
+            }
+            Some(_) => is_that,
+        };
+        same(
+            is_end && most.as_ref().is_none_or(|most| most.0 <= counted),
+            &format!("the interval of {}", own.name),
+        )?;
+    }
+    Ok(())
+}
+
+/// Returns an error that names `what` unless answer and certificate say the same of it.
+fn same(is_same: bool, what: &str) -> Result<(), Flaw> {
+    let differs = || Flaw::Differs(what.to_owned());
+    is_same.then_some(()).ok_or_else(differs)
 }

@@ -27,6 +27,8 @@ pub struct Verified {
     pub proofs: usize,
     /// How many of these are not proved from the network, but taken from the certificate.
     pub assumed: usize,
+    /// The number of inequalities proved from conditions on numbers, derived from problem and plan.
+    pub from_conditions: usize,
     /// What is proved of the box being inside the envelope; none if that is taken for granted.
     pub inside: Option<Inside>,
     /// What is proved, in words.
@@ -103,6 +105,7 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
         tolerance,
         proofs: certificate.proofs.len(),
         assumed: certificate.proofs.iter().filter(is_assumed).count(),
+        from_conditions: 0,
         inside,
         proves,
         assumes,

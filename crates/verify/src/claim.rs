@@ -10,12 +10,17 @@ pub(crate) fn proves(certificate: &Certificate) -> String {
         let is_proved = |own: &Condition| !own.cases.is_empty();
         sound.control != Control::Assumed && conditions.is_some_and(|own| own.iter().all(is_proved))
     });
-    let best = is_best(certificate);
     if is_inside {
-        format!("the box is inside the envelope, and {best}")
+        proves_all(certificate)
     } else {
-        best.to_owned()
+        is_best(certificate).to_owned()
     }
+}
+
+/// The claim of a certificate without any assumption.
+pub(crate) fn proves_all(certificate: &Certificate) -> String {
+    let best = is_best(certificate);
+    format!("the box is inside the envelope, and {best}")
 }
 
 /// That no box is better.

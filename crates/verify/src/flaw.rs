@@ -105,4 +105,7 @@ pub enum Flaw {
     /// The answer says something else than its certificate.
     #[error("the answer and its certificate differ in {0}")]
     Differs(String),
+    /// The answer is not about the problem and the plan.
+    #[error("the answer is not about these files: {0}")]
+    Files(String),
 }

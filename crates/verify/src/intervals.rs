@@ -42,6 +42,37 @@ impl Intervals {
         Ok(Self(intervals))
     }
 
+    /// These values alone.
+    pub(crate) fn exactly(values: impl Iterator<Item = Rational>) -> Self {
+        Self(values.map(|own| [Some(own.clone()), Some(own)]).collect())
+    }
+
+    /// Those parameters for which `is_up` says so have at least their nominal value, or at most that, and the
+    /// others just that. None is negative, unless `is_signed` says so.
+    pub(crate) fn around_nominal(
+        certificate: &Certificate,
+        is_signed: &dyn Fn(usize) -> bool,
+        is_up: impl Fn(usize) -> Option<bool>,
+    ) -> Self {
+        let parameters = certificate.parameters.iter().enumerate();
+        let intervals = parameters.map(|(index, own)| {
+            let nominal = Some(own.nominal.clone());
+            match is_up(index) {
+                None => [nominal.clone(), nominal],
+                Some(true) => [nominal, None],
+                Some(false) => [(!is_signed(index)).then_some(Rational::ZERO), nominal],
+            }
+        });
+        Self(intervals.collect())
+    }
+
+    /// All values of quantities that are not negative, unless `is_signed` says so.
+    pub(crate) fn widest(certificate: &Certificate, is_signed: &dyn Fn(usize) -> bool) -> Self {
+        let parameters = 0..certificate.parameters.len();
+        let least = |own: usize| (!is_signed(own)).then_some(Rational::ZERO);
+        Self(parameters.map(|own| [least(own), None]).collect())
+    }
+
     /// The ends of a parameter's interval.
     ///
     /// # Errors

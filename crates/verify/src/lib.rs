@@ -12,7 +12,8 @@
 //! rules for times or a closed network, by guarantee, and sums of bounds that refute each way in which
 //! a condition of the plan could fail. So there is nothing to believe but
 //!
-//! - that the network and the conditions are those of the plan,
+//! - that the network and the conditions are those of the plan. With problem and plan,
+//!   [`verify_answer_of`] (or [`verify_answer_of_network`]) derives both and assumes nothing about them (`derive`),
 //! - the theorems that make the cycles conflicts (Vidal & Fargier 1999; Morris & Muscettola 2005;
 //!   Morris 2006), and a closed network one that can be controlled (Morris & Muscettola 2005), and that
 //!   a box inside the envelope has its sub-boxes there, too.
@@ -20,8 +21,8 @@
 //! What the network does not show, such as cuts by conditions on numbers, is in it as an assumption with
 //! its reason in words; how many there are is part of the verdict.
 //!
-//! This crate knows exact numbers, for [`no_plan`] what a planning problem means, and nothing of networks
-//! or search.
+//! This crate knows exact numbers and what a planning problem means, and imports nothing that makes
+//! networks or searches.
 //!
 //! Work of 10 seconds has to end while a light burns, for 5. How far may both deviate if nobody
 //! knows in advance how long they take? By 20 %, and the certificate has the cycle of bounds that
@@ -49,7 +50,9 @@ mod check;
 mod claim;
 mod conditions;
 mod control;
+mod derive;
 mod flaw;
+mod given;
 mod intervals;
 mod network;
 pub mod no_plan;
@@ -58,11 +61,15 @@ mod probability;
 pub mod row;
 mod volume;
 
-pub use answer::{AnswerError, verify_answer};
+pub use answer::{
+    AnswerError, epsilon_of, verify_answer, verify_answer_of, verify_answer_of_network,
+};
 pub use bounds::Ends;
 pub use certificate::{
     Case, Certificate, Chance, Constraint, End, Exact, Guarantee, Limit, Multiplier, Parameter,
     Part, Proof, Reasons, Shape, Source, Stopped, Sum, Term, Total, Touch, Way, sound,
 };
 pub use check::{Inside, Verified, added_up, verify};
+pub use derive::NotDerived;
 pub use flaw::Flaw;
+pub use given::{GivenConstraint, GivenInstance, GivenParameter, GivenPlan};

@@ -29,6 +29,8 @@ mod lasting;
 mod moments;
 pub mod pairs;
 mod processes;
+mod relevance;
+mod valueless;
 
 use std::collections::BTreeMap;
 
@@ -57,6 +59,9 @@ pub struct NoPlan {
     /// The files that the problem was read from, as they were named: domain and problem.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<String>,
+    /// The least separation ε of interfering happenings that the proof uses. Only bounds on pairs need it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub epsilon: Option<Exact>,
     /// The facts that can become true, by time. Facts that only timed initials change are not among
     /// them: the problem says when these hold.
     pub reached: Vec<Group>,
@@ -198,13 +203,19 @@ enum Format {
 /// When it has none.
 pub fn certificate_of(answer: &str) -> Result<NoPlan, NoPlanAnswerError> {
     let answer: Answer = serde_json::from_str(answer)?;
-    if answer.finding != "no plan" {
-        return Err(NoPlanAnswerError::NotDenied);
+    match (
+        answer.finding.as_str(),
+        answer.certificate,
+        answer.uncertified,
+    ) {
+        ("no plan", Some(certificate), _) => Ok(certificate),
+        (_, _, Some(why)) => Err(NoPlanAnswerError::Uncertified(why)),
+        ("no plan", None, None) => {
+            let why = "it does not say why".to_owned();
+            Err(NoPlanAnswerError::Uncertified(why))
+        }
+        _ => Err(NoPlanAnswerError::NotDenied),
     }
-    answer.certificate.ok_or_else(|| {
-        let why = answer.uncertified;
-        NoPlanAnswerError::Uncertified(why.unwrap_or_else(|| "it says not why".to_owned()))
-    })
 }
 
 /// Checks that the certificate proves that the task has no plan.
@@ -311,6 +322,7 @@ pub fn no_plan_certificate(task: &Task, reached: &Reached) -> NoPlan {
     NoPlan {
         proves: PROVES.to_owned(),
         files: Vec::new(),
+        epsilon: None,
         reached: reached.collect(),
         apart: Vec::new(),
         closed: None,

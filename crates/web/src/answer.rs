@@ -12,7 +12,7 @@ use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
 use elbowroom::envelope::{BestSettings, Guarantee};
 use elbowroom::execute::{RunSpec, SpecError};
 use elbowroom::execution::executors::EXECUTORS;
-use elbowroom::execution::run::Verdict;
+use elbowroom::execution::run::{MissingPlan, TimeoutRule, Verdict};
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
@@ -21,7 +21,7 @@ use elbowroom::plan::format;
 use elbowroom::plan::parametrize::VarySpec;
 use elbowroom::report::trace::TraceWriter;
 use elbowroom::sim::WorldModel;
-use elbowroom::{AnyPlan, PlanKind};
+use elbowroom::{AnyPlan, PlanKind, RoundingRule};
 use serde_json::json;
 
 use crate::question::{
@@ -72,17 +72,25 @@ impl Read {
 
     /// A plan of either kind: told by its content, or by a name that ends in `.stn`.
     fn plan(&mut self, text: &Text) -> Result<AnyPlan, Failure> {
+        self.plan_by(text, &RoundingRule::default())
+    }
+
+    fn plan_by(&mut self, text: &Text, rule: &RoundingRule) -> Result<AnyPlan, Failure> {
         let has_name_of_stn = text.name.to_ascii_lowercase().ends_with(".stn");
         if has_name_of_stn || PlanKind::of_text(&text.text) == PlanKind::Stn {
             return Ok(AnyPlan::Stn(format::read(text.source(), &self.task)?));
         }
-        let (plan, warnings) = pddl::read_plan(&text.source(), &self.task)?;
+        let (plan, warnings) = rule.read_plan(&text.source(), &self.task)?;
         self.warnings.extend(warnings);
         Ok(AnyPlan::TimeTriggered(plan))
     }
 
-    fn plan_with_times(&mut self, text: &Text) -> Result<TimeTriggeredPlan, Failure> {
-        match self.plan(text)? {
+    fn plan_with_times(
+        &mut self,
+        text: &Text,
+        rule: &RoundingRule,
+    ) -> Result<TimeTriggeredPlan, Failure> {
+        match self.plan_by(text, rule)? {
             AnyPlan::TimeTriggered(plan) => Ok(plan),
             AnyPlan::Stn(_) => Err(Failure::new(format!(
                 "{} is an STN plan file, which stands for many plans; give a plan with fixed times",
@@ -98,13 +106,14 @@ fn checked(question: &CheckQuestion) -> Result<Reply, Failure> {
         &question.problem,
         question.epsilon.as_deref(),
     )?;
+    let tolerance = question.tolerance.as_deref();
+    let tolerance = tolerance
+        .map(|text| number("tolerance", text))
+        .transpose()?;
+    let rule = RoundingRule::with_tolerance(tolerance);
     let plan = match &question.plan {
-        Some(text) => Some(read.plan_with_times(text)?),
+        Some(text) => Some(read.plan_with_times(text, &rule)?),
         None => None,
-    };
-    let settings = match &question.tolerance {
-        Some(text) => Settings::like_val(number("tolerance", text)?),
-        None => Settings::default(),
     };
     let request = CheckRequest {
         task: &read.task,
@@ -113,7 +122,7 @@ fn checked(question: &CheckQuestion) -> Result<Reply, Failure> {
             .plan
             .as_ref()
             .map_or_else(String::new, |text| text.name.clone()),
-        settings,
+        settings: Settings::default(),
     };
     let answer = check(&request).map_err(Failure::new)?;
     let is_invalid = matches!(
@@ -144,6 +153,7 @@ fn planned(
         task: &read.task,
         first_plan_only: question.first || limit.is_none(),
         most_memory: None,
+        self_overlap: question.self_overlap,
         threads: 1,
     };
     let outcome = plan(&mut request, &mut Watch::start(clock, limit)).map_err(Failure::new)?;
@@ -225,6 +235,7 @@ fn widened(
         vary,
         guarantee: question.guarantee.unwrap_or_default(),
         enforce: question.enforce,
+        timeout: timeout(question.timeout.as_deref())?,
         contains: question.contains.clone(),
         search: Search {
             relative: match precision {
@@ -234,7 +245,7 @@ fn widened(
             precision: precision.unwrap_or(search.precision),
             growth: question.growth,
             sharpen: question.sharpen,
-            method: question.method.into(),
+            method: question.method.map(Method::of_boxes),
             most_checks: search.most_checks,
             best: BestSettings {
                 objective: question.objective,
@@ -245,7 +256,7 @@ fn widened(
         world,
         ..EnvelopeRequest::new(&Arc::new(read.task), plan)
     };
-    if question.method == Method::Exact {
+    if question.method == Some(Method::Exact) {
         return delimited(question, &request, &read.warnings, &mut watch);
     }
     let outcome = envelope(&request, &mut watch).map_err(Failure::new)?;
@@ -289,6 +300,12 @@ fn delimited(
     })
 }
 
+/// The rule that sets time-outs.
+fn timeout(text: Option<&str>) -> Result<TimeoutRule, Failure> {
+    text.map_or(Ok(TimeoutRule::default()), str::parse)
+        .map_err(|error| Failure::new(format!("timeout: {error}")))
+}
+
 fn ran(
     question: &RunQuestion,
     clock: &mut (dyn FnMut() -> Duration + Send),
@@ -304,6 +321,7 @@ fn ran(
     if let Some(executor) = &question.executor {
         spec.executor = executor.parse().map_err(Failure::new)?;
     }
+    spec.timeout = timeout(question.timeout.as_deref())?;
     if let Some(most) = question.max_replans {
         spec.max_replans = most;
     }
@@ -316,7 +334,7 @@ fn ran(
         question.epsilon.as_deref(),
     )?;
     let first = match &question.plan {
-        Some(text) => Some(read.plan_with_times(text)?),
+        Some(text) => Some(read.plan_with_times(text, &RoundingRule::default())?),
         None => None,
     };
     spec.check().map_err(contradiction)?;
@@ -333,8 +351,12 @@ fn ran(
     Ok(Reply {
         exit: match outcome.verdict() {
             Verdict::GoalReached => YES,
-            Verdict::Unsolvable | Verdict::NoPlan { .. } => NO,
-            Verdict::ReplanLimit | Verdict::TimeLimit => LIMIT,
+            Verdict::Unsolvable
+            | Verdict::NoPlan {
+                missing: MissingPlan::NotSearched,
+                ..
+            } => NO,
+            Verdict::ReplanLimit | Verdict::TimeLimit | Verdict::NoPlan { .. } => LIMIT,
             Verdict::Interrupted => INTERRUPTED,
             Verdict::PlannerFailed { .. } | Verdict::WorldFailed { .. } => BAD_INPUT,
         },

@@ -74,6 +74,9 @@ pub struct PlanQuestion {
     /// Whether the first plan is enough, whatever time is left.
     #[serde(default)]
     pub first: bool,
+    /// `true` if a ground action may overlap itself in the plan.
+    #[serde(default)]
+    pub self_overlap: bool,
 }
 
 /// Asks for a plan's network.
@@ -120,12 +123,16 @@ pub struct EnvelopeQuestion {
     /// Whether the dispatcher enforces conditions that bound the difference of two times.
     #[serde(default)]
     pub enforce: bool,
+    /// The rule that sets the time-out of each action: `none`, a number of seconds, or `10x,600`, the
+    /// default.
+    #[serde(default)]
+    pub timeout: Option<String>,
     /// The box that is asked about; without one, a large one is looked for.
     #[serde(default)]
     pub contains: Option<String>,
     /// The algorithm.
     #[serde(default)]
-    pub method: Method,
+    pub method: Option<Method>,
     /// With the method `exact`: whether the answer has the region's volume, and boxes with their
     /// shares of it.
     #[serde(default)]
@@ -174,7 +181,7 @@ pub struct RunQuestion {
     /// Probabilities for the executors that use them (`docs/formats/likelihoods.md`).
     #[serde(default)]
     pub likelihoods: Option<Text>,
-    /// Who decides: `guarded` if there is none.
+    /// The executor; `live` if there is none.
     #[serde(default)]
     pub executor: Option<String>,
     /// The seed of the world's random numbers.
@@ -183,6 +190,9 @@ pub struct RunQuestion {
     /// As for an [envelope](EnvelopeQuestion::guarantee).
     #[serde(default)]
     pub guarantee: Guarantee,
+    /// As for an [envelope](EnvelopeQuestion::timeout).
+    #[serde(default)]
+    pub timeout: Option<String>,
     /// How many new plans may be made.
     #[serde(default)]
     pub max_replans: Option<usize>,
@@ -192,11 +202,10 @@ pub struct RunQuestion {
 }
 
 /// The algorithm of an envelope.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Incremental rectangular robustification.
-    #[default]
     Irr,
     /// The largest box.
     Best,
@@ -204,12 +213,13 @@ pub enum Method {
     Exact,
 }
 
-impl From<Method> for envelope::Method {
-    /// The whole region is found without looking for a box.
-    fn from(method: Method) -> Self {
-        match method {
-            Method::Irr | Method::Exact => Self::Irr,
-            Method::Best => Self::Best,
+impl Method {
+    /// The method of the search for a box.
+    pub fn of_boxes(self) -> envelope::Method {
+        match self {
+            // The whole region is found without looking for a box.
+            Self::Irr | Self::Exact => envelope::Method::Irr,
+            Self::Best => envelope::Method::Best,
         }
     }
 }

@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use elbowroom::RoundingRule;
 use elbowroom::envelope as library;
+use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
-use super::number::{positive, whole};
+use super::number::{positive, positive_or_zero, timeout, whole};
 use crate::exit::Failure;
 
 #[derive(Args, Debug)]
@@ -22,12 +24,12 @@ pub(crate) struct EnvelopeArgs {
     /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file
     #[arg(value_name = "PLAN|FILE.stn")]
     pub(crate) plan: PathBuf,
-    /// A quantity that may deviate; may be repeated. By default all durations that the domain fixes
-    /// (what it leaves open is the executor's choice), or the parameters of the STN plan file or of
-    /// the domain (`:synth-parameters`)
+    /// A quantity that may deviate; may be repeated. By default all durations,
+    /// or the parameters of the STN plan file or of the domain (`:synth-parameters`)
     #[arg(long, value_name = "SPEC")]
     pub(crate) vary: Vec<String>,
-    /// The algorithm; `best` if --objective, --symmetric or --cap is given, otherwise `irr`
+    /// The algorithm: by default `best`; `irr` with --precision, --growth or --sharpen, and for
+    /// problems with processes or events
     #[arg(long, value_enum)]
     method: Option<Method>,
     /// What the largest box is the greatest of; by default the least slack
@@ -45,14 +47,14 @@ pub(crate) struct EnvelopeArgs {
     /// same
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     cap: Option<Rational>,
-    /// Step size at which the search ends, in the unit of the plan: each bound is closer to its
-    /// limit than twice this. By default a hundredth of each nominal value
+    /// Of IRR: step size at which the search ends, in the unit of the plan: each bound is closer to
+    /// its limit than twice this. By default a hundredth of each nominal value
     #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) precision: Option<Rational>,
-    /// Whether the step size doubles after a success, as by default, or stays constant
+    /// Of IRR: whether the step size doubles after a success, as by default, or stays constant
     #[arg(long, value_enum)]
     pub(crate) growth: Option<Growth>,
-    /// Finally move each bound exactly to its limit
+    /// Of IRR: finally move each bound exactly to its limit
     #[arg(long)]
     pub(crate) sharpen: bool,
     /// The guarantee that holds inside the envelope; by default dynamic
@@ -66,6 +68,11 @@ pub(crate) struct EnvelopeArgs {
     /// `(name argument …)`, where `_` matches any argument; may be repeated
     #[arg(long, value_name = "ACTION")]
     pub(crate) controllable: Vec<String>,
+    /// Largest difference between a printed time or duration and that of a valid plan (T) that counts
+    /// as rounding; 0 takes the plan as printed. By default one unit of the last printed digit, at
+    /// most 0.001
+    #[arg(long, value_name = "T", value_parser = positive_or_zero, allow_negative_numbers = true)]
+    pub(crate) tolerance: Option<Rational>,
     /// Minimum time between interfering happenings (epsilon)
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]
@@ -73,6 +80,10 @@ pub(crate) struct EnvelopeArgs {
     /// Time limit in seconds; the best envelope so far is printed
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) time_limit: Option<Rational>,
+    /// Time-out of each action, which the plan's promise names: `none`, a number of seconds, or `10x,600`,
+    /// the default: 10 times the planned duration, at least 600. --contains refuses a box beyond it
+    #[arg(long, value_name = "none|S|Fx,S", value_parser = timeout, allow_negative_numbers = true)]
+    pub(crate) timeout: Option<TimeoutRule>,
     /// Test whether this box is inside the envelope: `"dur_0=[7/4,12] (drive a b)=12 all=±10%"`;
     /// parameters that are not named keep their nominal value
     #[arg(long, value_name = "BOX")]
@@ -116,6 +127,11 @@ pub(crate) struct EnvelopeArgs {
 }
 
 impl EnvelopeArgs {
+    /// The rule about rounded plans.
+    pub(crate) fn rounding(&self) -> RoundingRule {
+        RoundingRule::with_tolerance(self.tolerance.clone())
+    }
+
     /// Refuses what has nothing to do with repairs.
     ///
     /// # Errors
@@ -130,6 +146,7 @@ impl EnvelopeArgs {
             ("--precision", self.precision.is_some()),
             ("--growth", self.growth.is_some()),
             ("--sharpen", self.sharpen),
+            ("--timeout", self.timeout.is_some()),
             ("--contains", self.contains.is_some()),
             ("--order", self.order.is_some()),
             ("--enforce", self.enforce),
@@ -194,6 +211,7 @@ impl EnvelopeArgs {
             ("--precision", self.precision.is_some()),
             ("--growth", self.growth.is_some()),
             ("--sharpen", self.sharpen),
+            ("--timeout", self.timeout.is_some()),
             ("--contains", self.contains.is_some()),
             ("--order", self.order.is_some()),
         ];
@@ -222,7 +240,9 @@ impl EnvelopeArgs {
     ///
     /// # Errors
     /// When IRR is asked for something that only the largest box has.
-    pub(crate) fn method(&self) -> Result<(library::Method, library::BestSettings), Failure> {
+    pub(crate) fn method(
+        &self,
+    ) -> Result<(Option<library::Method>, library::BestSettings), Failure> {
         let for_best = [
             ("--objective", self.objective.is_some()),
             ("--symmetric", self.symmetric),
@@ -244,8 +264,9 @@ impl EnvelopeArgs {
                     "leave out --method exact",
                 ));
             }
-            (Some(Method::Irr) | None, None) => library::Method::Irr,
-            (Some(Method::Best), _) | (None, Some(_)) => library::Method::Best,
+            (None, None) => None,
+            (Some(Method::Irr), None) => Some(library::Method::Irr),
+            (Some(Method::Best), _) | (None, Some(_)) => Some(library::Method::Best),
         };
         let default = library::BestSettings::default();
         let best = library::BestSettings {
@@ -301,6 +322,15 @@ pub(crate) enum Method {
     Best,
     /// No box, but all values for which the plan works, as inequalities
     Exact,
+}
+
+/// The algorithm that computes the envelopes of runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BoxMethod {
+    /// Incremental rectangular robustification: widen one bound at a time
+    Irr,
+    /// The largest box by --objective
+    Best,
 }
 
 /// The objective of the largest box.

@@ -1,5 +1,6 @@
 //! Numbers on the command line.
 
+use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
 fn number(text: &str) -> Result<Rational, String> {
@@ -34,6 +35,12 @@ pub(super) fn factor(text: &str) -> Result<Rational, String> {
         return Err("it must lie between 0.000001 and 1000000000".to_owned());
     }
     Ok(value)
+}
+
+/// Reads the rule that sets time-outs.
+pub(super) fn timeout(text: &str) -> Result<TimeoutRule, String> {
+    text.parse::<TimeoutRule>()
+        .map_err(|error| format!("it must be {}", error.expected))
 }
 
 pub(super) fn positive_or_zero(text: &str) -> Result<Rational, String> {

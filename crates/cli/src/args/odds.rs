@@ -10,6 +10,10 @@ use super::ProblemArgs;
 use super::number::{count, positive, whole};
 
 #[derive(Args, Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is an option of the command line"
+)]
 pub(crate) struct OddsArgs {
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
@@ -22,6 +26,9 @@ pub(crate) struct OddsArgs {
     /// Take the order of the plan's actions that is most likely to succeed, not that of its times
     #[arg(long)]
     pub(crate) best: bool,
+    /// Let a ground action overlap itself in plans that the embedded planner makes
+    #[arg(long)]
+    pub(crate) self_overlap: bool,
     /// What an effect that fails leaves behind
     #[arg(long, value_enum, default_value_t = SemanticsChoice::Paper)]
     pub(crate) semantics: SemanticsChoice,

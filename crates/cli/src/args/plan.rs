@@ -10,6 +10,10 @@ use super::number::{count, positive};
 
 #[derive(Args, Debug)]
 #[command(after_long_help = PLANNER_HELP)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is an option of the command line"
+)]
 pub(crate) struct PlanArgs {
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
@@ -32,6 +36,10 @@ pub(crate) struct PlanArgs {
     /// The world file (docs/formats/world.md) for --objective probability
     #[arg(long, value_name = "WORLD.toml", requires = "objective")]
     pub(crate) world: Option<PathBuf>,
+    /// Let a ground action overlap itself in the plan: start again before it has ended. Without it, no plan of
+    /// the embedded planner does
+    #[arg(long)]
+    pub(crate) self_overlap: bool,
     /// Memory limit in MB, of all that planning takes; by default, the states of the embedded
     /// planner may take 2048
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
@@ -45,6 +53,10 @@ pub(crate) struct PlanArgs {
     /// Write the plan to this file instead of standard output
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+    /// Write all numbers exactly, as fractions where they have no finite decimal; without it, as
+    /// decimals that other tools read
+    #[arg(long)]
+    pub(crate) exact: bool,
     /// Minimum time between interfering happenings (epsilon)
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]

@@ -3,11 +3,16 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
+use elbowroom::answers::envelope::objective_of;
+use elbowroom::envelope as library;
+use elbowroom::execution::executors::DEFAULT_EXECUTOR;
+use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
-use super::envelope::{Guarantee, Objective, controllable};
-use super::number::{count, factor, positive, whole};
+use super::envelope::{BoxMethod, Guarantee, Objective, controllable};
+use super::number::{count, factor, positive, positive_or_zero, timeout, whole};
 use super::plan::EMBEDDED;
+use crate::exit::Failure;
 use crate::serve::Address;
 
 #[derive(Args, Debug)]
@@ -41,14 +46,25 @@ pub(crate) struct RunArgs {
     /// default the likeliest where one of the two is given, and the shortest elsewhere
     #[arg(long = "first-plan", value_enum)]
     pub(crate) first_plan_by: Option<FirstPlanChoice>,
-    /// Number of states that the embedded planner may evaluate for a plan
-    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = whole)]
+    /// Work limit for each choice of the first plan and each new plan, in seconds of one processor. The
+    /// work is counted, so that it is the same on every machine. As long as there is no plan at all, a
+    /// search may take four times as much
+    #[arg(long, value_name = "S", value_parser = positive, default_value = "2")]
     #[arg(allow_negative_numbers = true)]
-    pub(crate) planner_states: u64,
+    pub(crate) planning_budget: Rational,
+    /// Number of states that the embedded planner may evaluate for a plan; without it, only
+    /// --planning-budget limits them
+    #[arg(long, value_name = "N", value_parser = whole)]
+    #[arg(allow_negative_numbers = true)]
+    pub(crate) planner_states: Option<u64>,
     /// Number of states after the first plan, in search of a better one
     #[arg(long, value_name = "N", default_value_t = 2_000, value_parser = whole)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) improve_states: u64,
+    /// Let a ground action overlap itself in plans of the embedded planner: start again before it has ended.
+    /// Without it, no plan that is made does; a given plan may, with a warning
+    #[arg(long, conflicts_with_all = ["replay", "resume"])]
+    pub(crate) self_overlap: bool,
     /// Number of threads of the embedded planner; 0 for one per processor; 1 unless it is given, as on a robot
     /// the other processors have work of their own. The plans are the same, but come sooner
     #[arg(long, value_name = "N", value_parser = count, conflicts_with = "replay")]
@@ -81,7 +97,7 @@ pub(crate) struct RunArgs {
     #[arg(long, requires = "programs")]
     pub(crate) strict_world: bool,
     /// The executor
-    #[arg(long, value_name = "NAME", default_value = "guarded")]
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_EXECUTOR)]
     pub(crate) executor: String,
     /// Probabilities of success and of spontaneous change (docs/formats/likelihoods.md), for the
     /// executors that use them; without it, everything is certain
@@ -97,8 +113,7 @@ pub(crate) struct RunArgs {
         conflicts_with = "world_process"
     )]
     pub(crate) seed: u64,
-    /// A quantity that may deviate, see `elbowroom help envelope`; by default all durations that
-    /// the domain fixes
+    /// A quantity that may deviate, see `elbowroom help envelope`; by default all durations
     #[arg(long, value_name = "SPEC")]
     pub(crate) vary: Vec<String>,
     /// An action whose duration the executor chooses, see `elbowroom help envelope`
@@ -107,12 +122,15 @@ pub(crate) struct RunArgs {
     /// The guarantee that holds inside the envelopes
     #[arg(long, value_enum, default_value_t = Guarantee::Dynamic)]
     pub(crate) guarantee: Guarantee,
-    /// Step size at which the search for an envelope ends, in the unit of the plan; by default a
-    /// hundredth of each nominal value
+    /// The algorithm for envelopes, see `elbowroom help envelope`; by default `best`, and `irr` with
+    /// --precision
+    #[arg(long, value_enum)]
+    pub(crate) method: Option<BoxMethod>,
+    /// Of IRR: step size at which the search for an envelope ends, in the unit of the plan; by default
+    /// a hundredth of each nominal value
     #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) precision: Option<Rational>,
-    /// What the envelopes are to be the best of, see `elbowroom help envelope`; without it, they are
-    /// those of IRR
+    /// The objective of the envelopes, see `elbowroom help envelope`; by default `least-slack`
     #[arg(long, value_enum)]
     pub(crate) objective: Option<Objective>,
     /// What happens to running actions when a new plan is made
@@ -126,6 +144,12 @@ pub(crate) struct RunArgs {
     /// Memory in MB that a plan in the making may take while the run goes on
     #[arg(long, value_name = "MB", default_value = "1000", value_parser = clap::value_parser!(u64).range(1..1_000_000))]
     pub(crate) planner_memory: Option<u64>,
+    /// Time-out of each action, from its start or its last progress: `none`, a number of seconds, or
+    /// `10x,600`, the default: 10 times the planned duration, at least 600. An action that
+    /// reaches it is cancelled, after a warning
+    #[arg(long, value_name = "none|S|Fx,S", value_parser = timeout, default_value_t)]
+    #[arg(hide_default_value = true, allow_negative_numbers = true)]
+    pub(crate) timeout: TimeoutRule,
     /// Number of new plans that may be made
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count)]
     #[arg(allow_negative_numbers = true)]
@@ -180,6 +204,11 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "TRACE", conflicts_with_all = IN_THE_TRACE)]
     #[arg(conflicts_with_all = ["answer_within", "strict_world"])]
     pub(crate) replay: Option<PathBuf>,
+    /// Largest difference between a printed time or duration and that of a valid plan (T) that counts
+    /// as rounding; 0 takes the plan as printed. By default one unit of the last printed digit, at
+    /// most 0.001
+    #[arg(long, value_name = "T", value_parser = positive_or_zero, allow_negative_numbers = true)]
+    pub(crate) tolerance: Option<Rational>,
     /// Minimum time between interfering happenings (epsilon)
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]
@@ -198,6 +227,24 @@ impl RunArgs {
     /// Whether the world is the spoiler.
     pub(crate) fn is_spoiled(&self) -> bool {
         self.world.as_deref() == Some(std::path::Path::new("spoiler"))
+    }
+
+    /// Returns the objective of the envelopes; `None` if they are those of IRR.
+    ///
+    /// # Errors
+    /// When IRR is asked for something that only the largest box has.
+    pub(crate) fn objective(&self) -> Result<Option<library::Objective>, Failure> {
+        let method = self.method.map(|method| match method {
+            BoxMethod::Irr => library::Method::Irr,
+            BoxMethod::Best => library::Method::Best,
+        });
+        let objective = self.objective.map(Into::into);
+        objective_of(method, objective, self.precision.is_some()).map_err(|_| {
+            Failure::new(
+                "--objective is about the largest box, which --method irr does not look for",
+                "leave out --method irr, or --objective",
+            )
+        })
     }
 
     /// The `--vary` specifications of the arguments.
@@ -225,6 +272,7 @@ const IN_THE_TRACE: &[&str] = &[
     "planner",
     "planner_time",
     "first_plan_by",
+    "planning_budget",
     "planner_states",
     "improve_states",
     "world",
@@ -236,16 +284,19 @@ const IN_THE_TRACE: &[&str] = &[
     "vary",
     "controllable",
     "guarantee",
+    "method",
     "precision",
     "objective",
     "running",
     "planning_time",
+    "timeout",
     "max_replans",
     "time_limit",
     "realtime",
     "trace",
     "journal",
     "epsilon",
+    "tolerance",
 ];
 
 /// The treatment of running actions when a new plan is made.

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use elbowroom::RoundingRule;
 use elbowroom::answers::RequestError;
 use elbowroom::answers::check::{
     CheckAnswer, CheckFinding, CheckRequest, FluentValue, MarginAnswer, PlanChecked,
@@ -56,8 +57,15 @@ fn line(finding: &Record) -> String {
 
 fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
+    let rule = RoundingRule::with_tolerance(arguments.tolerance.clone());
     let plan = match &arguments.plan {
-        Some(path) => Some(input::time_triggered(&task, path, FOR_NETWORKS, output)?),
+        Some(path) => Some(input::time_triggered(
+            &task,
+            path,
+            &rule,
+            FOR_NETWORKS,
+            output,
+        )?),
         None => None,
     };
     let name = arguments
@@ -69,10 +77,7 @@ fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
         task: &task,
         plan: plan.as_ref(),
         name: name.clone(),
-        settings: match &arguments.tolerance {
-            Some(tolerance) => Settings::like_val(tolerance.clone()),
-            None => Settings::default(),
-        },
+        settings: Settings::default(),
     };
     let answer = check(&request).map_err(|error| match error {
         RequestError::Undecided(why) => {
@@ -80,18 +85,22 @@ fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
         }
         error => Failure::new(error, ""),
     })?;
+    let is_invalid = matches!(
+        &answer,
+        CheckAnswer::Plan(PlanChecked {
+            finding: CheckFinding::Invalid { .. },
+            ..
+        })
+    );
     if arguments.json {
         output.document(&answer)?;
     } else {
         output::print(&text(&task, &answer, Look::of_stdout()))?;
+        if is_invalid {
+            input::tell_about_repairs();
+        }
     }
-    Ok(match answer {
-        CheckAnswer::Plan(PlanChecked {
-            finding: CheckFinding::Invalid { .. },
-            ..
-        }) => Exit::No,
-        _ => Exit::Yes,
-    })
+    Ok(if is_invalid { Exit::No } else { Exit::Yes })
 }
 
 fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {

@@ -16,7 +16,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::args::CompareArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::interrupt::Interrupt;
-use crate::look::Look;
+use crate::look::{BAD, Look, styled};
 use crate::output::Output;
 use crate::stopwatch::Stopwatch;
 use crate::words::plain;
@@ -70,7 +70,14 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     }
     // What was ended early is shown and kept, but is not what was asked for.
     written.map(|()| {
-        if answer.is_interrupted() {
+        let invalid = answer.invalid_notes();
+        if !invalid.is_empty() {
+            for note in invalid {
+                output::tell(&styled(BAD, &note));
+            }
+            output::tell("Please report it. With `-o DIR`, DIR/failures has the traces.");
+            Exit::Bug
+        } else if answer.is_interrupted() {
             Exit::Interrupted
         } else {
             Exit::Yes

@@ -3,11 +3,12 @@
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind};
 
-use elbowroom::answers::Exact;
+use elbowroom::answers::exact::{INFINITY, MINUS_INFINITY};
 use elbowroom::executive::documents::{
     GivenNumber, GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow, PlanNow, Refusal,
     State, StepNow, Taken,
 };
+use elbowroom::num::End;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -255,6 +256,10 @@ fn state(state: &State) -> String {
         if let Some(planned) = &running.planned {
             let _ = write!(text, ", planned {}", nearest(&planned.0));
         }
+        if let Some(times_out) = &running.times_out {
+            let times_out = nearest(&times_out.0);
+            let _ = write!(text, "; without progress, it times out at {times_out}");
+        }
         if let Some(needed) = &running.needed {
             let _ = write!(
                 text,
@@ -266,6 +271,11 @@ fn state(state: &State) -> String {
             let _ = write!(text, ": {}", tame(note));
         }
         text.push('\n');
+    }
+    for doubt in &state.in_doubt {
+        let (name, since) = (tame(&doubt.name), nearest(&doubt.since.0));
+        let line = format!("{name} is in doubt since {since}: {}", tame(&doubt.why));
+        let _ = writeln!(text, "{}", wrapped(&line, Look::of_stdout().width, 2));
     }
     let _ = writeln!(text, "  {}", counted(state.facts.len(), "fact"));
     for fact in &state.facts {
@@ -300,8 +310,20 @@ fn plan(plan: &PlanNow) -> String {
 }
 
 fn guarantee(guarantee: &GuaranteeNow) -> String {
-    let promise = guarantee.promise.as_deref().unwrap_or("none");
-    let mut text = format!("guarantee: {promise}");
+    let (name, condition) = match guarantee.promise.as_deref() {
+        Some("envelope") => ("envelope", Some("each quantity stays inside its interval")),
+        Some("part-of-envelope") => (
+            "part-of-envelope",
+            Some("each quantity stays inside a part of its interval"),
+        ),
+        Some("planned") => (
+            "none, feasible at nominal durations",
+            Some("each action still to start takes as long as planned"),
+        ),
+        Some(_) => ("none, may still work", None),
+        None => ("none", None),
+    };
+    let mut text = format!("guarantee: {name}");
     if let Some(since) = &guarantee.since {
         let _ = write!(text, ", since {}", nearest(&since.0));
     }
@@ -309,17 +331,25 @@ fn guarantee(guarantee: &GuaranteeNow) -> String {
     if let Some(deviation) = &guarantee.deviation {
         let _ = writeln!(text, "  last deviation: {}", tame(deviation));
     }
-    let end = |end: &Option<Exact>| end.as_ref().map_or("-".to_owned(), |it| nearest(&it.0));
+    if let Some(condition) = condition {
+        let before = match guarantee.timeout.as_str() {
+            "none" => "",
+            _ => " and each action ends before its time-out",
+        };
+        let _ = writeln!(text, "  the plan works as long as {condition}{before}");
+    }
+    let end = |end: &End, infinity: &str| end.value().map_or(infinity.to_owned(), nearest);
     for room in &guarantee.parameters {
-        let _ = writeln!(
-            text,
-            "  {}, {}: planned {}, from {} to {}",
-            room.name,
-            room.meaning,
-            nearest(&room.nominal.0),
-            end(&room.least),
-            end(&room.most)
-        );
+        let nominal = nearest(&room.nominal.0);
+        let _ = write!(text, "  {}, {}: planned {nominal}", room.name, room.meaning);
+        if let (Some(least), Some(most)) = (&room.least, &room.most) {
+            let (least, most) = (end(&least.0, MINUS_INFINITY), end(&most.0, INFINITY));
+            let _ = write!(text, ", from {least} to {most}");
+        }
+        if let Some(timeout) = &room.timeout {
+            let _ = write!(text, ", time-out {}", nearest(&timeout.0));
+        }
+        text.push('\n');
     }
     text
 }

@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     vary.extend(specifications(&args::controllable(
         &arguments.controllable,
     ))?);
-    let plan = input::any_plan(&task, &arguments.plan, output)?;
+    let plan = input::any_plan(&task, &arguments.plan, &arguments.rounding(), output)?;
     let world = match &arguments.world {
         Some(path) => {
             let text = input::source(path, "world")?;
@@ -54,6 +54,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
             .guarantee
             .map_or_else(Default::default, Into::into),
         enforce: arguments.enforce,
+        timeout: arguments.timeout.clone().unwrap_or_default(),
         contains: arguments.contains.clone(),
         search: Search {
             precision: arguments.precision.clone().unwrap_or(search.precision),
@@ -85,6 +86,9 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
             arguments.order.unwrap_or(args::Order::Plan),
             Look::of_stdout(),
         ))?;
+        if matches!(outcome.answer.finding, EnvelopeFinding::Fails(_)) {
+            input::tell_about_repairs();
+        }
     }
     Ok(exit(&outcome))
 }

@@ -5,7 +5,8 @@ mod prism;
 use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::answers::{EnvelopeAnswer, EnvelopeRequest, Event, Halt, Watcher};
+use elbowroom::RoundingRule;
+use elbowroom::answers::{EnvelopeAnswer, EnvelopeRequest};
 use elbowroom::envelope::Guarantee;
 use elbowroom::export::{self, ExportError};
 use elbowroom::flow::FlowError;
@@ -40,7 +41,7 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
         ));
     };
     let task = Arc::new(input::task(&arguments.problem, &arguments.epsilon, output)?);
-    let plan = input::any_plan(&task, file, output)?;
+    let plan = input::any_plan(&task, file, &RoundingRule::default(), output)?;
     let mut vary = specifications(&arguments.vary)?;
     vary.extend(specifications(&args::controllable(
         &arguments.controllable,
@@ -50,13 +51,14 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
         enforce: arguments.enforce,
         ..EnvelopeRequest::new(&task, plan)
     };
-    let plan = match export::opened(&request, &mut Repairs(file)) {
+    let plan = match export::opened(&request) {
         Ok(plan) => plan,
         Err(FlowError::Invalid(violation)) => {
             let file = file.display();
             let mut text = format!("{}: {file} does not work\n", styled(BAD, "invalid"));
             push_wrapped(&mut text, &violation.to_string(), 2, Look::PLAIN.width);
             output::tell(text.trim_end());
+            input::tell_about_repairs();
             return Ok(Exit::No);
         }
         Err(error) => return Err(Failure::new(error, "")),
@@ -215,19 +217,4 @@ fn network(path: Option<&Path>, file: &NetworkFile) -> Result<String, Failure> {
 
 fn failure(error: ExportError) -> Failure {
     Failure::new(error, "")
-}
-
-/// Tells of plans whose times are taken otherwise than they stand there.
-struct Repairs<'a>(&'a Path);
-
-impl Watcher for Repairs<'_> {
-    fn flow(&mut self) -> std::ops::ControlFlow<Halt> {
-        std::ops::ControlFlow::Continue(())
-    }
-
-    fn notice(&mut self, event: &Event<'_>) {
-        if let Event::Repaired(violation) = event {
-            input::tell_repair(self.0, violation);
-        }
-    }
 }

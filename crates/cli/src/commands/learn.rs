@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
+use elbowroom::RoundingRule;
 use elbowroom::answers::Unwatched;
 use elbowroom::answers::learn::{
     ActionLearnt, ConformalBox, DriftAnswer, DurationsLearnt, FitAnswer, GroupAnswer,
@@ -96,7 +97,7 @@ fn inside(arguments: &LearnArgs, output: &mut Output) -> Result<Option<InsideReq
         problem: problem.clone(),
     };
     let task = Arc::new(input::task(&problem, &arguments.epsilon, output)?);
-    let plan = input::any_plan(&task, plan, output)?;
+    let plan = input::any_plan(&task, plan, &RoundingRule::default(), output)?;
     Ok(Some(InsideRequest {
         task,
         plan,

@@ -4,6 +4,7 @@ mod text;
 
 use std::sync::Arc;
 
+use elbowroom::RoundingRule;
 use elbowroom::answers::odds::{LatticeFinding, OddsFinding, OddsRequest, OddsSettings, odds};
 use elbowroom::probability::likelihoods;
 use elbowroom::sim::WorldModel;
@@ -24,6 +25,7 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
         Some(path) => Some(input::time_triggered(
             &task,
             path,
+            &RoundingRule::default(),
             input::FIXED_TIMES,
             output,
         )?),
@@ -94,6 +96,7 @@ fn settings(arguments: &OddsArgs) -> Result<OddsSettings, Failure> {
         takes_best_order: arguments.best,
         most_sequences: arguments.most_sequences,
         with_lattice: arguments.lattice.is_some(),
+        self_overlap: arguments.self_overlap,
         samples: arguments.samples,
         seed: arguments.seed,
         ..OddsSettings::default()

@@ -7,13 +7,14 @@ mod watch;
 use std::sync::Arc;
 
 use elbowroom::answers::plan::{
-    BestPlanRequest, PlanAim, PlanFinding, PlanOutcome, PlanRequest, best_plan, certify, plan,
-    plan_with, unread,
+    BestPlanRequest, PlanAim, PlanFinding, PlanOutcome, PlanRequest, best_plan, plan, plan_with,
+    unread,
 };
 use elbowroom::answers::{RequestError, Watcher};
 use elbowroom::execute::SpecError;
 use elbowroom::external::Planner;
 use elbowroom::model::Task;
+use elbowroom::pddl::write_plan;
 use elbowroom::sim::WorldModel;
 
 use super::run::spec::contradiction;
@@ -37,6 +38,10 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
         Some(named(arguments)?)
     };
     let threads = threads::of(arguments.jobs, EVERY_PROCESSOR, planner.is_none())?;
+    if let (true, Some(planner)) = (arguments.self_overlap, &planner) {
+        let error = SpecError::SelfOverlap(planner.name.clone());
+        return Err(contradiction(error));
+    }
     let mut watch = Watch::start(arguments);
     let (task, domain, problem) = match reading::read(arguments, &mut watch, output)? {
         Ok(read) => read,
@@ -47,20 +52,17 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
             return print(arguments, &outcome, output);
         }
     };
+    let files = [domain.name(), problem.name()];
     if let Some(objective) = arguments.objective {
-        return best(
-            arguments,
-            objective,
-            planner.as_ref(),
-            &Arc::new(task),
-            watch,
-            output,
-        );
+        let task = Arc::new(task);
+        let planner = planner.as_ref();
+        return best(arguments, objective, planner, (&task, files), watch, output);
     }
     let mut request = PlanRequest {
         task: &task,
         first_plan_only: arguments.first || watch.limit().is_none(),
         most_memory: arguments.memory.map(|megabytes| megabytes << 20),
+        self_overlap: arguments.self_overlap,
         threads,
     };
     let mut outcome = match &planner {
@@ -72,16 +74,21 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
             plan_with(planner, &mut request, sources, limit, &mut watch).map_err(text::failure)?
         }
     };
-    // Of an answer that no plan exists, it is told whether others can check it.
-    certify(
-        &mut outcome.answer,
-        &task,
-        [domain.name(), problem.name()],
-        &mut watch,
-    );
+    outcome.answer.name_files(files);
+    write_exactly(arguments, &task, &mut outcome);
     // The line on the terminal goes before the answer comes.
     drop(watch);
     print(arguments, &outcome, output)
+}
+
+/// Writes the plan's numbers exactly, if that is asked for.
+fn write_exactly(arguments: &PlanArgs, task: &Task, outcome: &mut PlanOutcome) {
+    let finding = &mut outcome.answer.finding;
+    if let (true, PlanFinding::Plan { plan: text, .. }, Some(plan)) =
+        (arguments.exact, finding, &outcome.plan)
+    {
+        *text = write_plan(task, plan);
+    }
 }
 
 /// The plan that is best by an objective.
@@ -89,7 +96,7 @@ fn best(
     arguments: &PlanArgs,
     objective: PlanObjectiveChoice,
     planner: Option<&Planner>,
-    task: &Arc<Task>,
+    (task, files): (&Arc<Task>, [&str; 2]),
     mut watch: Watch,
     output: &mut Output,
 ) -> Answer {
@@ -125,9 +132,12 @@ fn best(
         task,
         aim,
         most_searches: watch.limit().is_none().then_some(SEARCHES),
+        self_overlap: arguments.self_overlap,
         most_memory: arguments.memory.map(|megabytes| megabytes << 20),
     };
-    let outcome = best_plan(&request, &mut watch).map_err(unsupported)?;
+    let mut outcome = best_plan(&request, &mut watch).map_err(unsupported)?;
+    outcome.answer.name_files(files);
+    write_exactly(arguments, task, &mut outcome);
     drop(watch);
     print(arguments, &outcome, output)
 }
@@ -164,14 +174,14 @@ fn print(arguments: &PlanArgs, outcome: &PlanOutcome, output: &mut Output) -> An
     }
     if arguments.json {
         output.document(answer)?;
-    } else if let PlanFinding::NoPlan { reason, .. } | PlanFinding::None { reason } =
+    } else if let PlanFinding::NoPlan { reason, .. } | PlanFinding::None { reason, .. } =
         &answer.finding
     {
         output::print(&format!("{reason}\n"))?;
     } else if let (Some(plan), None) = (&plan, &arguments.output) {
         output::print(plan)?;
     }
-    let certified = text::certified(&answer.finding, Look::of_stdout());
+    let certified = text::certified(answer, Look::of_stdout());
     if let Some(line) = certified.filter(|_| !arguments.json) {
         output::tell(&line);
     }

@@ -18,10 +18,11 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
+use elbowroom::RoundingRule;
 use elbowroom::answers::run::{RunOutcome, run as execute};
-use elbowroom::answers::{Halt, RunRequest, Watcher};
+use elbowroom::answers::{Event, Halt, RunRequest, Watcher};
 use elbowroom::execute::{RunSpec, SpecError, check_vary};
-use elbowroom::execution::run::Verdict;
+use elbowroom::execution::run::{MissingPlan, Verdict};
 use elbowroom::execution::{Planner, Progression, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
@@ -38,6 +39,7 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::journal::JournalFile;
+use crate::look::{BAD, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 use crate::words::tame;
@@ -131,6 +133,7 @@ pub(super) fn checked(
         Some(path) => Some(input::time_triggered(
             &task,
             path,
+            &RoundingRule::with_tolerance(arguments.tolerance.clone()),
             input::FIXED_TIMES,
             output,
         )?),
@@ -161,7 +164,15 @@ fn show(
             has_lost,
             is_lasting: spec.is_lasting,
         };
-        output::print(&text::human(&outcome.answer, &outcome.report, ends))
+        output::print(&text::human(&outcome.answer, &outcome.report, ends))?;
+        let is_given = arguments.plan().is_some() && outcome.report.starts == 0;
+        if let Verdict::NoPlan { why, .. } = outcome.verdict()
+            && is_given
+            && why.starts_with("the plan is not valid")
+        {
+            input::tell_about_repairs();
+        }
+        Ok(())
     }
 }
 
@@ -174,7 +185,8 @@ pub(super) fn conclude(
 ) -> Answer {
     let Some(why) = trouble else {
         show(asked, &outcome, false, output)?;
-        return exit(outcome.verdict());
+        let journal = asked.0.journal.as_ref().or(asked.0.resume.as_ref());
+        return exit(&outcome, journal.map(|path| path.display().to_string()));
     };
     // Nobody has asked it to end.
     let has_lost = *outcome.verdict() == Verdict::Interrupted;
@@ -264,6 +276,8 @@ impl Job<'_> {
             }
         };
         views.close();
+        let is_valid = outcome.answer.invalid.is_empty();
+        let trace = (!is_valid).then(|| file.of_invalid_run()).flatten();
         let trouble = file.close();
         let shown = show((arguments, spec), &outcome, false, output);
         // The run has been what it was, whatever became of its record.
@@ -271,7 +285,7 @@ impl Job<'_> {
             output::warn(&trouble);
         }
         shown?;
-        exit(outcome.verdict())
+        exit(&outcome, trace)
     }
 
     /// A world that takes requests, if the run is attended.
@@ -423,13 +437,34 @@ impl Watcher for Attentive {
         }
         self.inner.flow()
     }
+
+    fn notice(&mut self, event: &Event<'_>) {
+        self.inner.notice(event);
+    }
 }
 
-pub(super) fn exit(verdict: &Verdict) -> Answer {
-    Ok(match verdict {
+/// The exit code of a run. `trace` is the file that has its record.
+fn exit(outcome: &RunOutcome, trace: Option<String>) -> Answer {
+    let invalid = &outcome.answer.invalid;
+    if !invalid.is_empty() {
+        let record = trace.map_or_else(String::new, |trace| {
+            format!(" The record of the run is {trace}.")
+        });
+        let label = styled(BAD, "bug");
+        output::tell(&format!(
+            "{label}: this execution is not valid:\n  {}\nPlease report it, with domain and problem.{record}",
+            invalid.join("\n  ")
+        ));
+        return Ok(Exit::Bug);
+    }
+    Ok(match outcome.verdict() {
         Verdict::GoalReached => Exit::Yes,
-        Verdict::Unsolvable | Verdict::NoPlan { .. } => Exit::No,
-        Verdict::ReplanLimit | Verdict::TimeLimit => Exit::Limit,
+        Verdict::Unsolvable
+        | Verdict::NoPlan {
+            missing: MissingPlan::NotSearched,
+            ..
+        } => Exit::No,
+        Verdict::ReplanLimit | Verdict::TimeLimit | Verdict::NoPlan { .. } => Exit::Limit,
         Verdict::Interrupted => Exit::Interrupted,
         Verdict::PlannerFailed { why } => {
             return Err(Failure::new(

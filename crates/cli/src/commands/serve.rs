@@ -190,7 +190,7 @@ fn heeded(domain: &NamedText) -> Result<(), Failure> {
     let Ok((problem, _)) = pddl::read_problem(&domain.source(), &nothing) else {
         return Ok(());
     };
-    match Task::new(problem).left_to_the_judge() {
+    match Task::new(problem).only_judged() {
         Some(feature) => Err(spec::contradiction(SpecError::Unheeded(feature))),
         None => Ok(()),
     }
@@ -325,7 +325,7 @@ fn socket(path: &Path) -> Result<Listener, Failure> {
 
 /// From now on there is a run to ask about.
 fn begin(front: &Front, spec: &RunSpec, task: &Arc<Task>) -> Result<Attendance, Failure> {
-    let status = Status::new(task);
+    let status = Status::new(task, spec.timeout.clone());
     let board = front.board();
     let mut header = |line: &str| board.add(line);
     let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);

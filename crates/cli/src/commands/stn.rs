@@ -1,5 +1,6 @@
 //! `elbowroom stn`: the plan without its needless times and orderings.
 
+use elbowroom::RoundingRule;
 use elbowroom::answers::stn::{StnFinding, StnOutcome, StnRequest, stn};
 use elbowroom::graph;
 use elbowroom::model::Task;
@@ -15,12 +16,10 @@ use crate::{input, output};
 /// Writes the STN plan, and what else was asked for.
 pub(crate) fn run(arguments: &StnArgs, output: &mut Output) -> Answer {
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
-    let plan = input::any_plan(&task, &arguments.plan, output)?;
+    let rule = RoundingRule::with_tolerance(arguments.tolerance.clone());
+    let plan = input::any_plan(&task, &arguments.plan, &rule, output)?;
     let request = StnRequest { task: &task, plan };
     let outcome = stn(&request).map_err(|error| Failure::new(error, ""))?;
-    if let Some(violation) = &outcome.repaired {
-        input::tell_repair(&arguments.plan, violation);
-    }
     match &outcome.plan {
         Some(plan) => network(arguments, &task, plan, &outcome, output),
         None => invalid(arguments, &outcome, output),
@@ -61,6 +60,7 @@ fn invalid(arguments: &StnArgs, outcome: &StnOutcome, output: &mut Output) -> An
         let mut text = format!("{}: {file} does not work\n", styled(BAD, "invalid"));
         push_wrapped(&mut text, &violation.message, 2, Look::PLAIN.width);
         output::tell(text.trim_end());
+        input::tell_about_repairs();
     }
     Ok(Exit::No)
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use elbowroom::RoundingRule;
 use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, PlanChecked, check};
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -10,6 +11,7 @@ use elbowroom::num::Rational;
 
 use crate::args::ValArgs;
 use crate::exit::{Answer, Exit, Failure};
+use crate::look::{HINT, styled};
 use crate::output::Output;
 use crate::{input, output};
 
@@ -28,9 +30,12 @@ pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
             return Err(failure);
         }
     };
+    let settings = Settings::like_val(arguments.tolerance.clone());
     let mut tally = Tally::default();
+    // VAL has rules of its own about rounded numbers.
+    let as_printed = RoundingRule::with_tolerance(Some(Rational::ZERO));
     for path in &arguments.plans {
-        let plan = match input::time_triggered(&task, path, FOR_NETWORKS, output) {
+        let plan = match input::time_triggered(&task, path, &as_printed, FOR_NETWORKS, output) {
             Ok(plan) => plan,
             Err(failure) => {
                 output::print("Bad plan description!\n")?;
@@ -40,11 +45,14 @@ pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
             }
         };
         let name = path.display().to_string();
+        if let Some([first, later]) = equal_times(&settings, &times(&task, &plan)) {
+            warn_about_equal_times(&name, &first, &later, &arguments.tolerance);
+        }
         let request = CheckRequest {
             task: &task,
             plan: Some(&plan),
             name: name.clone(),
-            settings: Settings::like_val(arguments.tolerance.clone()),
+            settings: settings.clone(),
         };
         let answer = check(&request).map_err(|error| Failure::new(error, ""))?;
         let CheckAnswer::Plan(checked) = answer else {
@@ -160,6 +168,47 @@ fn push_plan(text: &mut String, name: &str, plan: &TimeTriggeredPlan) {
     text.push_str("\nPlan Validation details\n-----------------------\n\n");
 }
 
+/// The times at which something happens.
+fn times(task: &Task, plan: &TimeTriggeredPlan) -> BTreeSet<Rational> {
+    let mut times: BTreeSet<Rational> = task.timed().iter().map(|it| it.time.clone()).collect();
+    for step in &plan.steps {
+        times.insert(step.start.clone());
+        times.insert(step.end());
+    }
+    times
+}
+
+/// The first two different times that count as equal at the tolerance.
+fn equal_times(settings: &Settings, times: &BTreeSet<Rational>) -> Option<[Rational; 2]> {
+    let mut first: Option<&Rational> = None;
+    for time in times {
+        match first {
+            Some(first) if settings.counts_as_equal(first, time) => {
+                return Some([first.clone(), time.clone()]);
+            }
+            _ => first = Some(time),
+        }
+    }
+    None
+}
+
+/// Says on standard error that the verdict is about a plan with these times made equal.
+fn warn_about_equal_times(plan: &str, first: &Rational, later: &Rational, tolerance: &Rational) {
+    // The group width is a tenth of the tolerance.
+    let finer = later - first;
+    output::tell(&format!(
+        "{}: {plan}: the times {} and {} count as equal at -t {}, and so do others that are \
+         no more than {} apart\n  {}: try -t {}",
+        styled(HINT, "warning"),
+        first.to_decimal(DIGITS),
+        later.to_decimal(DIGITS),
+        tolerance.to_decimal(DIGITS),
+        (tolerance / Rational::from(10)).to_decimal(DIGITS),
+        styled(HINT, "help"),
+        finer.to_decimal(DIGITS),
+    ));
+}
+
 /// The times at which something happens, up to that one.
 fn push_happenings(
     text: &mut String,
@@ -167,12 +216,7 @@ fn push_happenings(
     plan: &TimeTriggeredPlan,
     until: Option<&Rational>,
 ) {
-    let mut times: BTreeSet<Rational> = task.timed().iter().map(|it| it.time.clone()).collect();
-    for step in &plan.steps {
-        times.insert(step.start.clone());
-        times.insert(step.end());
-    }
-    for time in times
+    for time in times(task, plan)
         .iter()
         .filter(|time| until.is_none_or(|until| *time <= until))
     {

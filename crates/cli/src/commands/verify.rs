@@ -3,10 +3,19 @@
 
 mod no_plan;
 
-use elbowroom::verify::{AnswerError, Inside, Verified, verify_answer};
+use std::fmt::Write as _;
+use std::path::Path;
+
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+use elbowroom::verify::{
+    AnswerError, Inside, Verified, epsilon_of, verify_answer, verify_answer_of,
+    verify_answer_of_network,
+};
+use elbowroom::{AnyPlan, RoundingRule, given_plan};
 use serde_json::{Value, json};
 
-use crate::args::VerifyArgs;
+use crate::args::{ProblemArgs, VerifyArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
 use crate::look::{BAD, GOOD, Look, styled};
@@ -20,18 +29,31 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
     if no_plan::is_meant(source.text()) {
         return no_plan::run(arguments, &source, output);
     }
-    if arguments.domain.is_some() {
-        return Err(Failure::new(
-            "DOMAIN and PROBLEM are for answers of `elbowroom plan`, and this is none",
-            "leave them out: the certificate of a box has its network in it",
-        ));
-    }
-    match verify_answer(source.text()) {
+    let (verdict, is_derived) = match files(arguments)? {
+        None => (verify_answer(source.text()), false),
+        Some((files, plan)) => {
+            let epsilon = epsilon_of(source.text()).ok().flatten();
+            let epsilon = epsilon.filter(Rational::is_positive);
+            let task = input::task(
+                &files,
+                &epsilon.unwrap_or_else(Task::default_epsilon),
+                output,
+            )?;
+            let verdict = match input::any_plan(&task, plan, &RoundingRule::default(), output)? {
+                AnyPlan::TimeTriggered(plan) => verify_answer_of(source.text(), &task, &plan),
+                AnyPlan::Stn(plan) => {
+                    verify_answer_of_network(source.text(), &task, &given_plan(&plan))
+                }
+            };
+            (verdict, true)
+        }
+    };
+    match verdict {
         Ok(verified) => {
             if arguments.json {
-                output.json(&document(Ok(&verified)))?;
+                output.json(&document(Ok(&verified), is_derived))?;
             } else {
-                output::print(&proven(name, &verified, Look::of_stdout()))?;
+                output::print(&proven(name, &verified, is_derived, Look::of_stdout()))?;
             }
             Ok(Exit::Yes)
         }
@@ -41,28 +63,50 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
         )),
         Err(wrong) => {
             if arguments.json {
-                output.json(&document(Err(&wrong)))?;
+                output.json(&document(Err(&wrong), is_derived))?;
             } else {
                 let mut text = format!("{}: {name}\n", styled(BAD, "not proved"));
                 push_wrapped(&mut text, &format!("{wrong}."), 2, Look::of_stdout().width);
                 output::print(&text)?;
             }
-            Ok(Exit::No)
+            Ok(match wrong {
+                AnswerError::NotDerivable(_) => Exit::Limit,
+                _ => Exit::No,
+            })
         }
     }
 }
 
+/// Returns the domain, problem and plan files, if they are given. Network and conditions are derived
+/// from them.
+fn files(arguments: &VerifyArgs) -> Result<Option<(ProblemArgs, &Path)>, Failure> {
+    match (&arguments.domain, &arguments.problem, &arguments.plan) {
+        (None, ..) => Ok(None),
+        (Some(domain), Some(problem), Some(plan)) => {
+            let (domain, problem) = (domain.clone(), problem.clone());
+            Ok(Some((ProblemArgs { domain, problem }, plan)))
+        }
+        _ => Err(Failure::new(
+            "the answer is about a box, and the plan is missing",
+            "give all three files, `elbowroom verify ANSWER.json DOMAIN PROBLEM PLAN`, or none",
+        )),
+    }
+}
+
 /// The verdict as a document.
-fn document(verdict: Result<&Verified, &AnswerError>) -> Value {
+fn document(verdict: Result<&Verified, &AnswerError>, is_derived: bool) -> Value {
     let exact = |value: &elbowroom::num::Rational| json!({ "exact": value.to_string(), "decimal": value.to_f64() });
     let mut document = json!({ "format": "elbowroom-verified", "version": 1 });
     let members = match verdict {
         Ok(verified) => json!({
+            "assumes": verified.assumes,
             "proved": true,
+            "derived": is_derived,
             "value": exact(&verified.value),
             "bound": exact(&verified.bound),
             "proofs": verified.proofs,
             "assumed": verified.assumed,
+            "from_conditions": verified.from_conditions,
             "inside": verified.inside.map(|inside| json!({
                 "proved": inside.is_proved(),
                 "controllable": inside.is_controllable,
@@ -70,9 +114,12 @@ fn document(verdict: Result<&Verified, &AnswerError>) -> Value {
                 "assumed": inside.assumed,
             })),
             "proves": verified.proves,
-            "assumes": verified.assumes,
         }),
-        Err(wrong) => json!({ "proved": false, "reason": wrong.to_string() }),
+        Err(wrong) => json!({
+            "proved": false,
+            "derivable": !matches!(wrong, AnswerError::NotDerivable(_)),
+            "reason": wrong.to_string(),
+        }),
     };
     if let (Value::Object(document), Value::Object(members)) = (&mut document, members) {
         document.extend(members);
@@ -80,8 +127,18 @@ fn document(verdict: Result<&Verified, &AnswerError>) -> Value {
     document
 }
 
-fn proven(name: &str, verified: &Verified, look: Look) -> String {
-    let mut text = format!("{}: {name}\n", styled(GOOD, "proved"));
+fn proven(name: &str, verified: &Verified, is_derived: bool, look: Look) -> String {
+    let mut text = String::new();
+    if !is_derived {
+        let without = "Assumed, because the files are not given (`elbowroom verify ANSWER.json DOMAIN \
+                       PROBLEM PLAN` derives it from them):";
+        push_wrapped(&mut text, without, 0, look.width);
+        for assumed in &verified.assumes {
+            push_wrapped(&mut text, &format!("- {assumed}"), 2, look.width);
+        }
+        text.push('\n');
+    }
+    let _ = writeln!(text, "{}: {name}", styled(GOOD, "proved"));
     let value = number::nearest(&verified.value);
     let bound = number::nearest(&verified.bound);
     let claim = if verified.value == verified.bound {
@@ -94,9 +151,10 @@ fn proven(name: &str, verified: &Verified, look: Look) -> String {
         format!("No box inside the envelope has more than {bound}; this one has {value}.")
     };
     push_wrapped(&mut text, &claim, 2, look.width);
-    let assumed = match verified.assumed {
-        0 => String::new(),
-        assumed => format!(
+    let assumed = match (verified.assumed, verified.from_conditions) {
+        (0, 0) => String::new(),
+        (0, derived) => format!(", but for {derived}, which conditions on numbers imply"),
+        (assumed, _) => format!(
             ", but for {assumed} about conditions on numbers, which the certificate only states"
         ),
     };
@@ -111,15 +169,22 @@ fn proven(name: &str, verified: &Verified, look: Look) -> String {
         ),
     };
     push_wrapped(&mut text, &how, 2, look.width);
-    push_wrapped(&mut text, &inside(verified.inside), 2, look.width);
+    if is_derived {
+        let derived = "The box is inside the envelope: for all its values the plan can be scheduled, and \
+                       every schedule is a valid plan. Network and conditions were derived from domain, \
+                       problem and plan; nothing is assumed.";
+        push_wrapped(&mut text, derived, 2, look.width);
+    } else {
+        push_wrapped(&mut text, &inside(verified.inside), 2, look.width);
+    }
     text
 }
 
 /// What is proved of the box being inside the envelope.
 fn inside(inside: Option<Inside>) -> String {
     let Some(inside) = inside else {
-        return "That the network is that of the plan, and that the box is inside, is not part of the \
-                certificate: `elbowroom envelope ... --contains` checks the box."
+        return "That the box is inside is not part of the certificate: `elbowroom envelope ... \
+                --contains` checks the box."
             .to_owned();
     };
     let conditions = match inside.conditions {
@@ -131,8 +196,7 @@ fn inside(inside: Option<Inside>) -> String {
     if inside.is_proved() {
         return format!(
             "The box is inside the envelope: for all its values the plan can be scheduled, and \
-             {conditions}. That the network and the conditions are those of the plan is not part of \
-             the certificate."
+             {conditions}."
         );
     }
     let mut stated = Vec::new();

@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
+use elbowroom::RoundingRule;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::text::Source;
@@ -116,7 +117,14 @@ fn script(
         problem: problem.clone(),
     };
     let task = input::task(&files, &Rational::new(1, 1000), output)?;
-    let steps = input::time_triggered(&task, plan, input::FIXED_TIMES, output)?.steps;
+    let steps = input::time_triggered(
+        &task,
+        plan,
+        &RoundingRule::default(),
+        input::FIXED_TIMES,
+        output,
+    )?
+    .steps;
     let actions = steps.into_iter().filter_map(|step| {
         let duration = step.duration?;
         Some((step.action.name.clone(), duration))

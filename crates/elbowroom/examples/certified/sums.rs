@@ -38,6 +38,7 @@ impl Sums {
             Proof::Unreachable(_) => "unreachable",
             Proof::TooLate { .. } => "too late",
             Proof::Exhausted { .. } => "exhausted",
+            Proof::WithoutSelfOverlap { .. } => "exhausted without self-overlap",
         };
         let begin = Instant::now();
         let mut goes_on = || begin.elapsed() < LIMIT;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::envelope::{Guarantee, Objection, Oracle, sharpen};
+use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 use elbowroom::plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
@@ -146,7 +147,7 @@ fn grown(
 fn spoiled(ready: &Ready<'_>, envelope: &DecoupledEnvelope) -> [bool; EXECUTORS.len()] {
     let worlds = Worlds::new(&ready.subject.task, &ready.open, envelope);
     EXECUTORS.map(|executor| {
-        let world = worlds.spoiled();
+        let world = worlds.spoiled(&TimeoutRule::Off);
         world.is_some_and(|mut world| ready.run(executor, &mut world).failure.is_some())
     })
 }

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::flow::{self, Freed};
+use elbowroom::flow;
 use elbowroom::model::{Step, Task, TimeTriggeredPlan};
 use elbowroom::pddl::{self, read_problem};
+use elbowroom::plan::deorder::Deordered;
 use elbowroom::plan::format;
 use elbowroom::plan::{NodeId, Valuation, network_node};
-use elbowroom::{PlanKind, stn};
+use elbowroom::{PlanKind, RoundingRule, stn};
 
 use super::planning;
 use super::sources::{Origin, Source};
@@ -21,7 +22,7 @@ pub(crate) struct Subject {
     pub(crate) name: String,
     pub(crate) task: Arc<Task>,
     pub(crate) plan: TimeTriggeredPlan,
-    pub(crate) freed: Freed,
+    pub(crate) freed: Deordered,
 }
 
 /// How to come by plans.
@@ -67,7 +68,8 @@ impl Subject {
     fn of_bytes([family, name]: [&str; 2], task: Task, bytes: &[u8]) -> Result<Self, String> {
         let plan = match PlanKind::of_text(&String::from_utf8_lossy(bytes)) {
             PlanKind::TimeTriggered => {
-                let read = pddl::read_plan(&pddl::Source::from_bytes("plan", bytes), &task);
+                let text = pddl::Source::from_bytes("plan", bytes);
+                let read = RoundingRule::default().read_plan(&text, &task);
                 read.map_err(|_| "refused by the reader of plans")?.0
             }
             PlanKind::Stn => scheduled(bytes, &task)?,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom::execution::Promise;
+use elbowroom::execution::run::TimeoutRule;
 
 use super::strain::Stray;
 use super::trial::{Outcome, Ready};
@@ -65,10 +66,16 @@ pub(crate) fn run(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
     let executor = EXECUTORS[usize::from(number % 2 == 1)];
     let label = format!("{executor}, run {number}");
     let turn = number / 2;
+    // With time-outs and without, alternately.
+    let timeout = if (turn / 2).is_multiple_of(2) {
+        TimeoutRule::default()
+    } else {
+        TimeoutRule::Off
+    };
     if turn.is_multiple_of(SPOILED)
-        && let Some(mut world) = worlds.spoiled()
+        && let Some(mut world) = worlds.spoiled(&timeout)
     {
-        let outcome = ready.run(executor, &mut world);
+        let outcome = ready.run_timed(executor, &mut world, &timeout);
         return tally.add(Kind::Spoiler, &label, &outcome);
     }
     if turn % LATE == LATE - 1 && run_unreckoned(ready, worlds, number, tally) {
@@ -79,7 +86,8 @@ pub(crate) fn run(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
     } else {
         Kind::Corner
     };
-    let outcome = ready.run(executor, &mut worlds.drawn(kind, number));
+    let mut world = worlds.drawn(kind, number, &timeout);
+    let outcome = ready.run_timed(executor, &mut world, &timeout);
     tally.add(kind, &label, &outcome);
 }
 
@@ -100,8 +108,8 @@ fn run_unreckoned(ready: &Ready<'_>, worlds: &Worlds<'_>, number: u64, tally: &m
         };
         let outcome = ready.run_late(&mut worlds.late(&late, number), &late.action);
         // What a late start excuses does not happen where that start is in time.
-        let outcome =
-            outcome.unwrap_or_else(|| ready.run(executor, &mut worlds.drawn(Kind::Late, number)));
+        let mut in_time = worlds.drawn(Kind::Late, number, &TimeoutRule::Off);
+        let outcome = outcome.unwrap_or_else(|| ready.run(executor, &mut in_time));
         tally.add(Kind::Late, &label, &outcome);
     } else {
         let (rest, promise) = match turn / 2 % 3 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use elbowroom::envelope::{Guarantee, Oracle, StopReason, irr};
 use elbowroom::execute::{Analyst, Execution};
-use elbowroom::execution::run::{Patience, PlanningTime, Report, RunSettings, Verdict};
+use elbowroom::execution::run::{PlanningTime, Report, RunSettings, TimeoutRule, Verdict};
 use elbowroom::execution::{
     Forms, Need, NoPlanner, NoRecord, PrepareError, Prepared, Preparer, Promise, Recorder, World,
 };
@@ -63,8 +63,8 @@ impl<'a> Ready<'a> {
     /// Why it cannot be.
     pub(crate) fn new(subject: &'a Subject, search: Search<'_>) -> Result<Self, String> {
         let task = &subject.task;
-        let nominal = subject.freed.deordered.nominal.clone();
-        let instances = subject.freed.deordered.instances.clone();
+        let nominal = subject.freed.nominal.clone();
+        let instances = subject.freed.instances.clone();
         let open = flow::open(task, subject.freed.clone(), &[])
             .map_err(|_| "durations cannot be left open".to_owned())?;
         let closed = flow::closed(task, subject.freed.clone());
@@ -122,6 +122,17 @@ impl<'a> Ready<'a> {
         self.outcome(&report)
     }
 
+    /// Runs with an executor in any world, with time-outs by that rule.
+    pub(crate) fn run_timed(
+        &self,
+        executor: &str,
+        world: &mut dyn World,
+        timeout: &TimeoutRule,
+    ) -> Outcome {
+        let report = self.recorded(executor, world, timeout, NoRecord);
+        self.outcome(&report)
+    }
+
     /// Runs with `guarded` in a world in which this action starts late; `None` if it ended because of
     /// that, before anybody could know.
     pub(crate) fn run_late(&self, world: &mut dyn World, late: &str) -> Option<Outcome> {
@@ -140,7 +151,7 @@ impl<'a> Ready<'a> {
         weakest: Promise,
     ) -> (Outcome, bool) {
         let mut course = Course::new(&self.open.plan, stray);
-        let report = self.recorded(executor, world, &mut course);
+        let report = self.recorded(executor, world, &TimeoutRule::Off, &mut course);
         let outcome = self.outcome(&report);
         let is_in_vain = executor == "live" && course.is_given_up_in_vain(&self.subject.task);
         let failure = match outcome.failure {
@@ -152,17 +163,18 @@ impl<'a> Ready<'a> {
     }
 
     pub(crate) fn report(&self, executor: &str, world: &mut dyn World) -> Report {
-        self.recorded(executor, world, NoRecord)
+        self.recorded(executor, world, &TimeoutRule::Off, NoRecord)
     }
 
-    fn recorded(&self, executor: &str, world: &mut dyn World, recorder: impl Recorder) -> Report {
-        // What may go on without end is waited for.
-        let patience = Patience {
-            at_least: Rational::from(1_000_000_000_000_i64),
-            ..Patience::default()
-        };
+    fn recorded(
+        &self,
+        executor: &str,
+        world: &mut dyn World,
+        timeout: &TimeoutRule,
+        recorder: impl Recorder,
+    ) -> Report {
         let settings = RunSettings {
-            patience,
+            timeout: timeout.clone(),
             planning_time: PlanningTime::Seconds(Rational::ZERO),
             time_limit: Rational::from(1_000_000_000_000_i64),
             ..RunSettings::default()

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use elbowroom::execute::Spoiling;
 use elbowroom::execution::Prepared;
+use elbowroom::execution::run::TimeoutRule;
 use elbowroom::model::Task;
 use elbowroom::num::{End, Interval, Rational};
 use elbowroom::plan::uncertain::PlanNetwork;
@@ -107,10 +108,15 @@ impl<'a> Worlds<'a> {
         SimWorld::new(Arc::clone(&self.task), &self.model, 0)
     }
 
-    /// The world in which durations are drawn so, with that seed.
-    pub(crate) fn drawn(&self, kind: Kind, seed: u64) -> Paced<'_, Durations> {
+    /// World whose durations are drawn with this seed, none of them beyond its time-out.
+    pub(crate) fn drawn(
+        &self,
+        kind: Kind,
+        seed: u64,
+        timeout: &TimeoutRule,
+    ) -> Paced<'_, Durations> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        Paced::new(self.sim(), self.durations(kind, &mut rng))
+        Paced::new(self.sim(), self.durations(kind, &mut rng, timeout))
     }
 
     /// A start that is late, as drawn with that seed: of an action of which the plan has no other.
@@ -136,7 +142,10 @@ impl<'a> Worlds<'a> {
     pub(crate) fn late<'b>(&self, late: &'b LateStart, seed: u64) -> Paced<'b, Durations> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let world = SimWorld::new(Arc::clone(&self.task), &late.model, 0);
-        Paced::new(world, self.durations(Kind::Late, &mut rng))
+        Paced::new(
+            world,
+            self.durations(Kind::Late, &mut rng, &TimeoutRule::Off),
+        )
     }
 
     /// The world in which one duration is outside its interval and the others are of that kind, as drawn with
@@ -169,7 +178,7 @@ impl<'a> Worlds<'a> {
             return None;
         }
         let stray = strays.swap_remove(rng.random_range(0..strays.len()));
-        let durations = self.durations_but(kind, &mut rng, Some(&stray));
+        let durations = self.durations_but(kind, &mut rng, &TimeoutRule::Off, Some(&stray));
         Some((Paced::new(self.sim(), durations), stray.0))
     }
 
@@ -181,12 +190,15 @@ impl<'a> Worlds<'a> {
         let times = plan.nodes().map(|(node, _)| &self.prepared.nominal[node]);
         let whole = times.max().cloned().unwrap_or_default();
         let lag = whole * Rational::new(rng.random_range(1..=200), 1000);
-        let inner = Paced::new(self.sim(), self.durations(Kind::Late, &mut rng));
+        let inner = Paced::new(
+            self.sim(),
+            self.durations(Kind::Late, &mut rng, &TimeoutRule::Off),
+        );
         (Lagging { inner, looks, lag }, looks)
     }
 
-    fn durations(&self, kind: Kind, rng: &mut ChaCha8Rng) -> Durations {
-        self.durations_but(kind, rng, None)
+    fn durations(&self, kind: Kind, rng: &mut ChaCha8Rng, timeout: &TimeoutRule) -> Durations {
+        self.durations_but(kind, rng, timeout, None)
     }
 
     /// Durations, but for a stray one.
@@ -194,6 +206,7 @@ impl<'a> Worlds<'a> {
         &self,
         kind: Kind,
         rng: &mut ChaCha8Rng,
+        timeout: &TimeoutRule,
         stray: Option<&(InstanceId, Rational)>,
     ) -> Durations {
         let stray = |id: InstanceId| stray.filter(|(own, _)| *own == id);
@@ -208,6 +221,7 @@ impl<'a> Worlds<'a> {
                         self.envelope.interval(*parameter),
                         &self.prepared.plan.parameter(*parameter).nominal,
                         kind,
+                        timeout,
                         rng,
                     ),
                     None => self.nominal(*id),
@@ -225,17 +239,25 @@ impl<'a> Worlds<'a> {
     }
 
     /// The world that plays the durations as spitefully as the box allows.
-    pub(crate) fn spoiled(&self) -> Option<Paced<'_, Spoiling>> {
+    pub(crate) fn spoiled(&self, timeout: &TimeoutRule) -> Option<Paced<'_, Spoiling>> {
         let network = self.network.as_ref()?;
         let plan = &self.prepared.plan.plan;
-        let spoiling = Spoiling::new(plan, network, &self.prepared.nominal);
+        let spoiling = Spoiling::new(plan, network, &self.prepared.nominal, timeout);
         Some(Paced::new(self.sim(), spoiling))
     }
 }
 
-/// A value in an interval. Where that is infinite, up to three times the nominal value, and
-/// sometimes fifty times.
-fn drawn(interval: &Interval, nominal: &Rational, kind: Kind, rng: &mut ChaCha8Rng) -> Rational {
+/// A value in an interval, up to the time-out of the action. Where the interval is infinite, up to
+/// three times the nominal value, and in three runs of ten up to the time-out, or up to a thousand
+/// times the nominal value if time-outs are off.
+fn drawn(
+    interval: &Interval,
+    nominal: &Rational,
+    kind: Kind,
+    timeout: &TimeoutRule,
+    rng: &mut ChaCha8Rng,
+) -> Rational {
+    let timeout = timeout.of(nominal);
     let thousandth = Rational::new(1, 1000);
     let lower = match &interval.lower {
         End::Closed(value) => value.clone(),
@@ -246,10 +268,18 @@ fn drawn(interval: &Interval, nominal: &Rational, kind: Kind, rng: &mut ChaCha8R
         End::Closed(value) => value.clone(),
         End::Open(value) => value - &thousandth,
         End::Infinite => {
-            let times = if rng.random_bool(0.1) { 50 } else { 3 };
+            let is_far = rng.random_bool(0.3);
             let least = nominal.max(&Rational::ONE).max(&lower).clone();
-            least * Rational::from(times)
+            match &timeout {
+                Some(timeout) if is_far => timeout.clone(),
+                None if is_far => least * Rational::from(1000),
+                _ => least * Rational::from(3),
+            }
         }
+    };
+    let upper = match timeout {
+        Some(timeout) => upper.min(timeout),
+        None => upper,
     };
     if kind == Kind::Corner {
         return if rng.random_bool(0.5) { lower } else { upper };

@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
-use elbowroom::answers::envelope::envelope;
+use elbowroom::answers::envelope::{Search, envelope};
 use elbowroom::answers::{EnvelopeRequest, Halt, Watcher};
-use elbowroom::envelope::{Guarantee, Method, Objective};
+use elbowroom::envelope::{Guarantee, Objective};
 use elbowroom::model::Task;
 use elbowroom::plan::format;
 use elbowroom::verify::{AnswerError, verify_answer};
@@ -85,8 +85,7 @@ fn checked(
     let plan = format::read(text.as_bytes(), task).ok()?;
     let mut request = EnvelopeRequest::new(task, plan);
     request.guarantee = guarantee;
-    request.search.method = Method::Best;
-    request.search.best.objective = objective;
+    request.search = Search::best(objective);
     request.world = around(task).map(Arc::new);
     let outcome = envelope(&request, &mut Patience(steps)).ok()?;
     let answer = serde_json::to_string(&outcome.answer).expect("a document");

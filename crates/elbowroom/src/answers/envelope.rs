@@ -6,10 +6,12 @@ mod best;
 mod certificate;
 mod conditions;
 mod foresight;
+mod grow;
 mod inequalities;
 mod limits;
 mod search;
 pub mod timeline;
+mod timeouts;
 mod told;
 mod worth;
 
@@ -17,7 +19,8 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_envelope::obligations::Refusal;
-use elbowroom_envelope::{BestSettings, Growth, Guarantee, Method, Oracle};
+use elbowroom_envelope::{BestSettings, Growth, Guarantee, Method, Objective, Oracle};
+use elbowroom_execution::run::TimeoutRule;
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder::DeorderError;
@@ -25,7 +28,7 @@ use elbowroom_plan::parametrize::VarySpec;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 use elbowroom_sim::WorldModel;
 
-use super::{Event, Halt, RequestError, Watcher};
+use super::{Halt, RequestError, Watcher};
 use crate::explain::{Explainer, Explanation};
 use crate::flow::{self, FlowError};
 use crate::{AnyPlan, parse_box};
@@ -38,8 +41,10 @@ pub use balance::{Balance, Deviation};
 pub use best::{Best, Probability};
 pub use conditions::Conditions;
 pub use foresight::Foresight;
+pub(crate) use grow::grow;
 pub use inequalities::{Inequalities, NetworkRow, RequirementRow};
 pub use timeline::Timeline;
+pub(crate) use timeouts::PlannedBeyond;
 pub(crate) use told::quantities;
 pub use worth::{Relax, Worth};
 
@@ -60,21 +65,51 @@ pub struct EnvelopeRequest {
     /// Whether the dispatcher is to keep to obligations that are bounds on differences of times
     /// ([`elbowroom_envelope::enforced`]).
     pub enforce: bool,
+    /// The rule that sets the time-out of each action. The plan works as long as each quantity
+    /// stays inside its interval *and* each action ends before its time-out; a box to ask about must not
+    /// reach beyond.
+    pub timeout: TimeoutRule,
     /// Whether this box lies inside the envelope: `d0=[5,30] d1=[10,20]`, as [`parse_box`] reads
     /// it. If there is none, a large box inside it is searched for.
     pub contains: Option<String>,
     /// How to search.
     pub search: Search,
     /// The world in which durations are to stay inside most likely, with
-    /// [`Objective::Probability`](elbowroom_envelope::Objective::Probability).
+    /// [`Objective::Probability`].
     pub world: Option<Arc<WorldModel>>,
+}
+
+/// Number of examined parameters before long conflicts are divided
+/// ([`divide_after`](elbowroom_envelope::Settings::divide_after)). Plans of a thousand actions hardly reach it.
+const DIVIDE_AFTER: usize = 50_000;
+
+/// IRR is asked for, and an objective, which only the largest box has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("IRR has no objective")]
+pub struct IrrHasNoObjective;
+
+/// Returns the objective of the box in a run for the given options; `None` if the box is that of IRR.
+///
+/// # Errors
+/// When the options contradict each other.
+pub fn objective_of(
+    method: Option<Method>,
+    objective: Option<Objective>,
+    has_precision: bool,
+) -> Result<Option<Objective>, IrrHasNoObjective> {
+    match (method, objective) {
+        (Some(Method::Irr), Some(_)) => Err(IrrHasNoObjective),
+        (Some(Method::Irr), None) => Ok(None),
+        (None, None) if has_precision => Ok(None),
+        (_, objective) => Ok(Some(objective.unwrap_or_default())),
+    }
 }
 
 /// Parameters of the search for an envelope.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Search {
-    /// How boxes are looked for.
-    pub method: Method,
+    /// The algorithm; by default the one that [`method_for`](Self::method_for) returns.
+    pub method: Option<Method>,
     /// The search ends when all steps are below this; positive.
     pub precision: Rational,
     /// If there is one, the precision of each parameter is this share of its nominal value instead.
@@ -90,11 +125,12 @@ pub struct Search {
 }
 
 impl Default for Search {
-    /// Precision a hundredth of each nominal value, doubling steps, no sharpening and no limit.
+    /// The box with the greatest least slack, found by a search that begins with IRR: precision a hundredth of
+    /// each nominal value, doubling steps, no sharpening and no limit.
     fn default() -> Self {
         let settings = elbowroom_envelope::Settings::default();
         Self {
-            method: Method::default(),
+            method: None,
             precision: settings.precision,
             relative: Some(Rational::new(1, 100)),
             growth: settings.growth,
@@ -106,14 +142,59 @@ impl Default for Search {
 }
 
 impl Search {
-    /// The settings of the search for a box.
-    pub(crate) fn settings(&self) -> elbowroom_envelope::Settings {
+    /// The search for the largest box by this objective.
+    pub fn best(objective: Objective) -> Self {
+        let mut search = Self {
+            method: Some(Method::Best),
+            ..Self::default()
+        };
+        search.best.objective = objective;
+        search
+    }
+
+    /// IRR, the algorithm of paper 1.
+    pub fn irr() -> Self {
+        Self {
+            method: Some(Method::Irr),
+            ..Self::default()
+        }
+    }
+
+    /// The same with this precision for all parameters, in the unit of the plan.
+    #[must_use]
+    pub fn with_precision(mut self, precision: Rational) -> Self {
+        self.precision = precision;
+        self.relative = None;
+        self
+    }
+
+    /// The method for the plans of a problem. If none is asked for, it is IRR where the search is to have a
+    /// precision, steps that do not double, or sharpened ends, which only IRR has, and for problems with
+    /// processes or events, for whose boxes nothing can be proved; otherwise the largest box is searched for.
+    pub fn method_for(&self, task: &Task) -> Method {
+        if let Some(method) = self.method {
+            return method;
+        }
+        let usual = Self::default();
+        let is_for_irr = self.relative != usual.relative
+            || self.precision != usual.precision
+            || self.growth != usual.growth
+            || self.sharpen;
+        if is_for_irr || task.left_to_the_judge().is_some() {
+            Method::Irr
+        } else {
+            Method::Best
+        }
+    }
+
+    /// The settings of IRR.
+    pub fn settings(&self) -> elbowroom_envelope::Settings {
         elbowroom_envelope::Settings {
             precision: self.precision.clone(),
             relative: self.relative.clone(),
             growth: self.growth,
             most_checks: self.most_checks,
-            divide_after: None,
+            divide_after: Some(DIVIDE_AFTER),
         }
     }
 }
@@ -142,10 +223,16 @@ impl EnvelopeRequest {
             vary: Vec::new(),
             guarantee: Guarantee::default(),
             enforce: false,
+            timeout: TimeoutRule::default(),
             contains: None,
             search: Search::default(),
             world: None,
         }
+    }
+
+    /// Returns the algorithm of the search.
+    pub(crate) fn method(&self) -> Method {
+        self.search.method_for(&self.task)
     }
 
     /// The same with what these settings say.
@@ -153,15 +240,9 @@ impl EnvelopeRequest {
     pub fn with_settings(mut self, settings: &flow::Settings) -> Self {
         self.vary.clone_from(&settings.vary);
         self.guarantee = settings.guarantee;
-        self.search.precision = settings.search.precision.clone();
-        self.search.relative.clone_from(&settings.search.relative);
-        self.search.growth = settings.search.growth;
-        self.search.most_checks = settings.search.most_checks;
+        self.timeout.clone_from(&settings.timeout);
+        self.search.clone_from(&settings.search);
         self.world.clone_from(&settings.world);
-        if let Some(objective) = settings.objective {
-            self.search.method = Method::Best;
-            self.search.best.objective = objective;
-        }
         self
     }
 }
@@ -177,10 +258,10 @@ pub fn envelope(
     request: &EnvelopeRequest,
     watcher: &mut dyn Watcher,
 ) -> Result<EnvelopeOutcome, RequestError> {
-    let opened = if request.search.method == Method::Best {
-        opened(request, watcher)
+    let opened = if request.method() == Method::Best {
+        opened(request)
     } else {
-        opened_with_nature(request, watcher)
+        opened_with_nature(request)
     };
     let (plan, enforced) = match opened {
         Ok((plan, enforced)) => (Arc::new(plan), enforced),
@@ -207,6 +288,13 @@ pub fn envelope(
     let nominal = plan.nominal();
     if plan.plan.network(&nominal).consistency().is_err() {
         return Ok(subject.fails(subject.explainer.no_schedule(&nominal)));
+    }
+    if let Some(counterexample) = subject.planned_beyond() {
+        let failing = Failing::AsPlanned {
+            parameters: subject.quantities(),
+            counterexample,
+        };
+        return Ok(subject.outcome(EnvelopeFinding::Fails(failing)));
     }
     if let Some(text) = &request.contains {
         return contains(&subject, oracle, text);
@@ -269,29 +357,19 @@ pub fn so_far(
 /// # Errors
 /// When the judge rejects the plan, or the request names what the plan does not have; when the
 /// problem has processes or events.
-pub(crate) fn opened(
-    request: &EnvelopeRequest,
-    watcher: &mut dyn Watcher,
-) -> Result<(ParametrizedPlan, usize), FlowError> {
+pub(crate) fn opened(request: &EnvelopeRequest) -> Result<(ParametrizedPlan, usize), FlowError> {
     match request.task.left_to_the_judge() {
         Some(feature) => Err(DeorderError::Unsupported { feature }.into()),
-        None => opened_with_nature(request, watcher),
+        None => opened_with_nature(request),
     }
 }
 
 /// [`opened`], also if the problem has processes and events.
-fn opened_with_nature(
-    request: &EnvelopeRequest,
-    watcher: &mut dyn Watcher,
-) -> Result<(ParametrizedPlan, usize), FlowError> {
+fn opened_with_nature(request: &EnvelopeRequest) -> Result<(ParametrizedPlan, usize), FlowError> {
     let task = &request.task;
     let plan = match &request.plan {
         AnyPlan::Stn(plan) => flow::open_more(task, plan.clone(), &request.vary)?,
-        AnyPlan::TimeTriggered(plan) => {
-            flow::free_and_open(task, plan, &request.vary, &mut |violation| {
-                watcher.notice(&Event::Repaired(violation));
-            })?
-        }
+        AnyPlan::TimeTriggered(plan) => flow::free_and_open(task, plan, &request.vary)?,
     };
     if !request.enforce {
         return Ok((plan, 0));
@@ -310,7 +388,14 @@ fn contains(
     let objection = oracle.objection(&envelope).map_err(FlowError::Refused)?;
     let parameters = subject.ranges(&envelope);
     let Some(objection) = objection else {
-        return Ok(subject.outcome(EnvelopeFinding::Inside { parameters }));
+        let finding = match subject.beyond_timeout(&envelope) {
+            None => EnvelopeFinding::Inside { parameters },
+            Some(counterexample) => EnvelopeFinding::Outside {
+                parameters,
+                counterexample,
+            },
+        };
+        return Ok(subject.outcome(finding));
     };
     let why_not = subject.explainer.objection(&oracle, &envelope, &objection);
     subject.refuse_harmless("this box", &why_not)?;

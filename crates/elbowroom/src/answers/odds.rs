@@ -59,6 +59,9 @@ pub struct OddsSettings {
     pub most_sequences: usize,
     /// Whether to list all orders.
     pub with_lattice: bool,
+    /// `true` if a ground action may overlap itself in plans that are made.
+    #[serde(default)]
+    pub self_overlap: bool,
     /// The executors that execute the plan in samples of the world.
     #[serde(with = "crate::execute::listed")]
     pub executors: Vec<ExecutorSpec>,
@@ -77,6 +80,7 @@ impl Default for OddsSettings {
             takes_best_order: false,
             most_sequences: 50_000,
             with_lattice: false,
+            self_overlap: false,
             executors: executors.filter_map(Result::ok).collect(),
             samples: 1000,
             seed: 0,
@@ -222,21 +226,25 @@ fn finding(
             Verdict::Undecided(why) => return Err(RequestError::Undecided(why.to_string())),
         }
     } else {
-        match planned(request.task) {
+        match planned(request) {
             PlanAnswer::Plan(plan) => made = plan,
             PlanAnswer::Unsolvable => return Ok(OddsFinding::NoPlan),
-            PlanAnswer::NotFound { why } | PlanAnswer::Failed { why } => {
-                return Ok(OddsFinding::None { reason: why });
+            other => {
+                let reason = other.why_not().unwrap_or_default().to_owned();
+                return Ok(OddsFinding::None { reason });
             }
         }
         &made
     };
-    let mut subject = Subject::new(request, plan)?;
+    let mut subject = Subject::new(request, plan, request.likelihoods)?;
     let order = if request.settings.takes_best_order || request.plan.is_none() {
         let (best, stop) = subject.best_order(watcher)?;
         match (best, stop) {
             (Some(order), stop) => OrderAnswer::of(&subject, &order, Some(stop))?,
-            (None, SearchStop::Complete) => return Ok(OddsFinding::NoOrder),
+            (None, SearchStop::Complete) if works_in_order(request, plan)? => {
+                return Ok(OddsFinding::NoOrder);
+            }
+            (None, SearchStop::Complete) => return Ok(fails_in_order()),
             (None, SearchStop::Interrupted) => {
                 let reason = "no order was found within the limit of the search".to_owned();
                 return Ok(OddsFinding::None { reason });
@@ -248,6 +256,9 @@ fn finding(
             .order_of(&subject.initial, &subject.as_planned);
         OrderAnswer::of(&subject, &order.map_err(|error| coupled(&error))?, None)?
     };
+    if order.probability <= 0.0 && !works_in_order(request, plan)? {
+        return Ok(fails_in_order());
+    }
     let gains = GainsAnswer::of(&mut subject, &order, watcher)?;
     let executed = match request.world {
         Some(world) => executed::all(&subject, world, watcher),
@@ -263,11 +274,39 @@ fn finding(
     })))
 }
 
+/// The answer for a valid plan whose happenings do not work as an order.
+fn fails_in_order() -> OddsFinding {
+    let reason = "not supported: the happenings of this plan do not reach the goal as an order, although the plan is valid";
+    OddsFinding::None {
+        reason: reason.to_owned(),
+    }
+}
+
+/// Returns `true` if the happenings of a valid plan, taken as an order, succeed when everything is certain.
+fn works_in_order(
+    request: &OddsRequest<'_>,
+    plan: &TimeTriggeredPlan,
+) -> Result<bool, RequestError> {
+    let mut subject = Subject::new(request, plan, &Likelihoods::certain())?;
+    subject.initial = Circumstances::initial(request.task);
+    let order = subject
+        .search
+        .order_of(&subject.initial, &subject.as_planned);
+    Ok(order.map_err(|error| coupled(&error))?.probability > 0.0)
+}
+
 /// A plan of the embedded planner.
-fn planned(task: &Task) -> PlanAnswer {
-    Embedded::default()
-        .plan(task, &Situation::initial(task))
+fn planned(request: &OddsRequest<'_>) -> PlanAnswer {
+    planner(&request.settings)
+        .plan(request.task, &Situation::initial(request.task))
         .answer
+}
+
+/// The planner that makes the plan, and new plans in samples.
+fn planner(settings: &OddsSettings) -> Embedded<'static> {
+    let mut planner = Embedded::default();
+    planner.settings.self_overlap = settings.self_overlap;
+    planner
 }
 
 fn coupled(error: &elbowroom_probability::TooCoupled) -> RequestError {
@@ -278,6 +317,7 @@ impl<'a> Subject<'a> {
     fn new(
         request: &'a OddsRequest<'a>,
         plan: &'a TimeTriggeredPlan,
+        likelihoods: &Likelihoods,
     ) -> Result<Self, RequestError> {
         let ordered = partial_order(request.task, &as_timed(plan));
         let by_step = ordered.instance_of_step.iter().zip(&plan.steps);
@@ -286,7 +326,7 @@ impl<'a> Subject<'a> {
         let steps: Vec<Step> = steps.into_iter().map(|(_, step)| step.clone()).collect();
         let semantics = request.settings.semantics.into();
         let task = Arc::clone(request.task);
-        let model = Model::new(task, ordered, request.likelihoods, semantics);
+        let model = Model::new(task, ordered, likelihoods, semantics);
         let model = model.map_err(|missing| RequestError::Unsupported(missing.to_string()))?;
         let search = OrderSearch::new(model, SearchSettings::default());
         let as_planned = search.as_timed(&steps);
@@ -294,7 +334,7 @@ impl<'a> Subject<'a> {
             request,
             plan,
             search: search.beginning_with(as_planned.clone()),
-            initial: Circumstances::believed(request.task, request.likelihoods),
+            initial: Circumstances::believed(request.task, likelihoods),
             as_planned,
         })
     }

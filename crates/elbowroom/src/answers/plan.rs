@@ -1,23 +1,23 @@
 //! Is there a plan?
 
-#[cfg(not(target_family = "wasm"))]
-mod certificate;
 mod external;
 mod objective;
+mod refuted;
 
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
-use elbowroom_pddl::write_plan;
 use elbowroom_planner::{Answer, Counts, Found, Progress, Settings, Stopped};
+use elbowroom_verify::no_plan::NoPlan;
 use serde::{Deserialize, Serialize};
 
 use super::{Event, Exact, Halt, PlanProgress, RequestError, Version, Watcher, exact};
+use crate::execute::exhausted;
+use crate::plan_text;
 
-#[cfg(not(target_family = "wasm"))]
-pub use certificate::{certify, no_plan_certificate_from};
+pub use crate::no_plan::no_plan_certificate_from;
 pub use external::{PlannerFailure, plan_with};
 pub use objective::{
     BestPlanRequest, PlanAim, PlanChoice, PlanObjective, PlanWorth, UnknownPlanObjective, best_plan,
@@ -33,6 +33,8 @@ pub struct PlanRequest<'a> {
     pub first_plan_only: bool,
     /// About how much memory the search may use, in bytes.
     pub most_memory: Option<u64>,
+    /// `true` if a ground action may overlap itself in plans of the embedded planner.
+    pub self_overlap: bool,
     /// How many threads the embedded planner may use. The answer is the same whatever their number, but
     /// for what a time limit allows.
     pub threads: usize,
@@ -107,25 +109,25 @@ pub enum PlanFinding {
         /// The same as text.
         plan: String,
     },
-    /// There is no plan, or the planner says so.
+    /// No plan exists.
     #[serde(rename = "no plan")]
     NoPlan {
         /// The reason.
         reason: String,
-        /// The proof for [`elbowroom_verify::no_plan`], if one was asked for ([`certify`]) and found.
-        #[cfg(not(target_family = "wasm"))]
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        certificate: Option<Box<elbowroom_verify::no_plan::NoPlan>>,
-        /// Why there is no certificate, if one was asked for.
-        #[cfg(not(target_family = "wasm"))]
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        uncertified: Option<String>,
+        /// The proof, which [`elbowroom_verify::no_plan`] accepts.
+        certificate: Box<NoPlan>,
     },
-    /// Nothing is known.
+    /// No plan was found; there may be one.
     #[serde(rename = "none")]
     None {
         /// The reason.
         reason: String,
+        /// The reason for the missing certificate, if the planner claims that no plan exists.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        uncertified: Option<String>,
+        /// `true` if all plans were tried without self-overlap; left out elsewhere.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        without_self_overlap: bool,
     },
 }
 
@@ -158,7 +160,7 @@ pub enum PlanStop {
     /// Nothing is left to search (embedded planner).
     #[serde(rename = "exhausted")]
     Exhausted,
-    /// It is proved that there is no plan (embedded planner).
+    /// It is proved that there is no plan, by a certificate.
     #[serde(rename = "proved")]
     Proved,
     /// By itself (other planners), or at the number of plans that is compared without a time limit.
@@ -210,6 +212,7 @@ pub fn plan(
     let situation = Situation::initial(request.task);
     let mut settings = Settings {
         first_plan_only: request.first_plan_only,
+        self_overlap: request.self_overlap,
         threads: request.threads,
         ..Settings::default()
     };
@@ -233,13 +236,17 @@ pub fn plan(
             counts,
         } => (Ok(found), course.stop(stopped), counts),
         Answer::Unsolvable { proof, counts } => {
-            let reason = proof.to_string();
-            (Err(PlanFinding::no_plan(reason)), PlanStop::Proved, counts)
+            let (finding, stop) = course.refuted(request.task, &proof, counts);
+            (Err(finding), stop, counts)
         }
-        Answer::NoneFound { stopped, counts } => {
+        Answer::NoneFound {
+            stopped,
+            without_self_overlap,
+            counts,
+        } => {
             let stop = course.stop(stopped);
-            let reason = none_found(stop, counts, settings.max_memory);
-            (Err(PlanFinding::None { reason }), stop, counts)
+            let reason = none_found(stop, (counts, without_self_overlap), settings.max_memory);
+            (Err(PlanFinding::none(request.task, reason)), stop, counts)
         }
         Answer::Unsupported(unsupported) => {
             return Err(RequestError::Unsupported(unsupported.to_string()));
@@ -280,7 +287,11 @@ pub fn unread(planner: &str, halt: Halt, elapsed: Duration) -> PlanOutcome {
             domain: String::new(),
             problem: String::new(),
             planner: planner.to_owned(),
-            finding: PlanFinding::None { reason },
+            finding: PlanFinding::None {
+                reason,
+                uncertified: None,
+                without_self_overlap: false,
+            },
             choice: None,
             stop,
             plans: 0,
@@ -319,17 +330,6 @@ impl Course<'_> {
 }
 
 impl PlanFinding {
-    /// No plan, and no certificate so far.
-    fn no_plan(reason: String) -> Self {
-        Self::NoPlan {
-            reason,
-            #[cfg(not(target_family = "wasm"))]
-            certificate: None,
-            #[cfg(not(target_family = "wasm"))]
-            uncertified: None,
-        }
-    }
-
     fn of(
         task: &Task,
         plan: &TimeTriggeredPlan,
@@ -349,7 +349,7 @@ impl PlanFinding {
             metric,
             repaired,
             steps: steps.collect(),
-            plan: write_plan(task, plan),
+            plan: plan_text(task, plan),
         }
     }
 }
@@ -431,7 +431,11 @@ impl Course<'_> {
 }
 
 /// `memory` is the limit of it, in bytes.
-fn none_found(stop: PlanStop, counts: Counts, memory: usize) -> String {
+fn none_found(
+    stop: PlanStop,
+    (counts, without_self_overlap): (Counts, bool),
+    memory: usize,
+) -> String {
     let evaluated = counts.evaluated;
     let ended = match stop {
         PlanStop::Cancelled => format!("stopped after {evaluated} states"),
@@ -440,7 +444,7 @@ fn none_found(stop: PlanStop, counts: Counts, memory: usize) -> String {
             "gave up at the memory limit of {} MB, after {evaluated} states",
             memory >> 20
         ),
-        _ => format!("searched all that the search can reach, {evaluated} states"),
+        _ => return exhausted(counts, without_self_overlap),
     };
     format!("no plan found: {ended}; this is no proof that there is none")
 }

@@ -160,7 +160,7 @@ pub fn region(
 ) -> Result<RegionOutcome, RequestError> {
     let task = &request.task;
     let outcome = |finding, plan, region| outcome(request, finding, plan, region);
-    let plan = match envelope::opened(request, watcher) {
+    let plan = match envelope::opened(request) {
         Ok((plan, _)) => plan,
         Err(FlowError::Invalid(violation)) => {
             let violation = (&*violation).into();

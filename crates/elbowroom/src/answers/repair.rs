@@ -3,10 +3,13 @@
 mod subject;
 mod words;
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_envelope::obligations::Refusal;
-use elbowroom_envelope::{Guarantee, Oracle, RepairRun, enforced, repair as cheapest};
+use elbowroom_envelope::{
+    Guarantee, Oracle, Repair, RepairLimits, RepairRun, enforced, repair as cheapest,
+};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::parametrize::VarySpec;
@@ -18,6 +21,10 @@ use super::{Exact, Halt, RequestError, Version, Watcher, exact};
 use crate::flow::{self, FlowError};
 use crate::{AnyPlan, room};
 use subject::Subject;
+
+/// The limit on the work of a search through other orders, in linear programs times the square of
+/// the number of time points.
+const OTHER_ORDERS: usize = 200_000;
 
 /// Asks for the cheapest change with which a plan works.
 #[derive(Clone, Debug)]
@@ -98,7 +105,7 @@ pub enum RepairFormat {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "lowercase")]
 pub enum RepairFinding {
-    /// The plan works after these changes, and after none that cost less.
+    /// The plan works after these changes, and after none that cost less in the `orders` searched.
     Repaired {
         /// What changes; empty if it is enough to take other times for the actions.
         changes: Vec<Change>,
@@ -121,11 +128,20 @@ pub enum RepairFinding {
         steps: Vec<PlanStep>,
         /// How many linear programs were solved; none if nothing had to change.
         cases: usize,
+        /// The searched orders of interfering actions. No repair in them is cheaper.
+        #[serde(default)]
+        orders: Orders,
+        /// `true` if interfering actions have another order than in the plan.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        reordered: bool,
     },
     /// Nothing that may change makes the plan work.
     Impossible {
         /// What stands in the way, in words.
         because: Vec<String>,
+        /// The searched orders of interfering actions.
+        #[serde(default)]
+        orders: Orders,
     },
     /// Not known.
     None {
@@ -135,6 +151,17 @@ pub enum RepairFinding {
         #[serde(with = "exact")]
         bound: Rational,
     },
+}
+
+/// The orders of interfering actions that a search for a repair has covered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Orders {
+    /// The order of the plan. Other orders were not searched to the end.
+    #[default]
+    Kept,
+    /// All orders; for an STN plan, all that its bounds allow.
+    All,
 }
 
 /// A quantity that changes.
@@ -155,9 +182,10 @@ pub struct Change {
 
 /// Finds the cheapest change with which a plan works.
 ///
-/// The answer says in which order happenings stay: that of the plan, where its actions interfere;
-/// timed initials may come before or after them, as it fits. The repair is checked: the judge accepts
-/// the plan for the changed problem, and the box check its values.
+/// The search first keeps the plan's order of interfering actions. Timed initials may come before or
+/// after them. If that costs anything, other orders are searched, within a limit, and the answer names
+/// the orders that it covers. The repair is checked: the validator accepts the plan for the changed
+/// problem, and the box check accepts its values.
 ///
 /// # Errors
 /// When the request names what the plan does not have, or the plan is beyond exact analysis.
@@ -172,57 +200,35 @@ pub fn repair(
     }
     let subject = Subject::new(request)?;
     let mut halt = None;
-    let mut judged = |values: &Valuation, schedule: &Schedule| {
-        let (task, plan) = subject.repaired(values, schedule);
-        flow::judge(&task, &plan).is_valid()
-    };
     let mut go_on = || watcher.flow().map_break(|why| halt = Some(why));
-    let run = cheapest(
-        &subject.task,
-        &subject.plan,
-        subject.times.as_ref(),
-        &subject.changeable,
-        &mut judged,
-        &mut go_on,
-    );
-    let run = run.map_err(FlowError::Refused)?;
-    let mut repaired = None;
-    let finding = match run {
-        RepairRun::Repaired { repair, cases } => {
-            let (task, plan) = subject.repaired(&repair.values, &repair.schedule);
-            let promise = match &subject.times {
-                Some(_) => promised(request, &task, &plan),
-                None => subject.kept(request, &repair.values, &repair.schedule),
-            };
-            let finding = RepairFinding::Repaired {
-                changes: subject.changes(&repair.values),
-                because: subject.because(&repair),
-                cost: repair.cost,
-                bound: repair.bound,
-                keeps: promise.keeps,
-                not_guaranteed: promise.why_not,
-                steps: steps(&plan),
-                cases,
-            };
-            repaired = Some((task, plan));
-            finding
-        }
-        RepairRun::Impossible { because } => RepairFinding::Impossible {
-            because: subject.hindrances(&because),
-        },
-        RepairRun::Unexplained { values, schedule } => {
-            let (task, plan) = subject.repaired(&values, &schedule);
-            let why = match flow::judge(&task, &plan) {
-                elbowroom_model::Verdict::Invalid(violation) => violation.to_string(),
-                _ => "the judge does not accept the plan".to_owned(),
-            };
-            RepairFinding::Impossible {
-                because: vec![format!("{why}; repairs do not heed this")],
-            }
-        }
-        RepairRun::Stopped { bound, .. } => stopped(halt, bound),
+    let limits = RepairLimits::default();
+    let times = subject.times.as_ref();
+    let run = subject.search(times, &limits, &mut go_on)?;
+    if times.is_none() {
+        return Ok(subject.outcome_of(request, run, (Orders::All, false), halt));
+    }
+    // Which other orders could be cheaper, and whether all of them have been searched.
+    let below = match &run {
+        RepairRun::Repaired { repair, .. } => Some(repair.cost.clone()),
+        _ => None,
     };
-    Ok(outcome(request, finding, repaired))
+    let is_free = below.as_ref().is_some_and(Rational::is_zero);
+    if is_free || matches!(run, RepairRun::Stopped { .. }) {
+        let orders = if is_free { Orders::All } else { Orders::Kept };
+        return Ok(subject.outcome_of(request, run, (orders, false), halt));
+    }
+    let limits = subject.limits_of_other_orders(below.clone());
+    let (run, orders) = match subject.search(None, &limits, &mut go_on) {
+        Ok(other @ RepairRun::Repaired { .. }) => (other, (Orders::All, true)),
+        Ok(RepairRun::Impossible { because }) if below.is_none() => {
+            (RepairRun::Impossible { because }, (Orders::All, false))
+        }
+        Ok(RepairRun::Stopped { bound, .. }) if below.is_some_and(|below| bound >= below) => {
+            (run, (Orders::All, false))
+        }
+        _ => (run, (Orders::Kept, false)),
+    };
+    Ok(subject.outcome_of(request, run, orders, None))
 }
 
 /// What is known when somebody could wait no longer for a single step: nothing.
@@ -254,6 +260,8 @@ fn as_it_stands(request: &RepairRequest, plan: &TimeTriggeredPlan) -> RepairOutc
         not_guaranteed: promise.why_not,
         steps: steps(plan),
         cases: 0,
+        orders: Orders::All,
+        reordered: false,
     };
     let repaired = ((*request.task).clone(), plan.clone());
     outcome(request, finding, Some(repaired))
@@ -317,6 +325,92 @@ fn objected(
 }
 
 impl Subject {
+    /// Searches for the cheapest repair; interfering actions keep the order of these times, if
+    /// there are any.
+    fn search(
+        &self,
+        times: Option<&Schedule>,
+        limits: &RepairLimits,
+        flow: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<RepairRun, FlowError> {
+        let mut judged = |values: &Valuation, schedule: &Schedule| {
+            let (task, plan) = self.repaired(values, schedule);
+            flow::judge(&task, &plan).is_valid()
+        };
+        let run = cheapest(
+            &self.task,
+            &self.plan,
+            times,
+            &self.changeable,
+            limits,
+            &mut judged,
+            flow,
+        );
+        run.map_err(FlowError::Refused)
+    }
+
+    /// The limits of a search through other orders for something cheaper: the more time points there
+    /// are, the longer each linear program takes.
+    fn limits_of_other_orders(&self, below: Option<Rational>) -> RepairLimits {
+        let points = self.plan.plan.nodes.len().max(1);
+        RepairLimits {
+            cases: (OTHER_ORDERS / (points * points)).clamp(10, 1_000),
+            below,
+        }
+    }
+
+    fn outcome_of(
+        &self,
+        request: &RepairRequest,
+        run: RepairRun,
+        (orders, reordered): (Orders, bool),
+        halt: Option<Halt>,
+    ) -> RepairOutcome {
+        let mut repaired = None;
+        let finding = match run {
+            RepairRun::Repaired { repair, cases } => {
+                let (task, plan) = self.repaired(&repair.values, &repair.schedule);
+                let promise = match &self.times {
+                    Some(_) => promised(request, &task, &plan),
+                    None => self.kept(request, &repair.values, &repair.schedule),
+                };
+                let because = self.because(&repair);
+                let Repair { cost, bound, .. } = repair;
+                let finding = RepairFinding::Repaired {
+                    changes: self.changes(&repair.values),
+                    because,
+                    cost,
+                    bound,
+                    keeps: promise.keeps,
+                    not_guaranteed: promise.why_not,
+                    steps: steps(&plan),
+                    cases,
+                    orders,
+                    reordered,
+                };
+                repaired = Some((task, plan));
+                finding
+            }
+            RepairRun::Impossible { because } => RepairFinding::Impossible {
+                because: self.hindrances(&because),
+                orders,
+            },
+            RepairRun::Unexplained { values, schedule } => {
+                let (task, plan) = self.repaired(&values, &schedule);
+                let why = match flow::judge(&task, &plan) {
+                    elbowroom_model::Verdict::Invalid(violation) => violation.to_string(),
+                    _ => "the judge does not accept the plan".to_owned(),
+                };
+                RepairFinding::Impossible {
+                    because: vec![format!("{why}; repairs do not heed this")],
+                    orders,
+                }
+            }
+            RepairRun::Stopped { bound, .. } => stopped(halt, bound),
+        };
+        outcome(request, finding, repaired)
+    }
+
     /// Whether an STN plan works with these values, and which bounds it needs for that.
     fn kept(&self, request: &RepairRequest, values: &Valuation, schedule: &Schedule) -> Promise {
         let mut plan = self.plan.clone();

@@ -11,7 +11,7 @@ use elbowroom_report::trace::line::ReportLine;
 use serde::{Deserialize, Serialize};
 
 use super::{Event, Version, Watcher};
-use crate::execute::{Listener, RunSpec, SpecError};
+use crate::execute::{Listener, RunSpec, SpecError, Validated};
 
 /// Asks for a run.
 pub struct RunRequest<'a> {
@@ -54,6 +54,10 @@ pub struct RunAnswer {
     /// Among what the first plan was chosen, in words; left out where it was not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_plan: Option<String>,
+    /// Violations that the validator finds in the execution: bugs of this program. Left out if there are
+    /// none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub invalid: Vec<String>,
     /// Always the same.
     pub format: RunFormat,
     /// Always the same.
@@ -178,8 +182,11 @@ pub fn run(
         None => spec.planner_for(request.task, model.as_ref(), &clock, &goes_on)?,
     };
     let remark = Arc::new(Mutex::new(None));
+    let (inner, validation) =
+        Validated::new(request.recorder, request.task, request.stand.as_ref());
+    let inner = inner.told_to(|invalid| shared.get().notice(&Event::Invalid(invalid)));
     let recorder = Heard {
-        inner: request.recorder,
+        inner: Box::new(inner),
         watched: &shared,
         plans: 0,
         remark: Arc::clone(&remark),
@@ -203,6 +210,7 @@ pub fn run(
     Ok(RunOutcome {
         answer: RunAnswer {
             first_plan,
+            invalid: validation.found().iter().map(ToString::to_string).collect(),
             ..RunAnswer::of(&report)
         },
         report,
@@ -234,6 +242,7 @@ impl RunAnswer {
         Self {
             report: ReportLine::of(report),
             first_plan: None,
+            invalid: Vec::new(),
             format: RunFormat::Run,
             version: Version,
         }

@@ -1,7 +1,6 @@
 //! Which orderings and times does a plan need?
 
 use elbowroom_model::Task;
-use elbowroom_model::validate::Violation;
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder::DeorderError;
 use elbowroom_plan::{Bound, Constraint, Node, NodeId, ParametrizedPlan};
@@ -29,8 +28,6 @@ pub struct StnOutcome {
     pub answer: StnAnswer,
     /// The network; `None` if the judge rejects the plan.
     pub plan: Option<ParametrizedPlan>,
-    /// The judge's objection to the plan's own times, if times close to these were taken.
-    pub repaired: Option<Box<Violation>>,
 }
 
 /// A plan as a network: `docs/formats/stn-json.md`.
@@ -131,19 +128,15 @@ pub fn stn(request: &StnRequest<'_>) -> Result<StnOutcome, RequestError> {
     if let Some(feature) = task.left_to_the_judge() {
         return Err(FlowError::from(DeorderError::Unsupported { feature }).into());
     }
-    let (plan, repaired) = match &request.plan {
-        AnyPlan::Stn(plan) => (plan.clone(), None),
+    let plan = match &request.plan {
+        AnyPlan::Stn(plan) => plan.clone(),
         AnyPlan::TimeTriggered(plan) => match flow::free(task, plan) {
-            Ok(freed) => {
-                let repaired = freed.repaired.clone();
-                (flow::closed(task, freed), repaired)
-            }
+            Ok(freed) => flow::closed(task, freed),
             Err(FlowError::Invalid(violation)) => {
                 let violation = (&*violation).into();
                 return Ok(StnOutcome {
                     answer: answer(StnFinding::Invalid { violation }),
                     plan: None,
-                    repaired: None,
                 });
             }
             Err(error) => return Err(error.into()),
@@ -152,7 +145,6 @@ pub fn stn(request: &StnRequest<'_>) -> Result<StnOutcome, RequestError> {
     Ok(StnOutcome {
         answer: answer(network(task, &plan)),
         plan: Some(plan),
-        repaired,
     })
 }
 

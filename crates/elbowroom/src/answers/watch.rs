@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom_model::validate::Violation;
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+use elbowroom_report::validation::Invalid;
 
 use super::RunProgress;
 
@@ -44,15 +44,14 @@ pub enum Halt {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Event<'a> {
-    /// The plan is not valid as it stands, but is with times close to its own, which are taken
-    /// instead: what the judge objects to.
-    Repaired(&'a Violation),
     /// The search for an envelope has tried a step.
     Envelope(EnvelopeProgress<'a>),
     /// A planner is at work, or has found a plan.
     Plan(PlanProgress<'a>),
     /// Something has happened in a run.
     Run(RunProgress<'a>),
+    /// The validator rejects the latest entry of a run: a bug of this program. The run continues.
+    Invalid(&'a Invalid),
     /// A trial of an experiment is over.
     Trials(TrialsProgress),
 }

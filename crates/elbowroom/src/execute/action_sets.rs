@@ -78,6 +78,8 @@ impl ActionSets {
             improve_states: embedded.improve_states,
             other_states: OTHER_STATES,
             searches: MOST_SEARCHES,
+            work: embedded.work,
+            patience: embedded.patience,
         };
         // What is only thought of gets no numbers.
         let thought = task.with_own_table();
@@ -112,9 +114,13 @@ fn fallbacks(
     first: &TimeTriggeredPlan,
     goes_on: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Vec<String>> {
+    let work = replanning.work;
     let rollouts = Rollouts {
         world: Arc::new(world.clone()),
-        executor: ExecutorSpec::default(),
+        // It makes a new plan at the first deviation, so that more plans are seen.
+        executor: "guarded"
+            .parse()
+            .unwrap_or_else(|_| ExecutorSpec::default()),
         settings: RunSettings {
             planning_time: PlanningTime::Seconds(Rational::ZERO),
             ..RunSettings::default()
@@ -124,7 +130,7 @@ fn fallbacks(
         replanning: Some(replanning),
         is_ready: true,
     };
-    let mut tryout = Tryout::new(task, rollouts, goes_on);
+    let mut tryout = Tryout::new(task, rollouts, work, goes_on);
     let mut found: IndexMap<Vec<String>, usize> = IndexMap::new();
     for sample in 0..SAMPLES {
         if !goes_on() {

@@ -5,26 +5,23 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_envelope::obligations::Refusal;
-use elbowroom_envelope::{
-    BestSettings, Guarantee, Objective, Oracle, Settings as SearchSettings, best, irr,
-};
+use elbowroom_envelope::{Guarantee, Oracle, Settings as SearchSettings, irr};
 use elbowroom_execution::{Forms, Need, PrepareError, Prepared, Preparer, Region};
+use elbowroom_model::ground::Action;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::deorder;
+use elbowroom_plan::deorder::{self, Deordered};
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
 use elbowroom_plan::partial_order::partial_order;
 use elbowroom_plan::{
-    BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Schedule, Side, Valuation,
+    Bound, BoxEnd, Constraint, DecoupledEnvelope, Node, NodeId, ParameterId, ParametrizedPlan,
+    Reason, Schedule, Side, StnPlan, Valuation,
 };
 
 use super::facts_only::{as_timed, facts_only};
 use super::vary::is_about_an_absent_action;
-use crate::chances::{ChanceError, chances};
+use crate::answers::envelope::{PlannedBeyond, grow};
 use crate::flow::{self, FlowError};
-
-/// See [`divide_after`](SearchSettings::divide_after). Looks at a plan of a thousand actions hardly go through so many.
-const DIVIDE_AFTER: usize = 50_000;
 
 impl From<FlowError> for PrepareError {
     fn from(error: FlowError) -> Self {
@@ -83,12 +80,12 @@ impl Analyst {
     }
 
     /// The specifications that fit something in the plan.
-    fn specs(&self, task: &Task, freed: &flow::Freed) -> Result<Vec<VarySpec>, ParametrizeError> {
+    fn specs(&self, task: &Task, freed: &Deordered) -> Result<Vec<VarySpec>, ParametrizeError> {
         let mut fitting = Vec::new();
         for spec in &self.settings.vary {
-            let plan = freed.deordered.plan.clone();
+            let plan = freed.plan.clone();
             let one = std::slice::from_ref(spec);
-            match parametrize(task, plan, &freed.deordered.nominal, one) {
+            match parametrize(task, plan, &freed.nominal, one) {
                 // Numbers that the domain leaves open may be given by another specification.
                 Ok(_) | Err(ParametrizeError::NoNominal { .. }) => fitting.push(spec.clone()),
                 Err(ParametrizeError::NothingMatches { .. }) => {}
@@ -99,7 +96,7 @@ impl Analyst {
         Ok(fitting)
     }
 
-    fn open(&self, task: &Task, freed: flow::Freed) -> Result<ParametrizedPlan, PrepareError> {
+    fn open(&self, task: &Task, freed: Deordered) -> Result<ParametrizedPlan, PrepareError> {
         let specs = self.specs(task, &freed)?;
         if specs.is_empty() && !self.settings.vary.is_empty() {
             return Ok(flow::closed(task, freed));
@@ -142,29 +139,12 @@ impl Analyst {
             Oracle::new(task, plan, guarantee)
         };
         let mut oracle = oracle.map_err(beyond)?;
-        // A long plan has to begin, even if its box is a little smaller.
-        let search = SearchSettings {
-            divide_after: Some(DIVIDE_AFTER),
-            ..self.settings.search.clone()
-        };
-        let run = irr(&mut oracle, &search, &mut |_| self.flow()).map_err(beyond)?;
-        let envelope = run.envelope.map_err(|_| PrepareError::NoGuarantee)?;
-        let Some(objective) = self.settings.objective else {
-            return Ok(envelope);
-        };
-        let chances = match (objective, &self.settings.world) {
-            (Objective::Probability, Some(world)) => chances(plan, world),
-            (Objective::Probability, None) => Err(ChanceError::NoWorld),
-            _ => Ok(Vec::new()),
-        };
-        let wanted = BestSettings {
-            objective,
-            chances: chances.map_err(|error| PrepareError::Beyond(error.to_string()))?,
-            ..BestSettings::default()
-        };
-        let run = best(&mut oracle, &wanted, Some(&envelope), &mut |_| self.flow());
-        let best = run.map_err(beyond)?;
-        best.envelope.map_err(|_| PrepareError::NoGuarantee)
+        let search = &self.settings.search;
+        let how = (search, search.method_for(task));
+        let world = self.settings.world.as_ref();
+        let grown = grow(&mut oracle, how, world, &mut |_| self.flow());
+        let grown = grown.map_err(|error| PrepareError::Beyond(error.to_string()))?;
+        grown.envelope.map_err(|_| PrepareError::NoGuarantee)
     }
 }
 
@@ -179,16 +159,22 @@ impl Preparer for Analyst {
         if is_about_orders && flow::judge(task, plan).is_valid() {
             return Self::orderings(task, plan, need);
         }
-        let freed = flow::free(task, plan)?;
+        let mut freed = flow::free_or_retimed(task, plan)?;
+        hold_starts_under_way(&mut freed.plan);
         if is_about_orders {
             return Self::orderings(task, plan, need);
         }
-        let nominal = freed.deordered.nominal.clone();
-        let instances = freed.deordered.instances.clone();
+        let nominal = freed.nominal.clone();
+        let instances = freed.instances.clone();
         let plan = Arc::new(match need {
             Need::Orderings | Need::PartialOrder | Need::Network => flow::closed(task, freed),
             Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
         });
+        if matches!(need, Need::OpenNetwork | Need::Envelope)
+            && let Some(beyond) = PlannedBeyond::find(&plan, &self.settings.timeout)
+        {
+            return Err(PrepareError::Beyond(beyond.message()));
+        }
         let envelope = match need {
             Need::Envelope => Some(self.envelope(task, &plan, &nominal)?),
             Need::OpenNetwork => self.envelope(task, &plan, &nominal).ok(),
@@ -203,6 +189,30 @@ impl Preparer for Analyst {
             order: None,
         })
     }
+}
+
+/// Fixes the starts of actions that are under way. Nothing else does, because these starts need and change nothing; and
+/// if they could be chosen, the envelope would rest on that choice.
+fn hold_starts_under_way(plan: &mut StnPlan) {
+    let is_under_way = |action: &Action| {
+        let body = action.durative();
+        body.is_some_and(|body| body.is_under_way)
+    };
+    let starts: Vec<NodeId> = plan
+        .nodes()
+        .filter_map(|(node, what)| match what {
+            Node::Start(id) if is_under_way(&plan.instance(id).action) => Some(node),
+            _ => None,
+        })
+        .collect();
+    plan.constraints
+        .extend(starts.into_iter().map(|start| Constraint {
+            from: NodeId::ZERO,
+            to: start,
+            lower: Bound::Finite(Rational::ZERO),
+            upper: Bound::Finite(Rational::ZERO),
+            reason: Reason::Given,
+        }));
 }
 
 /// Where a box is looked for around what is left of a plan, all values are moved in turn, by this part of themselves at

@@ -26,6 +26,7 @@ use std::sync::Arc;
 
 use elbowroom_model::validate::{self, validate_from};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
+use elbowroom_num::work;
 use elbowroom_plan::deorder::deorder;
 use elbowroom_planner::{Counts, embedded};
 use elbowroom_sim::WorldModel;
@@ -63,6 +64,10 @@ pub struct Limits {
     pub other_states: u64,
     /// The number of variants that may be asked for.
     pub searches: usize,
+    /// Work limit for all plans together, and for trying them out, in units of [`elbowroom_num::work`].
+    pub work: u64,
+    /// The plan for the unchanged problem may take this multiple of `work`.
+    pub patience: u64,
 }
 
 /// A plan, and what it was made for.
@@ -89,6 +94,7 @@ pub struct Candidates<'a> {
     /// All that were found.
     plans: Vec<TimeTriggeredPlan>,
     states: u64,
+    budget: work::Budget,
     first_states: Option<u64>,
     answer: Option<embedded::Answer>,
 }
@@ -143,6 +149,7 @@ impl<'a> Candidates<'a> {
             situation,
             world,
             settings,
+            budget: work::Budget::new(limits.work),
             limits,
             asked: queue.iter().cloned().collect(),
             queue,
@@ -186,7 +193,8 @@ impl<'a> Candidates<'a> {
             if self.asked.len() - self.queue.len() >= self.limits.searches.max(1) {
                 return None;
             }
-            if !goes_on(self.states) {
+            let is_first = self.answer.is_none();
+            if !goes_on(self.states) || self.budget.is_spent() && !is_first {
                 return None;
             }
             let variant = self.queue.pop_front()?;
@@ -198,10 +206,9 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// Plans for a variant.
-    fn search(&mut self, variant: &Variant, goes_on: &mut dyn FnMut(u64) -> bool) {
-        let own = variant.is_problem();
-        let (most, improve) = if own {
+    /// The limits on states for a plan of a variant, and for a better plan than the first.
+    fn most_states(&self, variant: &Variant) -> (u64, u64) {
+        if variant.is_problem() {
             (self.limits.most_states, self.limits.improve_states)
         } else {
             let first = self.first_states.unwrap_or_default();
@@ -213,10 +220,22 @@ impl<'a> Candidates<'a> {
             } else {
                 (most, most.min(self.limits.improve_states))
             }
-        };
+        }
+    }
+
+    /// Plans for a variant.
+    fn search(&mut self, variant: &Variant, goes_on: &mut dyn FnMut(u64) -> bool) {
+        let own = variant.is_problem();
+        let (most, improve) = self.most_states(variant);
         if most == 0 {
             return;
         }
+        let work = self.budget.left();
+        let most_work = if own {
+            work.saturating_mul(self.limits.patience)
+        } else {
+            work
+        };
         // Plans that differ are asked for, not the best one: the states are for searching, not for refining.
         let mut tuning = self.settings.tuning.clone();
         tuning.without.extend(REFINEMENT);
@@ -257,12 +276,12 @@ impl<'a> Candidates<'a> {
                 plans.push(found.plan.clone());
             }
             states = progress.counts.evaluated;
-            let limit = if progress.best.is_some() {
-                improve.min(most)
-            } else {
-                most
+            let (limit, work) = match progress.best {
+                Some(_) => (improve.min(most), work),
+                None => (most, most_work),
             };
-            if states >= limit || !goes_on(before + states) {
+            let is_over = states >= limit || progress.counts.work >= work;
+            if is_over || !goes_on(before + states) {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())

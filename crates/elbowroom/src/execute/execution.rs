@@ -5,7 +5,8 @@ use std::sync::Arc;
 use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, UnknownExecutor};
 use elbowroom_execution::run::{Ports, Report, Run, RunSettings, Stand};
 use elbowroom_execution::{
-    Executor, NoRecord, Odds, Outlook, Planner, Preparer, Progression, Recorder, Rehearsal, World,
+    Executor, NoRecord, Odds, Outlook, Planner, PortWorkers, Preparer, Progression, Recorder,
+    Rehearsal, Workers, World,
 };
 use elbowroom_model::problem::Condition;
 use elbowroom_model::{Task, TimeTriggeredPlan};
@@ -75,7 +76,7 @@ pub fn execute(
 /// let (problem, _warnings) = pddl::read_problem(&domain, &problem)?;
 ///
 /// // Without a plan, one is made.
-/// let mut run = Execution::of(&Arc::new(Task::new(problem))).by("stn".parse()?).run();
+/// let (mut run, mut workers) = Execution::of(&Arc::new(Task::new(problem))).by("stn".parse()?).run();
 /// // The world of this event loop: each action starts at once, and takes as long as planned.
 /// let mut coming: Vec<Observation> = Vec::new();
 /// let report = loop {
@@ -96,6 +97,8 @@ pub fn execute(
 ///         }
 ///         Next::Look { .. } => run.see(Vec::new())?,
 ///         Next::Over(report) => break report,
+///         // A plan is to be made, or prepared: these workers answer at once.
+///         request => run.delegate(request, &mut *workers),
 ///     }
 /// };
 /// assert_eq!(report.verdict, Verdict::GoalReached);
@@ -288,9 +291,10 @@ impl<'a> Execution<'a> {
         Self { listener, ..self }
     }
 
-    /// The run, to be driven step by step: by an event loop.
+    /// Returns the run, to be driven step by step by an event loop, and the workers that answer its requests for
+    /// plans.
     #[must_use = "a run does nothing until it is asked what is next"]
-    pub fn run(self) -> Run<'a> {
+    pub fn run(self) -> (Run<'a>, Box<dyn Workers + 'a>) {
         let rehearsal = self.rehearsal.clone();
         let executor = match self.executor {
             Decider::Another(executor) => executor,
@@ -314,9 +318,8 @@ impl<'a> Execution<'a> {
         let preparer = self
             .preparer
             .unwrap_or_else(|| Box::new(Analyst::new(self.flow)));
+        let workers = PortWorkers::new(planner, preparer);
         let ports = Ports {
-            planner,
-            preparer,
             executor,
             recorder: self.recorder,
         };
@@ -335,14 +338,14 @@ impl<'a> Execution<'a> {
             run = run.told_to(listener);
         }
         if self.is_explaining {
-            run.explaining()
-        } else {
-            run
+            run = run.explaining();
         }
+        (run, Box::new(workers))
     }
 
     /// The whole run, in this world.
     pub fn run_in(self, world: &mut dyn World) -> Report {
-        self.run().go(world)
+        let (run, mut workers) = self.run();
+        run.go(world, &mut *workers)
     }
 }

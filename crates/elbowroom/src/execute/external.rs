@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer};
 use elbowroom_external::{self as external, Event, Outcome, Report, Request, Settings};
-use elbowroom_model::{Situation, Task};
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
 
@@ -70,8 +70,12 @@ impl External<'_> {
     /// The answer, `before` which as much time had passed.
     fn answer(&self, report: Report, before: Duration) -> PlannerAnswer {
         let name = &self.planner.name;
+        let mut remark = None;
         let answer = match report.outcome {
-            Outcome::Plan(found) => PlanAnswer::Plan(found.plan),
+            Outcome::Plan(found) => {
+                remark = self_overlap(&found.plan);
+                PlanAnswer::Plan(found.plan)
+            }
             // "No plan exists" is its claim, not a proof.
             Outcome::NotStarted { ref help, .. } => PlanAnswer::Failed {
                 why: format!("{name}: {}; {help}", report.outcome),
@@ -90,9 +94,21 @@ impl External<'_> {
         PlannerAnswer {
             answer,
             seconds: Some(seconds(before + report.statistics.elapsed)),
-            remark: None,
+            remark,
         }
     }
+}
+
+/// Returns the warning that an action overlaps itself in the plan.
+fn self_overlap(plan: &TimeTriggeredPlan) -> Option<String> {
+    let [earlier, later] = plan.self_overlap()?.map(|place| &plan.steps[place]);
+    Some(format!(
+        "{} overlaps itself: it starts at {}, before the instance from {} to {} has ended",
+        later.action.name,
+        later.start.to_decimal(6),
+        earlier.start.to_decimal(6),
+        earlier.end().to_decimal(6),
+    ))
 }
 
 /// In whole microseconds.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, work};
 use elbowroom_plan::partial_order::partial_order;
 use elbowroom_planner::embedded;
 use elbowroom_probability::{
@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::as_timed;
 use super::candidates::{Candidate, Candidates, Limits};
+use super::planners::{CERTIFICATE_WORK, PATIENCE, without_plan};
 use super::race::{Rules, race};
 use super::rollouts::{Rollouts, Tryout};
 
@@ -172,6 +173,9 @@ pub struct Chooser<'a> {
     pub most_states: u64,
     /// See [`Embedded::improve_states`](super::Embedded::improve_states).
     pub improve_states: u64,
+    /// Work limit of the choice, in units of [`elbowroom_num::work`]. If it is spent, the plan is the best so far; to
+    /// find a first plan may take [`PATIENCE`](super::Embedded::patience) times as much.
+    pub work: u64,
     /// What is known.
     pub known: Known,
     /// Asked often whether to go on. When it says no, the plan is the best so far.
@@ -200,6 +204,7 @@ impl Chooser<'_> {
     /// # Errors
     /// What the planner answers where it has no plan.
     pub fn choose(&self, task: &Task, situation: &Situation) -> Result<Choice, PlanAnswer> {
+        let budget = work::Budget::new(self.work);
         // What is only thought of gets no numbers.
         let thought = task.with_own_table();
         let world = match &self.known {
@@ -211,16 +216,20 @@ impl Chooser<'_> {
             improve_states: self.improve_states,
             other_states: self.most_states.max(LEAST_OTHER_STATES),
             searches: MOST_SEARCHES,
+            work: self.work,
+            patience: PATIENCE,
         };
         let settings = self.settings.clone();
         let mut source = Candidates::new(&thought, situation, world, settings, limits);
         let goes_on = &mut |_| (self.goes_on)();
         let Some(first) = source.next(goes_on) else {
-            return Err(self.no_plan(source.answer()));
+            return Err(self.no_plan(task, situation, source.answer()));
         };
         let mut plans = vec![first];
         let (values, best) = match &self.known {
-            Known::World(rollouts) => self.sampled(&thought, rollouts, &mut source, &mut plans),
+            Known::World(rollouts) => {
+                self.sampled((&thought, budget), rollouts, &mut source, &mut plans)
+            }
             Known::Likelihoods {
                 likelihoods,
                 reorders,
@@ -250,17 +259,17 @@ impl Chooser<'_> {
     /// Values of plans by trying them out. Others than the first are made only if that can fail.
     fn sampled(
         &self,
-        task: &Task,
+        (task, budget): (&Task, work::Budget),
         rollouts: &Rollouts,
         source: &mut Candidates<'_>,
         plans: &mut Vec<Candidate>,
     ) -> (Vec<Value>, usize) {
-        let mut tryout = Tryout::new(task, rollouts.clone(), self.goes_on);
+        let mut tryout = Tryout::new(task, rollouts.clone(), budget.left(), self.goes_on);
         let mut first = Vec::new();
         let mut left = MOST_ACTIONS;
         let mut afford = |plan: &Candidate, floor: u64| {
             left = left.saturating_sub(plan.plan.steps.len() as u64);
-            left > floor && (self.goes_on)()
+            left > floor && !budget.is_spent() && (self.goes_on)()
         };
         for sample in 0..FIRST_LOOK {
             if !afford(&plans[0], MOST_ACTIONS / 2) {
@@ -269,7 +278,7 @@ impl Chooser<'_> {
             first.push(tryout.succeeds(&plans[0].plan, sample));
         }
         let successes = first.iter().filter(|success| **success).count() as u64;
-        if successes < first.len() as u64 && (self.goes_on)() {
+        if successes < first.len() as u64 && !budget.is_spent() && (self.goes_on)() {
             let goes_on = &mut |_| (self.goes_on)();
             plans.extend(std::iter::from_fn(|| source.next(goes_on)).take(MOST_PLANS - 1));
         }
@@ -291,17 +300,17 @@ impl Chooser<'_> {
         (values.collect(), best)
     }
 
-    fn no_plan(&self, answer: Option<&embedded::Answer>) -> PlanAnswer {
+    fn no_plan(
+        &self,
+        task: &Task,
+        situation: &Situation,
+        answer: Option<&embedded::Answer>,
+    ) -> PlanAnswer {
+        let limits = (self.most_states, CERTIFICATE_WORK);
         match answer {
-            Some(embedded::Answer::Unsolvable { .. }) => PlanAnswer::Unsolvable,
-            Some(embedded::Answer::Unsupported(unsupported)) => PlanAnswer::NotFound {
-                why: unsupported.to_string(),
-            },
-            _ if !(self.goes_on)() => PlanAnswer::NotFound {
+            Some(answer) => without_plan(answer, (task, situation), limits, self.goes_on),
+            None => PlanAnswer::NotFound {
                 why: "planning was interrupted".to_owned(),
-            },
-            _ => PlanAnswer::NotFound {
-                why: format!("no plan was found among {} states", self.most_states),
             },
         }
     }

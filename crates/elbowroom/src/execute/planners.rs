@@ -1,11 +1,14 @@
 //! Planners behind the port of [`execution`](crate::execution).
 
 use std::ops::ControlFlow;
+use std::time::Duration;
 
 use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer};
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
-use elbowroom_planner::embedded;
+use elbowroom_planner::embedded::{self, Counts, Proof, Stopped};
+
+use crate::no_plan::{Effort, no_plan_certificate_within, with_any_ends};
 
 /// A planner without a clock: a function from situations to answers.
 pub struct Clockless<F>(pub F);
@@ -25,6 +28,13 @@ pub struct Embedded<'a> {
     pub most_states: u64,
     /// How many states to look at for a better plan than the first.
     pub improve_states: u64,
+    /// Work limit for one plan, in units of [`elbowroom_num::work`]; [`u64::MAX`] for no limit.
+    pub work: u64,
+    /// As long as there is no plan at all, the search may take this multiple of `work`.
+    pub patience: u64,
+    /// Work limit for a certificate that no plan exists ([`Effort`]). Without a certificate, the answer is that
+    /// no plan was found. With 0, no certificate is made.
+    pub certificate_work: u64,
     /// The clock by which planning time is measured, in seconds since some fixed time.
     pub clock: Option<&'a (dyn Fn() -> Rational + Sync)>,
     /// Asked now and then whether to go on; without it, always.
@@ -44,12 +54,16 @@ impl Planner for Embedded<'_> {
 }
 
 impl Default for Embedded<'_> {
-    /// 20,000 states, of which 2,000 for a better plan than the first; no clock.
+    /// 20,000 states, 2,000 of them for a better plan than the first; about a second for a certificate; no
+    /// clock.
     fn default() -> Self {
         Self {
             settings: embedded::Settings::default(),
             most_states: 20_000,
             improve_states: 2_000,
+            work: u64::MAX,
+            patience: PATIENCE,
+            certificate_work: CERTIFICATE_WORK,
             clock: None,
             goes_on: None,
         }
@@ -65,14 +79,16 @@ impl Embedded<'_> {
     }
 
     fn answer(&self, task: &Task, situation: &Situation, states: &mut u64) -> PlanAnswer {
+        let most_work = self.work.saturating_mul(self.patience);
         let answer = embedded::plan(task, situation, &self.settings, &mut |progress| {
-            let limit = match progress.best {
-                Some(_) => self.improve_states.min(self.most_states),
-                None => self.most_states,
+            let (limit, work) = match progress.best {
+                Some(_) => (self.improve_states.min(self.most_states), self.work),
+                None => (self.most_states, most_work),
             };
             *states = progress.counts.evaluated;
             let is_wanted = self.goes_on.is_none_or(|goes_on| goes_on());
-            if progress.counts.evaluated >= limit || !is_wanted {
+            let is_over = progress.counts.evaluated >= limit || progress.counts.work >= work;
+            if is_over || !is_wanted {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -80,16 +96,115 @@ impl Embedded<'_> {
         });
         match answer {
             embedded::Answer::Plan { found, .. } => PlanAnswer::Plan(found.plan),
-            embedded::Answer::Unsolvable { .. } => PlanAnswer::Unsolvable,
-            _ if !self.goes_on.is_none_or(|goes_on| goes_on()) => PlanAnswer::NotFound {
-                why: "planning was interrupted".to_owned(),
-            },
-            embedded::Answer::NoneFound { .. } => PlanAnswer::NotFound {
-                why: format!("no plan was found among {} states", self.most_states),
-            },
-            embedded::Answer::Unsupported(unsupported) => PlanAnswer::NotFound {
-                why: unsupported.to_string(),
-            },
+            answer => {
+                let goes_on = || self.goes_on.is_none_or(|goes_on| goes_on());
+                let limits = (self.most_states, self.certificate_work);
+                without_plan(&answer, (task, situation), limits, &goes_on)
+            }
+        }
+    }
+}
+
+/// Returns the answer of a run's planner for an answer of the embedded planner that has no plan. `limits`: on the
+/// states of the search, and on the work for a certificate.
+pub(crate) fn without_plan(
+    answer: &embedded::Answer,
+    (task, situation): (&Task, &Situation),
+    (most_states, certificate_work): (u64, u64),
+    goes_on: &dyn Fn() -> bool,
+) -> PlanAnswer {
+    let why = match answer {
+        embedded::Answer::Unsolvable { proof, .. } => {
+            let goes_on = &mut || goes_on();
+            return refuted((task, situation), proof, certificate_work, goes_on);
+        }
+        embedded::Answer::Unsupported(unsupported) => unsupported.to_string(),
+        _ if !goes_on() => "planning was interrupted".to_owned(),
+        embedded::Answer::NoneFound {
+            stopped,
+            without_self_overlap,
+            counts,
+        } => none_found(*stopped, (*counts, *without_self_overlap), most_states),
+        embedded::Answer::Plan { .. } => "no plan was found".to_owned(),
+    };
+    PlanAnswer::NotFound { why }
+}
+
+/// The default limit on the work for one plan, in seconds of one processor.
+pub const PLANNING_BUDGET: i64 = 2;
+
+/// The units of [`elbowroom_num::work`] of a planning budget in seconds of one processor: about one for each
+/// nanosecond.
+pub fn planning_work(seconds: &Rational) -> u64 {
+    let time = Duration::try_from_secs_f64(seconds.to_f64());
+    time.map_or(u64::MAX, |time| {
+        u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+    })
+}
+
+/// See [`Embedded::patience`].
+pub(crate) const PATIENCE: u64 = 4;
+
+/// Returns the reason why the embedded planner has no plan after a search of at most `most_states` states.
+///
+/// The second member of `counts` is `true` if plans were excluded with self-overlap.
+fn none_found(stopped: Stopped, counts: (Counts, bool), most_states: u64) -> String {
+    match stopped {
+        Stopped::Exhausted => exhausted(counts.0, counts.1),
+        Stopped::OutOfMemory => format!(
+            "no plan was found within the planner's memory, among {} states",
+            counts.0.evaluated
+        ),
+        _ if counts.0.evaluated < most_states => format!(
+            "no plan was found within the planning budget (`--planning-budget`), among {} states",
+            counts.0.evaluated
+        ),
+        _ => format!("no plan was found among {most_states} states (`--planner-states`)"),
+    }
+}
+
+/// Returns the reason why there is no plan after a search of all reachable states.
+pub(crate) fn exhausted(counts: Counts, without_self_overlap: bool) -> String {
+    let evaluated = counts.evaluated;
+    let without = if without_self_overlap {
+        " without self-overlap (`--self-overlap`)"
+    } else {
+        ""
+    };
+    format!(
+        "no plan found{without}: searched all that the search can reach, {evaluated} states; this is no \
+         proof that there is none"
+    )
+}
+
+/// Beginning of the answer after a search of all plans without self-overlap, where no certificate
+/// covers the others.
+pub(crate) const WITHOUT_SELF_OVERLAP: &str = "no plan without self-overlap (`--self-overlap`)";
+
+/// Work limit for a certificate in a run: about a second.
+pub(crate) const CERTIFICATE_WORK: u64 = 10_000_000;
+
+/// Returns the answer to the embedded planner's claim that no plan exists from a situation. No plan exists if
+/// a certificate proves it for all ends of the running actions; otherwise, none was found.
+fn refuted(
+    (task, situation): (&Task, &Situation),
+    proof: &Proof,
+    work: u64,
+    goes_on: &mut dyn FnMut() -> bool,
+) -> PlanAnswer {
+    let from = with_any_ends(situation);
+    match no_plan_certificate_within(task, &from, &mut Effort::of(work, goes_on)) {
+        Ok(_) => PlanAnswer::Unsolvable,
+        Err(why) => {
+            let none = match proof {
+                Proof::WithoutSelfOverlap { .. } => WITHOUT_SELF_OVERLAP,
+                _ => "no plan was found",
+            };
+            PlanAnswer::NotFound {
+                why: format!(
+                    "{none}: the search ended without one. There is no certificate that none exists: {why}"
+                ),
+            }
         }
     }
 }

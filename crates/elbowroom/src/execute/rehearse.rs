@@ -364,6 +364,8 @@ impl Rehearse {
             improve_states: self.planner.improve_states,
             other_states: PLAN_STATES,
             searches: MOST_SEARCHES,
+            work: self.planner.work,
+            patience: self.planner.patience,
         };
         let (world, settings) = (&*self.rollouts.world, self.planner.settings.clone());
         let mut source = Candidates::new(task, situation, Some(world), settings, limits);

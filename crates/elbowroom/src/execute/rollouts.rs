@@ -1,12 +1,13 @@
 //! Trying a plan out in samples of a world that is known by its distributions.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_execution::executors::{ExecutorSpec, Foresight};
 use elbowroom_execution::run::{PlanningTime, RunSettings, Verdict};
 use elbowroom_execution::{NoPlanner, PlanAnswer, Planner, PlannerAnswer, Preparer};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, work};
 use elbowroom_planner::embedded;
 use elbowroom_probability::Likelihoods;
 use elbowroom_sim::WorldModel;
@@ -42,6 +43,9 @@ pub struct Rollouts {
     pub is_ready: bool,
 }
 
+/// The states that a search for a plan in a sample may examine.
+const MOST_STATES: u64 = 20_000;
+
 /// Making new plans on the way.
 #[derive(Clone, Debug)]
 pub struct Replanning {
@@ -51,19 +55,24 @@ pub struct Replanning {
     pub most_states: u64,
     /// See [`Embedded::improve_states`].
     pub improve_states: u64,
+    /// See [`Embedded::work`].
+    pub work: u64,
     /// The states that all plans of all samples may take together. What is not remembered after
     /// that counts as if there were no plan.
     pub all_states: u64,
 }
 
 impl Replanning {
-    /// As a planner is limited, with ten times as many states for all plans together.
+    /// As a planner is limited, but with at most 20,000 states for each plan, and ten times as many for all plans
+    /// together: where no plan exists, one sample must not use up the work of all.
     pub fn within(planner: &Embedded<'_>) -> Self {
+        let most_states = planner.most_states.min(MOST_STATES);
         Self {
             settings: planner.settings.clone(),
-            most_states: planner.most_states,
+            most_states,
             improve_states: planner.improve_states,
-            all_states: planner.most_states.saturating_mul(10),
+            work: planner.work,
+            all_states: most_states.saturating_mul(10),
         }
     }
 }
@@ -78,10 +87,11 @@ pub struct Tryout<'a> {
 }
 
 impl<'a> Tryout<'a> {
-    /// Of this problem.
+    /// Of this problem. `work`: what all samples may take together, in the units of [`elbowroom_num::work`].
     pub fn new(
         task: &Task,
         mut rollouts: Rollouts,
+        work: u64,
         goes_on: &'a (dyn Fn() -> bool + Sync),
     ) -> Self {
         if rollouts.executor.asks_odds()
@@ -104,15 +114,27 @@ impl<'a> Tryout<'a> {
                         settings: replanning.settings.clone(),
                         most_states: replanning.most_states,
                         improve_states: replanning.improve_states,
+                        work,
+                        patience: 1,
+                        // A sample says nothing about whether a plan exists.
+                        certificate_work: 0,
                         clock: None,
                         goes_on: Some(goes_on),
                     },
                     left: replanning.all_states,
+                    budget: work::Budget::new(work),
                 };
                 Box::new(RememberingPlanner::new(metered, MEMORY))
             }
         };
-        let analyst = Analyst::new(rollouts.flow.clone());
+        let budget = work::Budget::new(work);
+        let analyst = Analyst::new(rollouts.flow.clone()).until(move || {
+            if budget.is_spent() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
         Self {
             planner,
             preparer: RememberingPreparer::new(analyst, MEMORY),
@@ -201,6 +223,7 @@ impl Planner for Scripted<'_> {
 pub(super) struct Metered<'a> {
     embedded: Embedded<'a>,
     left: u64,
+    budget: work::Budget,
 }
 
 impl Metered<'_> {
@@ -214,10 +237,14 @@ impl Metered<'_> {
                 settings: replanning.settings.clone(),
                 most_states: replanning.most_states,
                 improve_states: replanning.improve_states,
+                work: replanning.work,
+                patience: 1,
+                certificate_work: 0,
                 clock: None,
                 goes_on: None,
             },
             left: replanning.all_states,
+            budget: work::Budget::new(replanning.work),
         };
         Box::new(RememberingPlanner::new(metered, MEMORY))
     }
@@ -225,7 +252,8 @@ impl Metered<'_> {
 
 impl Planner for Metered<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        if self.left == 0 {
+        self.embedded.work = self.budget.left();
+        if self.left == 0 || self.budget.is_spent() {
             return PlannerAnswer::from(PlanAnswer::NotFound {
                 why: "the limit on what trying plans out may take is reached".to_owned(),
             });

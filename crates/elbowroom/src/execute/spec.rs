@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use elbowroom_envelope::{Guarantee, Objective};
 use elbowroom_execution::executors::ExecutorSpec;
-use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
+use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule, TimeoutRule};
 use elbowroom_model::{Problem, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::parametrize::VarySpec;
@@ -16,10 +16,11 @@ use elbowroom_sim::WorldModel;
 use elbowroom_text::{Diagnostics, Source};
 use serde::{Deserialize, Serialize};
 
-use super::{Embedded, FirstPlan};
+use super::{Embedded, FirstPlan, PLANNING_BUDGET};
+use crate::answers::envelope::Search;
 use crate::flow;
-pub(crate) use text_form::listed;
-use text_form::{as_text, positive, required};
+pub(crate) use text_form::{as_text, listed};
+use text_form::{positive, required};
 
 pub use wiring::{FirstPlanError, SpecError, SpoilerError};
 
@@ -96,6 +97,14 @@ pub struct RunSpec {
     pub planner_states: u64,
     /// How many of them for a better plan than the first.
     pub improve_states: u64,
+    /// Work limit for each choice of the first plan and each new plan, in seconds of one processor
+    /// ([`elbowroom_num::work`]); left out if there is no limit.
+    #[serde(default, with = "positive::option")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub planning_budget: Option<Rational>,
+    /// `true` if a ground action may overlap itself in plans of the embedded planner; left out where it may not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub self_overlap: bool,
     /// How many threads the embedded planner may use for one plan. Nothing that is decided depends on it, but
     /// for how soon a plan is there; so it is no part of a trace.
     #[serde(skip, default = "one")]
@@ -131,6 +140,10 @@ pub struct RunSpec {
     /// wall clock.
     #[serde(with = "positive::nullable")]
     pub realtime: Option<Rational>,
+    /// The rule that sets the time-out of each action: `10x,600`, 10 times the planned duration, at
+    /// least 600 seconds, unless something else is given.
+    #[serde(default, with = "as_text")]
+    pub timeout: TimeoutRule,
     /// How often a new plan may be made.
     pub max_replans: usize,
     /// When the run ends in any case, in the world's seconds.
@@ -180,6 +193,9 @@ impl NamedText {
     }
 }
 
+/// Default limit on the states that the embedded planner examines for one plan: more than any planning budget allows.
+pub const MOST_STATES: u64 = 1_000_000_000;
+
 impl RunSpec {
     /// A run of this problem with everything else as the command has it by default.
     pub fn new(domain: NamedText, problem: NamedText) -> Self {
@@ -201,18 +217,21 @@ impl RunSpec {
             executor: ExecutorSpec::default(),
             seed: 0,
             first_plan: FirstPlan::default(),
-            planner_states: planner.most_states,
+            planner_states: MOST_STATES,
             improve_states: planner.improve_states,
+            planning_budget: Some(Rational::from(PLANNING_BUDGET)),
+            self_overlap: planner.settings.self_overlap,
             threads: planner.settings.threads,
             vary: flow.vary,
             guarantee: flow.guarantee,
             precision: None,
-            objective: None,
+            objective: Some(Objective::default()),
             running: settings.running,
             planning_time: PlanningTime::Seconds(Rational::ZERO),
             plans_aside: false,
             readies_aside: false,
             realtime: None,
+            timeout: settings.timeout,
             max_replans: settings.most_replans,
             time_limit: settings.time_limit,
             epsilon: Task::default_epsilon(),
@@ -225,12 +244,12 @@ impl RunSpec {
             running: self.running,
             planning_time: self.planning_time.clone(),
             most_replans: self.max_replans,
+            timeout: self.timeout.clone(),
             time_limit: self.time_limit.clone(),
             // In a simulation without a clock nobody can be warned.
             plans_aside: self.plans_aside,
             readies_aside: self.readies_aside,
             watches_room: self.world_process.is_some() || self.realtime.is_some(),
-            ..RunSettings::default()
         }
     }
 
@@ -250,12 +269,12 @@ impl RunSpec {
         let mut flow = flow::Settings {
             vary: self.vary.clone(),
             guarantee: self.guarantee,
-            objective: self.objective,
+            timeout: self.timeout.clone(),
+            search: self.objective.map_or_else(Search::irr, Search::best),
             ..flow::Settings::default()
         };
         if let Some(precision) = &self.precision {
-            flow.search.precision = precision.clone();
-            flow.search.relative = None;
+            flow.search = flow.search.with_precision(precision.clone());
         }
         flow
     }

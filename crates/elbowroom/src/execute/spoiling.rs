@@ -3,18 +3,20 @@
 use std::collections::BTreeMap;
 
 use elbowroom_execution::Ticket;
+use elbowroom_execution::run::TimeoutRule;
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::PlanNetwork;
 use elbowroom_plan::{InstanceId, Node, NodeId, Schedule, StnPlan, network_node};
 use elbowroom_sim::{Begun, Pace};
+use elbowroom_stn::NodeId as NetworkNode;
 use elbowroom_stn::uncertain::{Spoiler, UncertainNetwork};
 
 /// A [`Spoiler`] behind the port of [`sim`](crate::sim): sees what is started, and says when it
 /// ends.
 ///
 /// Durations that the box does not leave open, and actions that are not in the plan, last as long
-/// as planned. What the box lets go on without end comes to an end all the same, but late: patience
-/// with silent actions ([`Patience`](elbowroom_execution::run::Patience)) can end before.
+/// as planned. Every action ends by its time-out. Without time-outs, an action whose interval is
+/// infinite ends late.
 #[derive(Clone, Debug)]
 pub struct Spoiling {
     spoiler: Spoiler,
@@ -35,8 +37,13 @@ pub struct Spoiling {
 impl Spoiling {
     /// Spoils a plan whose network, with what the world decides in it, is that one
     /// ([`ParametrizedPlan::uncertain_network`](elbowroom_plan::ParametrizedPlan::uncertain_network)).
-    /// `nominal` says when everything happens if nothing deviates.
-    pub fn new(plan: &StnPlan, network: &PlanNetwork, nominal: &Schedule) -> Self {
+    /// `nominal` is the schedule without deviations, `timeout` the latest end of each action.
+    pub fn new(
+        plan: &StnPlan,
+        network: &PlanNetwork,
+        nominal: &Schedule,
+        timeout: &TimeoutRule,
+    ) -> Self {
         let time = |node: NodeId| &nominal[node];
         let mut order: Vec<InstanceId> = (0..plan.instances.len()).map(InstanceId::from).collect();
         order.sort_by_key(|id| (time(plan.start(*id)), *id));
@@ -48,10 +55,19 @@ impl Spoiling {
         let timed = plan
             .nodes()
             .filter(|(_, what)| matches!(what, Node::Timed(_)));
+        let all = (0..plan.instances.len()).map(InstanceId::from);
+        let latest = all.filter_map(|id| {
+            let planned = time(plan.end(id)) - time(plan.start(id));
+            Some((network_node(plan.end(id)), timeout.of(&planned)?))
+        });
+        let latest = latest.collect();
         let mut happened = vec![None; plan.nodes.len()];
         happened[NodeId::ZERO.index()] = Some(Rational::ZERO);
         Self {
-            spoiler: Spoiler::new(in_the_end(&network.network), network_node(NodeId::ZERO)),
+            spoiler: Spoiler::new(
+                in_the_end(&network.network, &latest),
+                network_node(NodeId::ZERO),
+            ),
             timed: timed.map(|(node, _)| (node, time(node).clone())).collect(),
             plan: plan.clone(),
             instances,
@@ -72,8 +88,12 @@ impl Spoiling {
 }
 
 /// The same network, in which everything ends at some time: what the world may draw out without
-/// end lasts at most longer than all other bounds together. No conflict needs more.
-fn in_the_end(network: &UncertainNetwork) -> UncertainNetwork {
+/// end lasts at most longer than all other bounds together. No conflict needs more. What `latest` has
+/// lasts no longer than that.
+fn in_the_end(
+    network: &UncertainNetwork,
+    latest: &BTreeMap<NetworkNode, Rational>,
+) -> UncertainNetwork {
     let mut longest = Rational::ONE;
     for constraint in network.requirements().constraints() {
         longest = &longest + &constraint.bound.abs();
@@ -84,7 +104,13 @@ fn in_the_end(network: &UncertainNetwork) -> UncertainNetwork {
     }
     let mut links = network.links().to_vec();
     for link in &mut links {
-        link.upper.get_or_insert_with(|| longest.clone());
+        let upper = link.upper.get_or_insert_with(|| longest.clone());
+        if let Some(latest) = latest.get(&link.end) {
+            let latest = latest.max(&link.lower);
+            if *upper > *latest {
+                upper.clone_from(latest);
+            }
+        }
     }
     UncertainNetwork::new(network.requirements().clone(), links)
         .expect("the links are those of a network, and none has become empty")

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use elbowroom_num::Rational;
-use elbowroom_report::exact::Exact;
+use elbowroom_num::{End, Rational};
+use elbowroom_report::exact::{self, Exact};
 use elbowroom_report::wire;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use serde_json::{Map, Value, json};
@@ -34,6 +34,40 @@ impl Described for GivenNumber {
         let exact = Exact::schema(definitions);
         json!({ "anyOf": [{ "type": "number" }, { "type": "string" }, exact] })
     }
+}
+
+/// The lower end of an interval; infinity is `-inf`, without a decimal.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct LowerEnd(#[serde(with = "exact::lower")] pub End);
+
+/// The upper end of an interval; infinity is `inf`, without a decimal.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct UpperEnd(#[serde(with = "exact::upper")] pub End);
+
+impl Described for LowerEnd {
+    fn schema(definitions: &mut Map<String, Value>) -> Value {
+        end_schema(definitions)
+    }
+}
+
+impl Described for UpperEnd {
+    fn schema(definitions: &mut Map<String, Value>) -> Value {
+        end_schema(definitions)
+    }
+}
+
+fn end_schema(definitions: &mut Map<String, Value>) -> Value {
+    let infinite = json!({
+        "type": "object",
+        "properties": {
+            "exact": { "enum": [exact::INFINITY, exact::MINUS_INFINITY] },
+            "decimal": { "type": "null" },
+        },
+        "required": ["exact"],
+    });
+    json!({ "anyOf": [Exact::schema(definitions), infinite] })
 }
 
 /// What an executive is doing.
@@ -103,6 +137,19 @@ documents! {
         pub facts: Vec<String>,
         /// The numbers as they are believed to be.
         pub numbers: Vec<NumberNow>,
+        /// Facts and numbers that are in doubt. Until they are known, such a fact counts as false, such a number keeps its
+        /// value, and a goal that reads them is not reached.
+        pub in_doubt: Vec<InDoubt>,
+    }
+
+    /// A fact or a number that is in doubt.
+    pub struct InDoubt {
+        /// The fact or the number.
+        pub name: String,
+        /// Since when.
+        pub since: Exact,
+        /// The reason, and how the doubt can be settled.
+        pub why: String,
     }
 
     /// A goal that is to be reached.
@@ -125,6 +172,8 @@ documents! {
         pub planned: Option<Exact>,
         /// From when on a new plan is needed if it has not ended, once that is near.
         pub needed: Option<Exact>,
+        /// When it times out and is cancelled if it has made no progress by then, once that is near.
+        pub times_out: Option<Exact>,
         /// The part that is done, from 0 to 1, if the world has said so.
         pub completion: Option<Exact>,
         /// What the world has said last about it.
@@ -172,6 +221,10 @@ documents! {
         pub since: Option<Exact>,
         /// The last thing since it rested that deviated so much that a plan was given up for it.
         pub deviation: Option<String>,
+        /// The rule that sets the time-out of each action: `10x,600` is 10 times the planned
+        /// duration, at least 600 seconds; `none` if time-outs are off. The promise holds as long as each
+        /// quantity stays inside its interval and each action ends before its time-out.
+        pub timeout: String,
         /// The quantities that may deviate, and how far.
         pub parameters: Vec<Room>,
     }
@@ -184,10 +237,14 @@ documents! {
         pub meaning: String,
         /// Its value if nothing deviates.
         pub nominal: Exact,
-        /// The least value that is guaranteed to work; none if there is no limit, or no guarantee.
-        pub least: Option<Exact>,
-        /// The largest one.
-        pub most: Option<Exact>,
+        /// The least value that is guaranteed to work; none if nothing is guaranteed: if the promise is neither
+        /// `envelope` nor `part-of-envelope`.
+        pub least: Option<LowerEnd>,
+        /// The greatest one.
+        pub most: Option<UpperEnd>,
+        /// The time-out of the action whose duration it is; none if it is no duration, or if
+        /// time-outs are off.
+        pub timeout: Option<Exact>,
     }
 
     /// What is next, and why.

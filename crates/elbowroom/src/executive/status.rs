@@ -3,21 +3,22 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom_execution::run::{FIRST_GOAL, Verdict};
+use elbowroom_execution::run::{FIRST_GOAL, TimeoutRule, Verdict};
 use elbowroom_execution::{
-    Cause, Command, Decided, Decision, Entry, Event, Mission, Observation, Progression, Promise,
-    Request, StepId, Ticket,
+    Cause, Command, Decided, Decision, Doubt, Entry, Event, Mission, Observation, Progression,
+    Promise, Request, StepId, Ticket, WarningCause,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Task};
-use elbowroom_num::{Interval, Rational};
+use elbowroom_num::Rational;
 use elbowroom_pddl::{ProblemText, write_problem};
-use elbowroom_plan::ParameterId;
+use elbowroom_plan::{ParameterId, ParameterKind};
 use elbowroom_report::exact::Exact;
 use elbowroom_report::trace::SnapshotLine;
 
 use super::documents::{
-    Activity, GuaranteeNow, NextNow, NumberNow, OpenGoal, PlanNow, Room, Running, State, StepNow,
+    Activity, GuaranteeNow, InDoubt, LowerEnd, NextNow, NumberNow, OpenGoal, PlanNow, Room,
+    Running, State, StepNow, UpperEnd,
 };
 
 /// Follows a lasting run by its record. Clones are the same; whoever asks is answered at once, and
@@ -27,6 +28,7 @@ pub struct Status(Arc<Mutex<Known>>);
 
 #[derive(Default)]
 struct Known {
+    timeout: TimeoutRule,
     now: Rational,
     is_planning: bool,
     is_paused: bool,
@@ -50,8 +52,8 @@ struct Known {
 }
 
 impl Status {
-    /// Of a run of this task that has not begun.
-    pub fn new(task: &Task) -> Self {
+    /// Of a run of this task that has not begun, and whose actions time out by that rule.
+    pub fn new(task: &Task, timeout: TimeoutRule) -> Self {
         let goal = goal_text(task);
         let mut goals = Vec::new();
         if !task.problem().goal.is_trivial() {
@@ -59,6 +61,7 @@ impl Status {
             goals.push(OpenGoal { name, goal });
         }
         let known = Known {
+            timeout,
             goals,
             ..Known::default()
         };
@@ -116,6 +119,7 @@ impl Status {
                 Some(NumberNow { fluent, value })
             });
             state.numbers = numbers.collect();
+            state.in_doubt = in_doubt(&belief);
         }
         state
     }
@@ -142,11 +146,18 @@ impl Status {
     pub fn guarantee(&self) -> GuaranteeNow {
         let known = self.known();
         let promise = known.promise.as_ref();
+        let mut parameters = known.room.clone();
+        if promise.is_none_or(|(promise, _)| *promise > Promise::PartOfEnvelope) {
+            for room in &mut parameters {
+                (room.least, room.most) = (None, None);
+            }
+        }
         GuaranteeNow {
             promise: promise.map(|(promise, _)| promise.name().to_owned()),
             since: promise.map(|(_, since)| Exact(since.clone())),
             deviation: known.deviation.clone(),
-            parameters: known.room.clone(),
+            timeout: known.timeout.to_string(),
+            parameters,
         }
     }
 
@@ -191,6 +202,28 @@ pub fn goal_text(task: &Task) -> String {
     line.strip_suffix(')').unwrap_or(line).to_owned()
 }
 
+fn in_doubt(belief: &Progression) -> Vec<InDoubt> {
+    let task = belief.task();
+    let of = |name: &str, doubts: &[Doubt], settles: &str| {
+        let one = |doubt: &Doubt| InDoubt {
+            why: format!(
+                "it is unknown whether {} has come to its end; `ctl {}` settles it",
+                doubt.action,
+                settles.replace("NAME", &format!("'{name}'"))
+            ),
+            since: Exact(doubt.since.clone()),
+            name: name.to_owned(),
+        };
+        doubts.iter().map(one).collect::<Vec<_>>()
+    };
+    let facts = belief.doubtful_facts().iter();
+    let facts = facts.flat_map(|(fact, doubts)| of(&task.fact_name(*fact), doubts, "fact NAME"));
+    let values = belief.doubtful_values().iter();
+    let values = values
+        .flat_map(|(fluent, doubts)| of(&task.fluent_name(*fluent), doubts, "number NAME VALUE"));
+    facts.chain(values).collect()
+}
+
 impl Known {
     fn state(&self) -> State {
         let activity = match () {
@@ -211,6 +244,7 @@ impl Known {
             plans: self.plans,
             facts: Vec::new(),
             numbers: Vec::new(),
+            in_doubt: Vec::new(),
         }
     }
 
@@ -243,6 +277,7 @@ impl Known {
                 since: start.ordered.clone(),
                 planned: start.duration.clone(),
                 needed: None,
+                times_out: None,
                 completion: None,
                 note: None,
             };
@@ -271,9 +306,18 @@ impl Known {
                 });
             }
             Entry::Planned { .. } => self.is_planning = false,
-            Entry::Warning { ticket, until, .. } => {
+            Entry::Warning {
+                ticket,
+                until,
+                cause,
+                ..
+            } => {
                 if let Some(running) = self.running.get_mut(&ticket.0) {
-                    running.needed = Some(Exact((*until).clone()));
+                    let until = Some(Exact((*until).clone()));
+                    match cause {
+                        WarningCause::Slack => running.needed = until,
+                        WarningCause::Timeout => running.times_out = until,
+                    }
                 }
             }
             Entry::Kept { .. } | Entry::Interrupted { .. } => {}
@@ -354,17 +398,20 @@ impl Known {
             .map(|(index, parameter)| {
                 let allowed = mission.envelope.as_ref();
                 let allowed = allowed.and_then(|envelope| envelope.intervals().get(index));
-                let end = |of: fn(&Interval) -> Option<&Rational>| {
-                    allowed.and_then(of).cloned().map(Exact)
-                };
                 Room {
                     name: parameter.name.clone(),
                     meaning: mission
                         .plan
                         .describe(&mission.task, ParameterId::from(index)),
                     nominal: Exact(parameter.nominal.clone()),
-                    least: end(|interval| interval.lower.value()),
-                    most: end(|interval| interval.upper.value()),
+                    least: allowed.map(|interval| LowerEnd(interval.lower.clone())),
+                    most: allowed.map(|interval| UpperEnd(interval.upper.clone())),
+                    timeout: match parameter.kind {
+                        ParameterKind::Duration(_) => {
+                            self.timeout.of(&parameter.nominal).map(Exact)
+                        }
+                        _ => None,
+                    },
                 }
             })
             .collect();
@@ -416,6 +463,7 @@ impl Known {
             since: Exact(now.clone()),
             planned: duration.clone().map(Exact),
             needed: None,
+            times_out: None,
             completion: None,
             note: None,
         };
@@ -453,6 +501,7 @@ impl Known {
                 note,
             } => {
                 if let Some(running) = self.running.get_mut(&ticket.0) {
+                    running.times_out = None;
                     running.completion = completion.clone().map(Exact);
                     running.note = Some(note.clone()).filter(|note| !note.is_empty());
                 }

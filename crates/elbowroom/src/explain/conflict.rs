@@ -271,7 +271,11 @@ fn sentence(needs: &[String], rooms: &[Room]) -> String {
         (true, true, _) => limits,
         (true, false, true) => format!("the duration of {actions}"),
         (true, false, false) => format!("{limits}, and the duration of {actions}"),
-        (false, true, _) => format!("{limits}, because {needs} must be over before it"),
+        // Its end comes no later than its start, which nothing but a condition over no time allows.
+        (false, true, true) => {
+            format!("an over-all condition holds only if {needs} ends as soon as it starts")
+        }
+        (false, true, false) => format!("{limits}, because {needs} must be over before it"),
         (false, false, true) => format!("{needs} must fit into {actions}"),
         (false, false, false) => format!("{limits}, and {needs} must fit into {actions}"),
     }

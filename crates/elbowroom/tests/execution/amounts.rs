@@ -260,7 +260,7 @@ fn live_looks_at_the_numbers_again_only_when_one_is_not_as_planned() {
 }
 
 /// How long an action under way may take is found with one oracle that widens a box; asking about each
-/// duration by itself gives the same limits, and so the same runs.
+/// duration by itself gives the same limits up to ε, and so the same runs.
 #[test]
 fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_about() {
     let mut outlived = 0;
@@ -277,10 +277,13 @@ fn durations_have_the_same_limits_whether_a_box_is_widened_or_each_is_asked_abou
             };
             let widened = run(Means::from(Box::new(WholeRegion)));
             let asked = run(Means::from(Box::new(Counting::default())));
-            assert_eq!(
-                format!("{widened:?}"),
-                format!("{asked:?}"),
-                "{case}, seed {seed}"
+            let of = |it: &Report| (it.verdict.clone(), it.replans, it.starts);
+            assert_eq!(of(&widened), of(&asked), "{case}, seed {seed}");
+            // Limits are found up to ε.
+            let difference = (&widened.time - &asked.time).abs();
+            assert!(
+                difference <= *scene.task.epsilon(),
+                "{case}, seed {seed}: {difference}"
             );
             let mut causes = widened.reasons.iter().map(|reason| reason.cause);
             outlived += usize::from(causes.any(|cause| cause == Cause::Outlived));

@@ -12,9 +12,12 @@ use elbowroom::num::Rational;
 use crate::beside::{Beside, Told, assert_has, seconds, settings, told};
 use crate::lasting::scripted::{abandon, fact, pursue, task};
 use crate::meanwhile::{Fate, ITEMS, assert_in_order, assert_plays_back};
+use crate::recorded::assert_as_recorded;
+use crate::scene::irr;
 
 fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
     Execution::of(task)
+        .with_envelopes(irr())
         .by(executor.parse().expect("a registered one"))
         .with_settings(settings())
 }
@@ -53,6 +56,24 @@ fn the_running_plan_goes_on_while_one_is_made_for_a_goal_that_was_given() {
     assert_eq!((desk.begun, desk.waited_for), (2, 0), "{:#?}", told.notes);
 }
 
+#[test]
+fn search_ends_when_a_deadline_passes_behind_which_the_goal_is_out_of_reach() {
+    let init = "(at 20 (not (here book))) (at 40 (not (power))) (at 60 (not (here key)))";
+    let task = task(init, "(have cup)");
+    let planner = Beside::taking(&[seconds(5000), seconds(1)]);
+    let told = lasting(&task, 200, Vec::new(), &planner);
+    // The book is not needed, but power is.
+    assert_has(
+        &told,
+        &[
+            "0: plan",
+            "40: plan",
+            "41: rest: unsolvable-from-here problem",
+        ],
+    );
+    assert_eq!(planner.desk().begun, 2, "{:#?}", told.notes);
+}
+
 /// What the new plan was to do and the running one has done meanwhile is not done again.
 #[test]
 fn what_was_done_meanwhile_is_not_done_again() {
@@ -83,7 +104,7 @@ fn goals_and_facts_that_come_in_during_a_search_are_taken_in_at_once() {
         &[
             "3: it is no goal of this problem",
             "30: the plan is there",
-            "30: the plan is kept",
+            "30: plan, because the goals have changed",
             "30: start (fetch r book)",
             "rest: goal-reached",
         ],
@@ -165,8 +186,9 @@ fn a_search_for_a_goal_that_is_abandoned_ends_and_one_without_goals_is_needless(
             "31: rest: no goals",
         ],
     );
+    // The last plan arrives when its goal is abandoned: there is no open request to abandon.
     let desk = planner.desk();
-    assert_eq!((desk.begun, desk.given_up), (4, 2), "{:#?}", told.notes);
+    assert_eq!((desk.begun, desk.given_up), (4, 1), "{:#?}", told.notes);
 }
 
 /// Goals that come, or go, faster than plans can be made do not keep the run from acting.
@@ -299,6 +321,7 @@ fn a_plan_that_is_outdated_when_it_comes_is_made_again() {
 #[test]
 fn whatever_happens_meanwhile_what_is_done_is_valid_and_plays_back() {
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut records = Vec::new();
     for seed in 0..240 {
         let executor =
             ["guarded", "live", "stn", "adaptable"][usize::try_from(seed % 4).expect("small")];
@@ -322,7 +345,9 @@ fn whatever_happens_meanwhile_what_is_done_is_valid_and_plays_back() {
         *seen.entry("given up").or_default() += planner.desk().given_up;
         let again = execution(&task, executor).lasting(true);
         assert_plays_back(&task, &told, again, about);
+        records.push(told.lines);
     }
+    assert_as_recorded("aside", &records);
     for (what, count) in &seen {
         assert!(*count > 10, "{what}: {seen:?}");
     }

@@ -10,12 +10,13 @@ use elbowroom::execution::{
     Command, Entry, Event, Need, Observation, Passage, PlanAnswer, Planner, PlannerAnswer,
     PrepareError, Prepared, Preparer, Recorder, Wanted, World, WorldError,
 };
-use elbowroom::flow;
+
 use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::Line;
 
 use crate::lasting::scripted::{Notes, Scripted};
+use crate::scene::irr;
 
 /// A planner that works beside the run.
 #[derive(Clone, Default)]
@@ -43,6 +44,8 @@ pub(crate) struct Desk {
     pub(crate) ahead: Vec<Situation>,
     /// When the last one of these is there.
     ahead_due: Rational,
+    /// The task of the search that was begun, with the goals of then.
+    task: Option<Task>,
 }
 
 impl Beside {
@@ -85,7 +88,7 @@ impl Planner for Beside {
         desk.ahead.push(situation.clone());
     }
 
-    fn begin(&mut self, _task: &Task, situation: &Situation) -> bool {
+    fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
         let mut desk = self.desk();
         let is_begun = desk.ahead.last() == Some(situation);
         let due = if is_begun {
@@ -96,19 +99,22 @@ impl Planner for Beside {
         desk.due = Some(due);
         desk.begun += 1;
         desk.asked.push(situation.clone());
+        desk.task = Some(task.clone());
         true
     }
 
     fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        let begun = self.desk().task.take();
         if self.desk().has_none {
             return PlannerAnswer::from(PlanAnswer::Unsolvable);
         }
-        Embedded::default().plan(task, situation)
+        Embedded::default().plan(begun.as_ref().unwrap_or(task), situation)
     }
 
     fn give_up(&mut self) {
         let mut desk = self.desk();
         desk.due = None;
+        desk.task = None;
         desk.given_up += 1;
     }
 }
@@ -123,7 +129,7 @@ impl Preparer for Readier {
         plan: &TimeTriggeredPlan,
         need: Need,
     ) -> Result<Prepared, PrepareError> {
-        Analyst::new(flow::Settings::default()).prepare(task, plan, need)
+        Analyst::new(irr()).prepare(task, plan, need)
     }
 
     fn begin(&mut self, _wanted: &Wanted<'_>) -> bool {

@@ -8,7 +8,7 @@ use elbowroom::num::Rational;
 
 use crate::beside::{Beside, Telling, Told, assert_has, seconds, settings, telling, told_in};
 use crate::lasting::scripted::{fact, pursue, task};
-use crate::scene::Scene;
+use crate::scene::{Scene, irr};
 
 /// What is under way there: the actions and when they started.
 fn under_way(situation: &Situation) -> Vec<(String, String)> {
@@ -27,6 +27,7 @@ fn errands(script: Vec<(i64, Event)>, quarters: &[i64]) -> (Told, Vec<Situation>
         .map(|(time, event)| (seconds(time), event));
     let (mut world, is_to_end) = telling((200, script.collect()), &planner, quarters);
     let execution = Execution::of(&task)
+        .with_envelopes(irr())
         .by("guarded".parse().expect("a registered one"))
         .with_settings(settings())
         .lasting(true);
@@ -133,6 +134,7 @@ fn walking(
         durations: &durations,
     };
     let execution = Execution::of(&scene.task)
+        .with_envelopes(irr())
         .by("guarded".parse().expect("a registered one"))
         .beginning_with(scene.plan.clone())
         .with_settings(settings());

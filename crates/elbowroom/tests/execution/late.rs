@@ -4,7 +4,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom::execute::Embedded;
-use elbowroom::execution::run::{Report, RunSettings, Verdict};
+use elbowroom::execution::run::{MissingPlan, Report, RunSettings, Verdict};
 use elbowroom::execution::{
     Command, Ending, Event, NoPlanner, Observation, Passage, Planner, PlannerAnswer, Ticket, World,
     WorldError,
@@ -359,7 +359,8 @@ fn a_decision_that_is_late_takes_from_the_room_and_needs_no_new_plan() {
             assert!(scene.judged(&report).is_valid());
         }
         // Of the twelve seconds to spare, more than all are lost.
-        assert_eq!(run("7").replans, 1, "{executor}");
+        // `live` is asked again when it has carried on in vain.
+        assert!(run("7").replans >= 1, "{executor}");
     }
 }
 
@@ -401,11 +402,19 @@ fn a_start_that_is_late_is_no_excuse_for_what_has_left_its_interval() {
     assert_eq!(report.time, Rational::from(16), "{report:#?}");
 }
 
-/// In worlds without a clock, as in the papers' experiments, that is the end.
+/// In worlds without a clock, as in the papers' experiments, that is the end. That no plan exists is not
+/// proved: the running action might end at any moment.
 #[test]
 fn where_room_is_not_watched_a_run_ends_when_no_plan_can_bear_what_is_late() {
     let (report, _) = walking(Rational::from(1000), false);
-    assert_eq!(report.verdict, Verdict::Unsolvable);
+    let is_none_found = matches!(
+        report.verdict,
+        Verdict::NoPlan {
+            missing: MissingPlan::NotFound,
+            ..
+        }
+    );
+    assert!(is_none_found, "{report:#?}");
 }
 
 /// At the warning the planner is told from where a plan will be needed, and when it is needed it is

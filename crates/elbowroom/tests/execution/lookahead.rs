@@ -161,3 +161,56 @@ fn the_machines_of_paper_2_are_maintained_on_a_clock() {
         }
     }
 }
+
+/// By the likelihoods the goal may come about by itself, which never happens. The world has no table, as an action of it
+/// may take no time.
+#[test]
+fn chance_change_that_never_happens_is_not_awaited() {
+    let idle = |name: &str, effect: &str| {
+        format!(
+            "(:durative-action {name} :parameters () :duration (and (>= ?duration 0) (<= ?duration 2))
+               :condition (at start (free))
+               :effect (and (at start (not (free))) (at end (free)) (at end {effect})))"
+        )
+    };
+    for (goal, chance) in [
+        ("(done)", "becomes_true"),
+        ("(not (undone))", "becomes_false"),
+    ] {
+        let effect = goal;
+        let domain = format!(
+            "(define (domain d) (:requirements :durative-actions :duration-inequalities :negative-preconditions)
+               (:predicates (free) (done) (undone) (seen)) {}
+               (:durative-action work :parameters () :duration (= ?duration 5) :condition (at start (free))
+                 :effect (and (at start (not (free))) (at end (free)) (at end {effect}))))",
+            idle("idle", "(seen)")
+        );
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init (free) (undone)) (:goal (and {goal})))"
+        );
+        let fact = goal.trim_start_matches("(not ").trim_matches(['(', ')']);
+        let unsteady = |when: &str| {
+            format!(
+                "[defaults]\nbecomes_true = 0.0\nbecomes_false = 0.0\nstart = 1.0\neffect = 1.0\n\
+                 [facts.{fact}]\n{chance}{when} = 0.3\n[actions.work]\nstart = 0.9\n\
+                 [actions.work.effects]\n{fact} = 0.5\n"
+            )
+        };
+        for when in ["", "_per_second"] {
+            let mut scene = Scene::new(&domain, &problem, Some("0: (idle) [1]\n1.001: (work) [5]"))
+                .with_likelihoods(&unsteady(when));
+            scene.settings.time_limit = 1000.into();
+            for executor in ["lookahead", "adaptable"] {
+                let report = scene.run(executor, &scene.world(""), 0);
+                assert!(
+                    has_reached(&report),
+                    "{goal} {when} {executor}: {report:#?}"
+                );
+                assert!(
+                    report.time < 30.into(),
+                    "{goal} {when} {executor}: {report:#?}"
+                );
+            }
+        }
+    }
+}

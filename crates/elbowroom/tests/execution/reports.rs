@@ -143,10 +143,9 @@ fn an_end_after_another_end_is_a_contradiction() {
 }
 
 #[test]
-fn an_end_that_never_comes_is_given_up_when_patience_ends() {
+fn end_that_is_never_reported_times_out() {
     let mut scene = Scene::case("delivery");
-    scene.settings.patience.at_least = Rational::from(30);
-    scene.settings.patience.factor = Rational::from(2);
+    scene.settings.timeout = "2x,30".parse().expect("a correct test");
     for executor in ["fixed:1000", "live"] {
         let mut lost = None;
         let report = run(&scene, executor, &WorldModel::as_planned(), &mut |it| {

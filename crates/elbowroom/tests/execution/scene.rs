@@ -2,7 +2,8 @@
 
 use std::sync::{Arc, LazyLock};
 
-use elbowroom::execute::{Analyst, Embedded, Execution, Likeliest, SharedLikeliest};
+use elbowroom::answers::envelope::Search;
+use elbowroom::execute::{Analyst, Embedded, Execution, Likeliest, SharedLikeliest, Validated};
 use elbowroom::execution::executors::{self, ExecutorSpec};
 use elbowroom::execution::run::{PlanningTime, Report, RunSettings, Verdict};
 use elbowroom::execution::{NoRecord, Planner, Prepared, Preparer, Recorder, World};
@@ -20,6 +21,14 @@ pub(crate) static EXECUTORS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
     let registered = executors::EXECUTORS.iter();
     registered.map(|it| &*it.example().leak()).collect()
 });
+
+/// Envelopes are IRR's boxes.
+pub(crate) fn irr() -> flow::Settings {
+    flow::Settings {
+        search: Search::irr(),
+        ..flow::Settings::default()
+    }
+}
 
 /// A problem with a plan.
 pub(crate) struct Scene {
@@ -51,20 +60,26 @@ impl Scene {
 
     /// A problem; without a plan, one is made.
     pub(crate) fn new(domain: &str, problem: &str, plan: Option<&str>) -> Self {
+        Self::within(400, domain, problem, plan)
+    }
+
+    /// The same; plans are searched for among at most `states` states.
+    pub(crate) fn within(states: u64, domain: &str, problem: &str, plan: Option<&str>) -> Self {
         let source = |text: &str| Source::new("test", text);
         let (problem, _) =
             pddl::read_problem(&source(domain), &source(problem)).expect("a correct test");
         let task = Task::new(problem);
         let mut scene = Self {
             plan: TimeTriggeredPlan::default(),
-            flow: flow::Settings::default(),
+            // The times and numbers that the tests expect are those of IRR's boxes.
+            flow: irr(),
             settings: RunSettings {
                 planning_time: PlanningTime::Seconds(Rational::ZERO),
                 time_limit: Rational::from(100_000),
                 ..RunSettings::default()
             },
             task: Arc::new(task.clone()),
-            states: 400,
+            states,
             likelihoods: Arc::new(Likelihoods::certain()),
         };
         scene.plan = if let Some(text) = plan {
@@ -117,8 +132,7 @@ impl Scene {
             settings: embedded::Settings::default(),
             most_states: self.states,
             improve_states: 256,
-            clock: None,
-            goes_on: None,
+            ..Embedded::default()
         }
     }
 
@@ -139,10 +153,14 @@ impl Scene {
         preparer: &mut dyn Preparer,
         recorder: &mut dyn Recorder,
     ) -> Report {
-        self.execution(executor)
+        let (recorder, validation) = Validated::new(recorder, &self.task, None);
+        let report = self
+            .execution(executor)
             .prepared_by(preparer)
             .recorded_by(recorder)
-            .run_in(world)
+            .run_in(world);
+        assert_eq!(validation.found(), [], "{executor}: {report:#?}");
+        report
     }
 
     /// An execution of the plan.

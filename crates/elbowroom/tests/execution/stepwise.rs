@@ -7,7 +7,10 @@ use elbowroom::execute::{
     SharedLikeliest, WholeRegion,
 };
 use elbowroom::execution::run::{Next, NotAsked, Report, Run, Verdict};
-use elbowroom::execution::{Executor, Passage, World, WorldError};
+use elbowroom::execution::{
+    Answer, Executor, Passage, PlanAnswer, PlannerAnswer, RequestId, Urgency, Workers, World,
+    WorldError,
+};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, TraceWriter};
 use elbowroom::sim::{SimWorld, Unreliable};
@@ -33,11 +36,29 @@ fn everything_that_is_assembled_can_be_sent_to_another_thread() {
     is_send::<(elbowroom::envelope::Oracle, elbowroom::model::Task)>();
 }
 
+/// Returns the next question to the world; the workers answer the others.
+fn next_of_the_world(run: &mut Run<'_>, workers: &mut dyn Workers) -> Next {
+    loop {
+        match run.next() {
+            request @ (Next::Plan(_) | Next::Prepare(_) | Next::Abandon(_)) => {
+                run.delegate(request, workers);
+            }
+            next => return next,
+        }
+    }
+}
+
 /// Drives a run as an event loop would, and asks each question twice.
-fn driven(mut run: Run<'_>, world: &mut dyn World) -> Report {
+fn driven(mut run: Run<'_>, world: &mut dyn World, workers: &mut dyn Workers) -> Report {
     loop {
         let next = run.next();
-        if !matches!(next, Next::Command(_)) {
+        let is_repeated = match &next {
+            Next::Command(_) | Next::Abandon(_) => false,
+            Next::Plan(request) => request.urgency == Urgency::Awaited,
+            Next::Prepare(request) => request.urgency == Urgency::Awaited,
+            _ => true,
+        };
+        if is_repeated {
             assert_eq!(run.next(), next, "the question is still open");
         }
         let answer = match next {
@@ -52,6 +73,10 @@ fn driven(mut run: Run<'_>, world: &mut dyn World) -> Report {
                 run.see(seen).expect("it was asked for");
             }),
             Next::Over(report) => return report,
+            request => {
+                run.delegate(request, workers);
+                Ok(())
+            }
         };
         if let Err(error) = answer {
             run.fail(error);
@@ -70,15 +95,18 @@ fn an_event_loop_comes_to_the_same_decisions_as_a_world_that_blocks() {
     model.reports.duplicated = 0.1;
     for executor in EXECUTORS.iter() {
         for seed in 0..4 {
-            let traced = |drive: &dyn Fn(Run<'_>, &mut dyn World) -> Report| {
+            let traced = |drive: &dyn Fn(Run<'_>, &mut dyn World, &mut dyn Workers) -> Report| {
                 let mut text = String::new();
                 let mut sink = |line: &str| text.push_str(line);
                 let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
-                let run = scene.execution(executor).recorded_by(&mut writer).run();
-                let report = drive(run, model.world(&scene.task, seed).as_mut());
+                let execution = scene.execution(executor).recorded_by(&mut writer);
+                let (run, mut workers) = execution.run();
+                let world = &mut *model.world(&scene.task, seed);
+                let report = drive(run, world, &mut *workers);
+                drop(workers);
                 (report, text)
             };
-            let blocking = traced(&|run, world| run.go(world));
+            let blocking = traced(&|run, world, workers| run.go(world, workers));
             assert_eq!(traced(&driven), blocking, "{executor}, {seed}");
         }
     }
@@ -87,8 +115,8 @@ fn an_event_loop_comes_to_the_same_decisions_as_a_world_that_blocks() {
 #[test]
 fn a_run_that_is_over_stays_over() {
     let scene = Scene::case("delivery");
-    let mut run = scene.execution("stn").run();
-    let Next::Command(_) = run.next() else {
+    let (mut run, mut workers) = scene.execution("stn").run();
+    let Next::Command(_) = next_of_the_world(&mut run, &mut *workers) else {
         panic!("the plan begins with a start");
     };
     run.fail(WorldError::new("the robot fell over"));
@@ -104,7 +132,7 @@ fn a_run_that_is_over_stays_over() {
 #[test]
 fn what_was_not_asked_for_is_refused_and_changes_nothing() {
     let scene = Scene::case("delivery");
-    let (mut run, mut world) = (scene.execution("stn").run(), Vec::new());
+    let ((mut run, mut workers), mut world) = (scene.execution("stn").run(), Vec::new());
     let early = Passage {
         now: Rational::from(1_000_000),
         observations: Vec::new(),
@@ -112,9 +140,33 @@ fn what_was_not_asked_for_is_refused_and_changes_nothing() {
     let refused: Result<(), NotAsked> = run.observe(early);
     let words = refused.expect_err("nothing was asked").to_string();
     assert!(words.contains("has not asked for time to pass"), "{words}");
-    while let Next::Command(command) = run.next() {
+    while let Next::Command(command) = next_of_the_world(&mut run, &mut *workers) {
         world.push(command);
     }
     assert_eq!(*run.now(), Rational::ZERO);
     assert!(!world.is_empty());
+}
+
+#[test]
+fn answers_to_unknown_requests_change_nothing() {
+    let scene = Scene::case("delivery");
+    let (mut run, mut workers) = scene.execution("stn").run();
+    let Next::Prepare(request) = run.next() else {
+        panic!("the given plan is prepared first");
+    };
+    assert_eq!(request.urgency, Urgency::Awaited);
+    let other = RequestId(request.id.0 + 1);
+    let no_plan = || PlannerAnswer::from(PlanAnswer::NoPlanner);
+    // Of the other kind, and of another identifier.
+    run.planned(request.id, no_plan());
+    run.answer(Answer::Planned(other, no_plan()));
+    let mission = workers.prepare(&request).expect("answered at once");
+    run.prepared(other, mission.clone());
+    assert_eq!(run.next(), Next::Prepare(request.clone()));
+    run.prepared(request.id, mission.clone());
+    let command = run.next();
+    assert!(matches!(command, Next::Command(_)), "{command:?}");
+    // The answer once more.
+    run.prepared(request.id, mission);
+    assert!(matches!(run.next(), Next::Command(_) | Next::Wait { .. }));
 }

@@ -10,6 +10,7 @@ use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, Trace
 use elbowroom::sim::SimWorld;
 use serde_json::json;
 
+use crate::recorded::assert_as_recorded;
 use crate::scene::{EXECUTORS, Scene};
 
 fn traced(scene: &Scene, executor: &str, seed: u64) -> String {
@@ -49,6 +50,7 @@ fn replayed(scene: &Scene, executor: &str, text: &str) -> usize {
 
 #[test]
 fn a_run_can_be_played_back_from_its_trace_alone() {
+    let mut records = Vec::new();
     for scene in [Scene::case("delivery"), Scene::case("match")] {
         for executor in EXECUTORS.iter() {
             for seed in 0..5 {
@@ -56,9 +58,11 @@ fn a_run_can_be_played_back_from_its_trace_alone() {
                 assert_eq!(text, traced(&scene, executor, seed));
                 let agreed = replayed(&scene, executor, &text);
                 assert_eq!(agreed + 1, text.lines().count(), "{executor}, {seed}");
+                records.push(text.lines().map(str::to_owned).collect());
             }
         }
     }
+    assert_as_recorded("traces", &records);
 }
 
 #[test]

@@ -15,8 +15,8 @@ mod skipped;
 
 use std::path::{Path, PathBuf};
 
-use elbowroom_model::Task;
-use elbowroom_pddl::{Source, read_problem};
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_pddl::{Source, read_plan, read_problem};
 pub(crate) use skipped::skipped;
 
 /// The folder of benchmark data, if it is there.
@@ -33,6 +33,12 @@ pub(crate) fn data() -> Option<PathBuf> {
 pub(crate) fn source(path: &Path) -> Source {
     let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     Source::from_bytes(path.display().to_string(), &bytes)
+}
+
+/// Reads a plan; `None` if it is not one for this task.
+pub(crate) fn plan(task: &Task, path: &Path) -> Option<TimeTriggeredPlan> {
+    let read = read_plan(&source(path), task);
+    read.ok().map(|(plan, _)| plan)
 }
 
 /// The task of a domain and a problem file, or what is wrong with them.

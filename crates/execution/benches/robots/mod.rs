@@ -229,6 +229,7 @@ fn nothing(index: usize) -> Action {
             over_all: Condition::TRUE,
             end: nothing,
             continuous: Vec::new(),
+            is_under_way: false,
         }),
     }
 }

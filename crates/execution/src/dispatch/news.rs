@@ -7,7 +7,7 @@ use elbowroom_stn::WindowEnd;
 use super::projection;
 use super::{Dispatch, explain};
 use crate::event::Ending;
-use crate::executor::{Moment, News};
+use crate::executor::{Moment, News, StepId};
 use crate::horizon::{Horizon, Missed};
 use crate::reason::{About, Behind, Cause, Reason};
 
@@ -85,6 +85,11 @@ impl Dispatch {
     fn ended(&mut self, id: InstanceId, time: &Rational, ending: &Ending) -> Option<Reason> {
         let [start, end] = self.ends[id.index()];
         let name = self.action(id).name.clone();
+        let local = self.local(time);
+        if let Some(separation) = &mut self.separation {
+            let succeeded = *ending == Ending::Succeeded;
+            separation.end(StepId::from(id).0, succeeded, &local);
+        }
         match ending {
             Ending::Succeeded => {}
             Ending::Failed { why } => {
@@ -100,7 +105,6 @@ impl Dispatch {
                 return Some(reason.since(time.clone()));
             }
         }
-        let local = self.local(time);
         if let Some(told) = self.told.remove(&id)
             && let Horizon::Dispatchable(_) = self.horizon
         {

@@ -38,7 +38,7 @@ impl Progress {
         let mut before = vec![BTreeSet::new(); count];
         let together = falling_together(count, constraints);
         let mut order = |earlier: NodeId, later: NodeId, least: &Rational| {
-            let is_end = matches!(plan.nodes[earlier.index()], Node::End(_));
+            let is_end = is_end_to_wait_for(plan, &together, earlier, later);
             let is_timed = matches!(plan.nodes[earlier.index()], Node::Timed(_));
             // Starts that have to fall together do not wait for each other.
             let follows = is_end || together[earlier.index()] != together[later.index()];
@@ -63,7 +63,7 @@ impl Progress {
             if !matches!(what, Node::Start(_) | Node::Instant(_)) {
                 continue;
             }
-            for earlier in with_ends_before(plan, &before, node) {
+            for earlier in with_ends_before(plan, &before, &together, node) {
                 progress.successors[earlier.index()].push(node);
                 progress.missing[node.index()] += 1;
             }
@@ -91,6 +91,16 @@ impl Progress {
                 self.ready.insert(after);
             }
         }
+    }
+}
+
+/// Returns `true` if `node` is an end that `later` has to wait for, even if both have to fall together.
+/// `later` does not wait for the end of an action without duration at the same moment: its own end, for
+/// example.
+fn is_end_to_wait_for(plan: &StnPlan, together: &[usize], node: NodeId, later: NodeId) -> bool {
+    match plan.nodes[node.index()] {
+        Node::End(id) => together[plan.start(id).index()] != together[later.index()],
+        _ => false,
     }
 }
 
@@ -122,6 +132,7 @@ fn falling_together(count: usize, constraints: &[Constraint]) -> Vec<usize> {
 fn with_ends_before(
     plan: &StnPlan,
     before: &[BTreeSet<NodeId>],
+    together: &[usize],
     start: NodeId,
 ) -> BTreeSet<NodeId> {
     let mut all = before[start.index()].clone();
@@ -131,7 +142,7 @@ fn with_ends_before(
             continue;
         }
         for &earlier in &before[node.index()] {
-            if matches!(plan.nodes[earlier.index()], Node::End(_)) && all.insert(earlier) {
+            if is_end_to_wait_for(plan, together, earlier, start) && all.insert(earlier) {
                 frontier.push(earlier);
             }
         }

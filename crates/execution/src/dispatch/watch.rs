@@ -63,6 +63,13 @@ impl Dispatch {
                 wake_at(latest + &self.epsilon, node);
             }
         }
+        orders.retain(|&node| {
+            let separated = self.separated(node, &now);
+            if let Some(separated) = &separated {
+                wake_at(separated.clone(), node);
+            }
+            separated.is_none()
+        });
         for &id in &self.progress.running {
             let node = self.awaited(id);
             if let Some(silent) = self.silent(id, &now) {
@@ -71,8 +78,10 @@ impl Dispatch {
                 }
                 continue;
             }
-            if let Some(latest) = self.horizon.window(network_node(node)).1 {
-                wake_at(latest.max(now.clone()) + &self.epsilon, node);
+            // One that is past has been noticed, or does not matter to the executor.
+            let latest = self.horizon.window(network_node(node)).1;
+            if let Some(latest) = latest.filter(|latest| *latest >= now) {
+                wake_at(latest + &self.epsilon, node);
             }
         }
         if !orders.is_empty() {
@@ -135,7 +144,7 @@ impl Dispatch {
 
     /// How long an action that starts now is told to take: as long as planned, or as near to that
     /// as what is known allows.
-    fn told_duration(&self, id: InstanceId, now: &Rational) -> Rational {
+    pub(super) fn told_duration(&self, id: InstanceId, now: &Rational) -> Rational {
         let planned = self.nominal_duration(id);
         let (least, most) = &self.durations[id.index()];
         let end = network_node(self.ends[id.index()][1]);

@@ -2,6 +2,7 @@
 
 mod initial;
 mod orders;
+mod repetitions;
 mod rest;
 
 use std::collections::BTreeMap;
@@ -38,6 +39,7 @@ pub(super) const REGISTERED: Registered = Registered {
             likelihoods: means.likelihoods,
             orders: means.orders,
             foresight: None,
+            is_table_circling: false,
             state: None,
         })
     },
@@ -56,6 +58,8 @@ pub(super) struct Adaptable {
     /// Of plans that were taken up before.
     orders: Option<Orders>,
     foresight: Option<Foresight>,
+    /// `true` if the table of a small world has led to the same state repeatedly: then orders are executed.
+    is_table_circling: bool,
     state: Option<Rest>,
 }
 
@@ -82,11 +86,13 @@ impl Executor for Adaptable {
                 let task = moment.belief.task();
                 self.initial.learn(news, rest.action_of(news), task);
             }
-            if let Some(reason) = rest.learn(news, moment.belief, &self.likelihoods) {
+            if let Some(reason) = rest.learn(news, moment, &self.likelihoods) {
                 return replan(reason);
             }
         }
-        rest.next(moment, &self.initial)
+        let decided = rest.next(moment, &self.initial);
+        self.is_table_circling |= rest.is_table_circling();
+        decided
     }
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
@@ -106,6 +112,7 @@ impl Adaptable {
             likelihoods,
             orders: None,
             foresight: Some(foresight),
+            is_table_circling: false,
             state: None,
         }
     }
@@ -115,11 +122,21 @@ impl Adaptable {
     fn tabulated(&self, mission: &Mission) -> Option<(Chooser, Vec<Step>)> {
         let foresight = self.foresight.as_ref()?;
         // A table is for who sees the state as it is.
-        if !mission.running.is_empty() || !self.initial.is_empty() {
+        if !mission.running.is_empty() || !self.initial.is_empty() || self.is_table_circling {
             return None;
         }
         let table = foresight.table(&mission.task, &self.likelihoods)?;
         let steps = table.steps().to_vec();
+        // The world may have gone where, by the likelihoods, it cannot: the plan then needs actions that the
+        // table left out.
+        let is_known = |planned: &Step| {
+            let mut actions = steps.iter().map(|step| &step.action);
+            let planned = &planned.action;
+            actions.any(|it| it.schema == planned.schema && it.arguments == planned.arguments)
+        };
+        if !mission.time_triggered.steps.iter().all(is_known) {
+            return None;
+        }
         let search = Box::new(table.search());
         let chooser = Chooser::Table {
             table,
@@ -159,8 +176,15 @@ impl Adaptable {
             let about = About::Said(missing.to_string());
             Box::new(Reason::new(Cause::NoOrder).about(about))
         })?;
-        let as_planned = model.as_timed(&steps);
-        let search = OrderSearch::new(model, SearchSettings::default()).beginning_with(as_planned);
+        // On a clock facts do not change with steps: an order that counts on that would repeat steps in vain.
+        let model = if looks_ahead {
+            model.without_luck()
+        } else {
+            model
+        };
+        let search = OrderSearch::new(model, SearchSettings::default());
+        let as_planned = search.as_timed(&steps);
+        let search = search.beginning_with(as_planned);
         let is_short = search.model().plan().nodes.len() <= SHORT;
         let reconsider = if looks_ahead && is_short {
             Reconsider::Always

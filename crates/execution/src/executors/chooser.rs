@@ -53,6 +53,38 @@ impl Chooser {
         }
     }
 
+    /// Returns `true` if a table chooses.
+    pub(super) fn is_table(&self) -> bool {
+        matches!(self, Self::Table { .. })
+    }
+
+    /// From now on keeps an order for as long as it fits. Returns `false` if that was so before.
+    pub(super) fn keep_order(&mut self) -> bool {
+        match self {
+            Self::Orders(dispatch) => dispatch.keep_order(),
+            Self::Table { .. } => false,
+        }
+    }
+
+    /// Drops the order that is being executed, so that the next choice is that of a new search. Returns `false` if there
+    /// is none, if it is new, or if it has to be kept. With `has_happened`,
+    /// the next happening has already happened at this moment.
+    pub(super) fn drop_order(&mut self, next: &NextHappening, has_happened: bool) -> bool {
+        match self {
+            Self::Orders(dispatch) if !next.is_new_order => {
+                // Between happenings of one moment nothing else can be done.
+                let order = dispatch.order();
+                let is_joined = order.is_some_and(|order| order.joined[next.position]);
+                let can_be_dropped = has_happened || !is_joined;
+                if can_be_dropped {
+                    dispatch.drop_order();
+                }
+                can_be_dropped
+            }
+            Self::Orders(_) | Self::Table { .. } => false,
+        }
+    }
+
     /// Why this is next.
     pub(super) fn about(&self, next: &NextHappening) -> About {
         match self {

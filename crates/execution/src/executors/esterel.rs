@@ -1,7 +1,8 @@
 //! `esterel`: paper 2's baseline.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{Bound, Constraint};
+use elbowroom_plan::uncertain::Reading;
+use elbowroom_plan::{Bound, Constraint, Node, NodeId};
 
 use super::Registered;
 use crate::dispatch::{Bounds, Dispatch, Sight, replan};
@@ -44,7 +45,10 @@ impl Executor for Esterel {
             }
             orderings(constraint)
         };
-        self.dispatch = Some(Dispatch::new(mission, Sight::Whole, &bounds)?);
+        // Its orderings hold for planned durations; the world's may bring an end close to a start.
+        let dispatch =
+            Dispatch::new(mission, Sight::Whole, &bounds)?.keeping_apart(&Rational::ZERO);
+        self.dispatch = Some(dispatch);
         Ok(())
     }
 
@@ -70,6 +74,25 @@ impl Executor for Esterel {
     fn fork(&self) -> Option<Box<dyn Executor>> {
         Some(Box::new(self.clone()))
     }
+}
+
+/// Continues with a plan by its orderings alone; `None` if they contradict each other after what has happened.
+pub(super) fn carry_on(mut dispatch: Dispatch, now: &Rational) -> Option<Box<dyn Executor>> {
+    let local = dispatch.local(now);
+    let plan = dispatch.plan().clone();
+    let is_timed = |node: NodeId| matches!(plan.nodes[node.index()], Node::Timed(_));
+    let reading = |constraint: &Constraint| {
+        let (lower, upper) = orderings(constraint);
+        // What has to come before a timed initial has a deadline.
+        Reading::Requirement {
+            lower: lower.filter(|_| !is_timed(constraint.to)),
+            upper: upper.filter(|_| !is_timed(constraint.from)),
+        }
+    };
+    dispatch.rebound(&local, &reading).ok()?;
+    Some(Box::new(Esterel {
+        dispatch: Some(dispatch.keeping_apart(&local)),
+    }))
 }
 
 /// Takes note of what is new; why the plan has to be given up, if it has to.

@@ -111,7 +111,9 @@ impl Executor for Fixed {
             };
             (lower, room.upper.value().cloned())
         };
-        let dispatch = Dispatch::new(mission, Sight::OneHop, &bounds)?;
+        // Its orderings are those of facts alone, so numbers may be written and read at one time.
+        let dispatch =
+            Dispatch::new(mission, Sight::OneHop, &bounds)?.keeping_apart(&Rational::ZERO);
         self.state = Some((dispatch, mission.clone()));
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! `live`: the envelope after each observation, with what was observed fixed.
 
+mod carrying_on;
 mod inside;
 mod limits;
 
@@ -11,7 +12,8 @@ use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{Bound, InstanceId, ParameterId, ParametrizedPlan, Valuation};
 use inside::Inside;
 
-use super::{Registered, promise};
+use self::carrying_on::{CarriedOn, Hope};
+use super::{Registered, esterel, promise};
 use crate::dispatch::{Bounds, Dispatch, replan};
 use crate::event::Measured;
 use crate::executor::{CAN_HAVE_A_CLOCK, Need};
@@ -28,9 +30,11 @@ pub(super) const REGISTERED: Registered = Registered {
     summary: "Dispatches so that the rest of the plan works whatever happens within its envelope. \
               When a value leaves it, gives the strongest guarantee that still holds for the rest, \
               with the observed values fixed, and replans only when the rest does not work even if \
-              nothing deviates any more. With a number, it also replans while no action is running \
-              and another plan is more likely to succeed, by at least that number of percentage \
-              points, in the world that the world file describes.",
+              nothing deviates any more. Where time is lacking and no other plan is found, it \
+              carries on by the plan's orderings, without a guarantee, as `esterel` does. With a \
+              number, it also replans while no action is running and another plan is more likely \
+              to succeed, by at least that number of percentage points, in the world that the \
+              world file describes.",
     paper: "goes beyond Cashmore et al. (2020)",
     need: Need::OpenNetwork,
     make: |argument, means| {
@@ -39,6 +43,8 @@ pub(super) const REGISTERED: Registered = Registered {
             region: means.region,
             odds: means.odds.zip(advantage),
             state: None,
+            hope: Hope::None,
+            carried_on: None,
         })
     },
 };
@@ -49,6 +55,10 @@ struct Live {
     /// The source of likelier plans, and by how much one must be likelier.
     odds: Option<(Box<dyn Odds>, Rational)>,
     state: Option<Rest>,
+    /// The hope for the plan for which another one was requested.
+    hope: Hope,
+    /// A plan that lacks time and is executed nevertheless.
+    carried_on: Option<CarriedOn>,
 }
 
 /// A plan, and what is known of its open quantities.
@@ -73,6 +83,8 @@ struct Rest {
     /// How long the actions under way may take of which that has been found out; `None` where numbers do not limit
     /// it. Of the others it is known that they may take as long as the envelope has it.
     limits: BTreeMap<InstanceId, Option<Rational>>,
+    /// `true` if the rest is continued although it is too late for a deadline.
+    ignores_deadlines: bool,
 }
 
 impl Executor for Live {
@@ -92,6 +104,7 @@ impl Executor for Live {
             reads_more_than_facts,
             durations_move_numbers: reads_more_than_facts && plan.durations_move_numbers(),
             limits: BTreeMap::new(),
+            ignores_deadlines: false,
             inside: Inside::default(),
             in_constraints: in_constraints(plan),
             values: plan.nominal(),
@@ -101,10 +114,71 @@ impl Executor for Live {
         };
         rest.begin(self.region.as_mut());
         self.state = Some(rest);
+        self.hope = Hope::None;
+        self.carried_on = None;
         Ok(())
     }
 
     fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        let decided = match (&mut self.carried_on, &mut self.state) {
+            (Some(carried_on), Some(rest)) => {
+                rest.decide_carried_on(moment, carried_on, self.region.as_mut())
+            }
+            _ => self.decide_by_guarantee(moment),
+        };
+        let is_abandoned = decided.decision == Decision::Replan;
+        let rest = self.state.as_ref().filter(|_| is_abandoned);
+        let region = self.region.as_mut();
+        let hope = rest.map(|rest| rest.hope(&decided.reason, moment.now, region));
+        self.hope = hope.unwrap_or_default();
+        decided
+    }
+
+    fn may_carry_on(&self) -> bool {
+        self.hope == Hope::Fair
+    }
+
+    fn carry_on(&mut self, now: &Rational) -> bool {
+        let hope = self.hope;
+        let rest = self.state.as_mut().filter(|_| hope > Hope::None);
+        self.carried_on = rest.and_then(|rest| rest.carry_on(hope, now, self.region.as_mut()));
+        self.carried_on.is_some()
+    }
+
+    fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
+        if let Some(carried_on) = &self.carried_on {
+            return carried_on.executor().window(step, is_end);
+        }
+        self.state.as_ref()?.dispatch.planned(step, is_end)
+    }
+
+    fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
+        let is_guaranteed = self.carried_on.is_none();
+        let rest = self
+            .state
+            .as_ref()
+            .filter(|_| CAN_HAVE_A_CLOCK && is_guaranteed)?;
+        rest.bears_until(step.instance(), now)
+    }
+
+    /// Without anybody to compare plans.
+    fn fork(&self) -> Option<Box<dyn Executor>> {
+        let carried_on = match &self.carried_on {
+            Some(carried_on) => Some(carried_on.fork()?),
+            None => None,
+        };
+        Some(Box::new(Self {
+            region: self.region.fork()?,
+            odds: None,
+            state: self.state.clone(),
+            hope: self.hope,
+            carried_on,
+        }))
+    }
+}
+
+impl Live {
+    fn decide_by_guarantee(&mut self, moment: &Moment<'_>) -> Decided {
         let Some(rest) = &mut self.state else {
             return super::without_plan();
         };
@@ -136,24 +210,6 @@ impl Executor for Live {
             _ => None,
         };
         decided
-    }
-
-    fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
-        self.state.as_ref()?.dispatch.planned(step, is_end)
-    }
-
-    fn bears_until(&self, step: StepId, now: &Rational) -> Option<Rational> {
-        let rest = self.state.as_ref().filter(|_| CAN_HAVE_A_CLOCK)?;
-        rest.bears_until(step.instance(), now)
-    }
-
-    /// Without anybody to compare plans.
-    fn fork(&self) -> Option<Box<dyn Executor>> {
-        Some(Box::new(Self {
-            region: self.region.fork()?,
-            odds: None,
-            state: self.state.clone(),
-        }))
     }
 }
 
@@ -364,6 +420,9 @@ impl Rest {
         plan.plan = plan
             .plan
             .remainder(&now, |node| self.dispatch.happened(node), |_| true);
+        if self.ignores_deadlines {
+            carrying_on::remove_deadlines(&mut plan.plan);
+        }
         (plan, values)
     }
 

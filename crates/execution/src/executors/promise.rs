@@ -5,6 +5,7 @@ use elbowroom_plan::uncertain::Reading;
 use elbowroom_plan::{
     Bound, Constraint, InstanceId, ParameterId, ParameterKind, ParametrizedPlan, Valuation,
 };
+use elbowroom_stn::ConsistentNetwork;
 
 use crate::dispatch::{Dispatch, Overdue, Until};
 use crate::executor::{Mission, StepId};
@@ -59,6 +60,11 @@ pub(super) fn is_about_time(reason: &Reason) -> bool {
     )
 }
 
+/// Returns whether a reason to abandon a plan says that time is lacking, so that the plan works if something takes less.
+pub(super) fn lacks_time(reason: &Reason) -> bool {
+    is_about_time(reason) || matches!(reason.about, Some(About::TooLittleTime))
+}
+
 /// What is left of a plan.
 pub(super) struct Rest<'a> {
     pub(super) mission: &'a Mission,
@@ -104,11 +110,7 @@ pub(super) fn weaken(
         });
     }
     let elapsed: Vec<Option<Rational>> = (0..dispatch.plan().instances.len())
-        .map(|index| {
-            let [start, end] = dispatch.nodes_of(InstanceId::from(index));
-            let begun = dispatch.happened(start)?;
-            dispatch.happened(end).is_none().then(|| &local - begun)
-        })
+        .map(|index| elapsed(dispatch, InstanceId::from(index), &local))
         .collect();
     let mut behind = Vec::new();
     let mut attempt = |share: &Rational, overrun: Overrun| {
@@ -150,11 +152,7 @@ pub(super) fn bears_until(
     now: &Rational,
 ) -> Option<Rational> {
     let local = dispatch.local(now);
-    let elapsed = |instance: InstanceId| {
-        let [start, end] = dispatch.nodes_of(instance);
-        let begun = dispatch.happened(start)?;
-        dispatch.happened(end).is_none().then(|| &local - begun)
-    };
+    let elapsed = |instance: InstanceId| elapsed(dispatch, instance, &local);
     let room = Room {
         mission,
         values,
@@ -173,6 +171,40 @@ pub(super) fn bears_until(
         }
     };
     dispatch.latest_end(late, now, &reading)
+}
+
+/// Returns the possible times of the rest of a plan if actions that have not ended take at least this share of their
+/// planned durations.
+pub(super) fn times_if_faster(
+    dispatch: &Dispatch,
+    values: &Valuation,
+    share: &Rational,
+    now: &Rational,
+) -> Option<ConsistentNetwork> {
+    let local = dispatch.local(now);
+    let elapsed = |instance: InstanceId| elapsed(dispatch, instance, &local);
+    let reading = |constraint: &Constraint| {
+        let lower = constraint.lower.at(values);
+        let Some(instance) = dispatch.plan().duration_of(constraint) else {
+            return Reading::Requirement {
+                lower,
+                upper: constraint.upper.at(values),
+            };
+        };
+        let planned = lower.unwrap_or_default() * share;
+        Reading::Requirement {
+            lower: Some(planned.max(elapsed(instance).unwrap_or_default())),
+            upper: None,
+        }
+    };
+    dispatch.possible_times(now, &reading)
+}
+
+/// The time for which an action has run, on the plan's clock; `None` if it does not run.
+fn elapsed(dispatch: &Dispatch, instance: InstanceId, now: &Rational) -> Option<Rational> {
+    let [start, end] = dispatch.nodes_of(instance);
+    let begun = dispatch.happened(start)?;
+    dispatch.happened(end).is_none().then(|| now - begun)
 }
 
 /// When an action that is overdue may end, on the plan's clock, the most that is asked for first.

@@ -1,5 +1,6 @@
 //! `stn`: dispatch within the windows of the plan's network.
 
+use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::Reading;
 use elbowroom_plan::{Constraint, NodeId};
 
@@ -40,9 +41,12 @@ impl Executor for Stn {
             let reading = |constraint: &Constraint| reading(mission, constraint, open);
             Dispatch::controlled(mission, &reading)
         };
-        let dispatch = attempt(Open::World)
-            .or_else(|_| attempt(Open::Planned))
-            .or_else(|_| attempt(Open::Executor));
+        let dispatch = if reads_planned_duration(mission) {
+            attempt(Open::Planned)
+        } else {
+            attempt(Open::World).or_else(|_| attempt(Open::Planned))
+        };
+        let dispatch = dispatch.or_else(|_| attempt(Open::Executor));
         self.state = Some((dispatch?, mission.clone()));
         Ok(())
     }
@@ -65,6 +69,13 @@ impl Executor for Stn {
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
         self.state.as_ref()?.0.planned(step, is_end)
     }
+}
+
+/// Returns `true` if an action reads its duration before it ends. Then the plan is known to work only with
+/// real durations that equal the planned ones.
+fn reads_planned_duration(mission: &Mission) -> bool {
+    let mut instances = mission.plan.plan.instances.iter();
+    instances.any(|own| own.action.with_planned_duration(&Rational::ZERO).is_some())
 }
 
 /// The party that chooses a duration which the domain leaves open.

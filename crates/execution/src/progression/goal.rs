@@ -28,12 +28,22 @@ impl Progression {
         last.map_or(Outlook::Reached, Outlook::Awaited)
     }
 
+    /// Returns whether the goal holds in the end, but only by the assumptions about doubtful facts and values.
+    pub(crate) fn is_goal_in_doubt(&self) -> bool {
+        let is_in_doubt = !self.doubtful_facts().is_empty() || !self.doubtful_values().is_empty();
+        if !is_in_doubt {
+            return false;
+        }
+        let (_, state) = self.in_the_end();
+        state.is_goal() != Ok(true) && state.holds(self.task.goal(), None) == Ok(true)
+    }
+
     /// The parts of the goal that will not hold in the end, or say nothing.
     pub(crate) fn unmet_in_the_end(&self) -> Vec<&Condition> {
         let goal = self.task.goal();
         let (_, state) = self.in_the_end();
         let mut parts = goal.conjuncts();
-        parts.retain(|part| state.holds(part, None) != Ok(true));
+        parts.retain(|part| state.is_certain(part) != Ok(true));
         parts
     }
 

@@ -7,7 +7,7 @@ use elbowroom_model::ground::{Action, Body, Condition, FactId, FluentId, Guard};
 use elbowroom_model::{RunningAction, Task};
 use elbowroom_num::{Interval, Rational};
 
-use super::{Progression, Underway, decide_guards};
+use super::{Doubt, Progression, Underway, decide_guards};
 use crate::event::Ticket;
 
 /// A [`Progression`], but for its task and the actions under way in it.
@@ -25,10 +25,10 @@ pub struct Parts {
     pub facts_on_arrival: BTreeMap<FactId, bool>,
     /// The values on arrival, likewise.
     pub values_on_arrival: BTreeMap<FluentId, Option<Rational>>,
-    /// Facts about which reports contradict each other.
-    pub doubtful_facts: BTreeSet<FactId>,
-    /// Fluents about which reports contradict each other.
-    pub doubtful_values: BTreeSet<FluentId>,
+    /// Facts that are in doubt ([`Progression::doubt`]); `facts` has their truth before.
+    pub doubtful_facts: BTreeMap<FactId, Vec<Doubt>>,
+    /// Fluents whose values are in doubt.
+    pub doubtful_values: BTreeMap<FluentId, Vec<Doubt>>,
     /// How many groups of timed initials have happened.
     pub timed: usize,
     /// What is under way.

@@ -12,9 +12,9 @@ use super::Progression;
 pub enum Unreadable {
     /// The fluent has no value.
     Undefined(FluentId),
-    /// Reports contradict each other about the fact.
+    /// The fact is in doubt.
     DoubtfulFact(FactId),
-    /// Reports contradict each other about the fluent.
+    /// The value of the fluent is in doubt.
     DoubtfulValue(FluentId),
     /// Something is divided by zero.
     DivisionByZero,
@@ -30,15 +30,29 @@ pub enum Unreadable {
 struct Reading<'a> {
     state: &'a Progression,
     duration: Option<&'a Rational>,
-    /// Whether the state on arrival is meant, before anything of the present group.
-    is_on_arrival: bool,
+    mode: Mode,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Now,
+    /// On arrival, before anything of the present group.
+    OnArrival,
+    /// Now, without assumptions about doubtful facts and values.
+    Certain,
 }
 
 impl Moment<Unreadable> for Reading<'_> {
     fn fact(&self, fact: FactId) -> Result<bool, Unreadable> {
-        let truth = self.state.fact_in_doubt(fact)?;
+        if self.state.doubtful_facts.contains_key(&fact) {
+            return match self.mode {
+                Mode::Certain => Err(Unreadable::DoubtfulFact(fact)),
+                Mode::Now | Mode::OnArrival => Ok(false),
+            };
+        }
         let before = self.state.facts_on_arrival.get(&fact);
-        Ok(*before.filter(|_| self.is_on_arrival).unwrap_or(&truth))
+        let before = before.filter(|_| self.mode == Mode::OnArrival).copied();
+        Ok(before.unwrap_or_else(|| self.state.fact(fact)))
     }
 
     fn compare(
@@ -48,11 +62,13 @@ impl Moment<Unreadable> for Reading<'_> {
         right: &Expression,
     ) -> Result<bool, Unreadable> {
         let value = |expression: &Expression| {
-            if let Some(fluent) = self.state.doubtful_fluent(expression) {
+            if self.mode == Mode::Certain
+                && let Some(fluent) = self.state.doubtful_fluent(expression)
+            {
                 return Err(Unreadable::DoubtfulValue(fluent));
             }
             evaluate(expression, self.duration, &|fluent| {
-                if self.is_on_arrival {
+                if self.mode == Mode::OnArrival {
                     self.state.value_on_arrival(fluent)
                 } else {
                     self.state.value(fluent)
@@ -73,7 +89,7 @@ impl Progression {
         condition: &Condition,
         duration: Option<&Rational>,
     ) -> Result<bool, Unreadable> {
-        self.read(condition, duration, false)
+        self.read(condition, duration, Mode::Now)
     }
 
     /// Whether a condition held on arrival at the present moment, before anything happened at it:
@@ -86,19 +102,19 @@ impl Progression {
         condition: &Condition,
         duration: Option<&Rational>,
     ) -> Result<bool, Unreadable> {
-        self.read(condition, duration, true)
+        self.read(condition, duration, Mode::OnArrival)
     }
 
     fn read(
         &self,
         condition: &Condition,
         duration: Option<&Rational>,
-        is_on_arrival: bool,
+        mode: Mode,
     ) -> Result<bool, Unreadable> {
         let basic = Reading {
             state: self,
             duration,
-            is_on_arrival,
+            mode,
         };
         match self.task.derivation() {
             Some(derivation) if derivation.is_read_by(condition) => {
@@ -109,12 +125,20 @@ impl Progression {
         }
     }
 
-    /// Whether the task's goal holds now.
+    /// Returns whether the task's goal holds now.
     ///
     /// # Errors
-    /// When that cannot be said.
+    /// If that cannot be said, for instance because it depends on a doubtful fact.
     pub fn is_goal(&self) -> Result<bool, Unreadable> {
-        self.holds(self.task.goal(), None)
+        self.is_certain(self.task.goal())
+    }
+
+    /// Returns whether a condition holds now, without assumptions about doubtful facts and values.
+    ///
+    /// # Errors
+    /// If that cannot be said.
+    pub fn is_certain(&self, condition: &Condition) -> Result<bool, Unreadable> {
+        self.read(condition, None, Mode::Certain)
     }
 
     /// The parts of a condition that do not hold, or say nothing.
@@ -139,19 +163,11 @@ impl Progression {
         parts
     }
 
-    /// Whether a basic fact is true, if reports do not contradict each other about it.
-    pub(super) fn fact_in_doubt(&self, fact: FactId) -> Result<bool, Unreadable> {
-        if self.doubtful_facts.contains(&fact) {
-            return Err(Unreadable::DoubtfulFact(fact));
-        }
-        Ok(self.fact(fact))
-    }
-
-    pub(super) fn doubtful_fluent(&self, expression: &Expression) -> Option<FluentId> {
+    fn doubtful_fluent(&self, expression: &Expression) -> Option<FluentId> {
         let mut found = None;
         if !self.doubtful_values.is_empty() {
             expression.visit_fluents(&mut |fluent| {
-                if self.doubtful_values.contains(&fluent) {
+                if self.doubtful_values.contains_key(&fluent) {
                     found = Some(fluent);
                 }
             });

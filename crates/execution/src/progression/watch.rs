@@ -47,6 +47,17 @@ impl Progression {
         breaking.collect()
     }
 
+    /// Returns whether an over-all condition fails from now on that has not failed before.
+    pub fn is_breaking(&self) -> bool {
+        let motion = self.motion().unwrap_or_default();
+        let lost = self.lost(&motion, Span::Soon).conditions;
+        let is_new = |(ticket, parts): &(Ticket, Vec<usize>)| {
+            let underway = self.running.get(ticket);
+            underway.is_some_and(|it| parts.iter().any(|part| !it.broken.contains(part)))
+        };
+        lost.iter().any(is_new)
+    }
+
     /// The time at which an over-all condition that holds now has failed, if nothing happens until
     /// then, and if that is before `until`: the first multiple of `grid` after that moment.
     pub fn next_break(&self, until: &Rational, grid: &Rational) -> Option<Rational> {
@@ -195,11 +206,6 @@ impl View<'_> {
     }
 
     fn difference(&self, left: &Expression, right: &Expression) -> Result<Fraction, Unreadable> {
-        for side in [left, right] {
-            if let Some(fluent) = self.state.doubtful_fluent(side) {
-                return Err(Unreadable::DoubtfulValue(fluent));
-            }
-        }
         let now = |fluent| {
             let value = self.state.value(fluent).cloned();
             value.ok_or(Unreadable::Undefined(fluent))
@@ -212,7 +218,7 @@ impl View<'_> {
 
 impl Moment<Unreadable> for View<'_> {
     fn fact(&self, fact: FactId) -> Result<bool, Unreadable> {
-        self.state.fact_in_doubt(fact)
+        Ok(self.state.fact(fact))
     }
 
     fn compare(

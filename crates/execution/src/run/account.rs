@@ -9,7 +9,6 @@ use elbowroom_model::ground::{
 };
 use elbowroom_num::Rational;
 
-use super::Patience;
 use super::waits::{Moment, Wait, waits_of};
 use crate::event::{Ending, Measured, Ticket};
 use crate::executor::{Mission, Order, StepId};
@@ -32,14 +31,21 @@ pub struct Account {
     kept: usize,
     /// What was done before the run last had nothing to do, for its report.
     closed: VecDeque<ExecutedStep>,
-    /// The steps of the present plan.
-    steps: BTreeMap<StepId, Ticket>,
-    /// What the present plan has, on the world's clock, if that was noted.
+    /// The present plan.
+    plan: PlanAccount,
+    /// Those that have not ended.
+    open: BTreeSet<Ticket>,
+}
+
+/// The part of a plan that has been started.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PlanAccount {
+    /// The starts, by step.
+    pub(super) steps: BTreeMap<StepId, Ticket>,
+    /// All steps, on the world's clock, if they were noted.
     planned: Vec<(StepId, Step)>,
     /// What the starts of these wait for.
     waits: BTreeMap<StepId, Vec<Wait>>,
-    /// Those that have not ended.
-    open: BTreeSet<Ticket>,
 }
 
 /// One start.
@@ -51,12 +57,18 @@ pub(super) struct Opened {
     pub(super) step: Option<StepId>,
     pub(super) ordered: Rational,
     pub(super) started: Option<Rational>,
-    /// When it last gave a sign of life, after its start.
-    heard: Option<Rational>,
+    /// When it last reported progress, after its start, and the part that was done.
+    pub(super) progress: Option<(Rational, Rational)>,
     pub(super) ended: Option<(Rational, Ending)>,
-    cancelled: Option<Rational>,
+    pub(super) cancelled: Option<Rational>,
+    /// Its time-out, if it has reached it.
+    pub(super) timed_out: Option<Rational>,
+    /// `true` if it is unknown whether it has come to its end.
+    pub(super) is_in_doubt: bool,
     /// Until when the plan could bear it when that was warned of.
     pub(super) warned: Option<Rational>,
+    /// The time-out that the last warning of one was about.
+    pub(super) warned_timeout: Option<Rational>,
     /// The end of its window when that was last looked into, and until when the plan can bear it.
     pub(super) bearable: Option<(Rational, Rational)>,
     pub(super) measured: [Vec<Measured>; 2],
@@ -77,14 +89,20 @@ pub struct KnownStart {
     pub ordered: Rational,
     /// When it has started, if it has.
     pub started: Option<Rational>,
-    /// When it last gave a sign of life, after its start.
-    pub heard: Option<Rational>,
+    /// When it last reported progress, after its start, and the part that was done.
+    pub progress: Option<(Rational, Rational)>,
     /// When and how it has ended, if it has.
     pub ended: Option<(Rational, Ending)>,
     /// When it was told to stop, if it was.
     pub cancelled: Option<Rational>,
+    /// Its time-out, if it has reached it.
+    pub timed_out: Option<Rational>,
+    /// `true` if it is unknown whether it has come to its end.
+    pub is_in_doubt: bool,
     /// Until when the plan could bear it when that was warned of.
     pub warned: Option<Rational>,
+    /// The time-out that the last warning of one was about.
+    pub warned_timeout: Option<Rational>,
     /// What was measured at its start, and at its end.
     pub measured: [Vec<Measured>; 2],
 }
@@ -115,10 +133,13 @@ impl Account {
                 step: None,
                 ordered: underway.start.clone(),
                 started: Some(underway.start.clone()),
-                heard: None,
+                progress: None,
                 ended: None,
                 cancelled: None,
+                timed_out: None,
+                is_in_doubt: false,
                 warned: None,
+                warned_timeout: None,
                 bearable: None,
                 measured: [Vec::new(), Vec::new()],
                 is_past: false,
@@ -151,10 +172,13 @@ impl Account {
                 step: None,
                 ordered: it.ordered,
                 started: it.started,
-                heard: it.heard,
+                progress: it.progress,
                 ended: it.ended,
                 cancelled: it.cancelled,
+                timed_out: it.timed_out,
+                is_in_doubt: it.is_in_doubt,
                 warned: it.warned,
+                warned_timeout: it.warned_timeout,
                 bearable: None,
                 measured: it.measured,
                 is_past: false,
@@ -175,10 +199,13 @@ impl Account {
             planned: it.planned.clone(),
             ordered: it.ordered.clone(),
             started: it.started.clone(),
-            heard: it.heard.clone(),
+            progress: it.progress.clone(),
             ended: it.ended.clone(),
             cancelled: it.cancelled.clone(),
+            timed_out: it.timed_out.clone(),
+            is_in_doubt: it.is_in_doubt,
             warned: it.warned.clone(),
+            warned_timeout: it.warned_timeout.clone(),
             measured: it.measured.clone(),
         });
         known.collect()
@@ -211,7 +238,7 @@ impl Account {
         let surplus = self.closed.len().saturating_sub(MOST_REPORTED);
         self.closed.drain(..surplus);
         self.entries.clear();
-        self.steps.clear();
+        self.plan.steps.clear();
         self.kept = 0;
     }
 
@@ -260,25 +287,28 @@ impl Account {
             step: Some(order.step),
             ordered: now.clone(),
             started: None,
-            heard: None,
+            progress: None,
             ended: None,
             cancelled: None,
+            timed_out: None,
+            is_in_doubt: false,
             warned: None,
+            warned_timeout: None,
             bearable: None,
             measured: [Vec::new(), Vec::new()],
             is_past: false,
         };
         self.entries.insert(ticket, opened);
-        self.steps.insert(order.step, ticket);
+        self.plan.steps.insert(order.step, ticket);
         self.open.insert(ticket);
         ticket
     }
 
     /// The steps of earlier plans no longer mean anything, but for those that go on.
     pub(super) fn begin_plan(&mut self, running: &BTreeMap<StepId, Ticket>) {
-        self.planned.clear();
-        self.waits.clear();
-        for ticket in std::mem::take(&mut self.steps).into_values() {
+        self.plan.planned.clear();
+        self.plan.waits.clear();
+        for ticket in std::mem::take(&mut self.plan.steps).into_values() {
             if let Some(entry) = self.entries.get_mut(&ticket) {
                 entry.step = None;
             }
@@ -287,8 +317,19 @@ impl Account {
             if let Some(entry) = self.entries.get_mut(ticket) {
                 entry.step = Some(*step);
             }
-            self.steps.insert(*step, *ticket);
+            self.plan.steps.insert(*step, *ticket);
         }
+    }
+
+    /// Returns the part of the present plan that has been started.
+    pub(super) fn plan(&self) -> &PlanAccount {
+        &self.plan
+    }
+
+    /// Continues with an earlier plan.
+    pub(super) fn resume_plan(&mut self, plan: PlanAccount) {
+        self.begin_plan(&plan.steps);
+        self.plan = plan;
     }
 
     /// When a start of the present plan was told, or the end of a step came that ended well.
@@ -314,33 +355,33 @@ impl Account {
                 },
             )
         });
-        self.planned = on_the_worlds_clock.collect();
-        self.waits = waits_of(mission);
+        self.plan.planned = on_the_worlds_clock.collect();
+        self.plan.waits = waits_of(mission);
     }
 
     /// What the start of a step that was noted waits for.
     pub(super) fn waits(&self, step: StepId) -> &[Wait] {
-        self.waits.get(&step).map_or(&[], Vec::as_slice)
+        self.plan.waits.get(&step).map_or(&[], Vec::as_slice)
     }
 
     /// The steps that were noted.
     pub(super) fn plan_steps(&self) -> &[(StepId, Step)] {
-        &self.planned
+        &self.plan.planned
     }
 
     /// The actions of the present plan that were started, or went on when it began.
     pub(super) fn of_plan(&self) -> impl Iterator<Item = (Ticket, &Opened)> + '_ {
-        let tickets = self.steps.values();
+        let tickets = self.plan.steps.values();
         tickets.filter_map(|ticket| Some((*ticket, self.get(*ticket)?)))
     }
 
     /// The steps of the present plan that were started, or went on when it began.
     pub(super) fn steps(&self) -> &BTreeMap<StepId, Ticket> {
-        &self.steps
+        &self.plan.steps
     }
 
     pub(super) fn ticket(&self, step: StepId) -> Option<Ticket> {
-        self.steps.get(&step).copied()
+        self.plan.steps.get(&step).copied()
     }
 
     pub(super) fn get(&self, ticket: Ticket) -> Option<&Opened> {
@@ -374,10 +415,27 @@ impl Account {
         self.open.remove(&ticket);
     }
 
-    pub(super) fn note_heard(&mut self, ticket: Ticket, time: &Rational) {
+    /// Notes the part that is done of an action, if that is more than before.
+    pub(super) fn note_progress(&mut self, ticket: Ticket, time: &Rational, done: &Rational) {
         if let Some(entry) = self.entries.get_mut(&ticket) {
-            let latest = entry.heard.take().into_iter().chain([time.clone()]).max();
-            entry.heard = latest;
+            let before = entry.progress.as_ref();
+            if before.map_or(done.is_positive(), |(_, before)| done > before) {
+                entry.progress = Some((time.clone(), done.clone()));
+            }
+        }
+    }
+
+    /// Notes that an action has reached its time-out.
+    pub(super) fn note_timeout(&mut self, ticket: Ticket, timeout: &Rational) {
+        if let Some(entry) = self.entries.get_mut(&ticket) {
+            entry.timed_out = Some(timeout.clone());
+        }
+    }
+
+    /// Notes whether it is unknown if an action has come to its end.
+    pub(super) fn note_doubt(&mut self, ticket: Ticket, is_in_doubt: bool) {
+        if let Some(entry) = self.entries.get_mut(&ticket) {
+            entry.is_in_doubt = is_in_doubt;
         }
     }
 
@@ -394,6 +452,12 @@ impl Account {
         }
     }
 
+    pub(super) fn note_timeout_warning(&mut self, ticket: Ticket, until: &Rational) {
+        if let Some(entry) = self.entries.get_mut(&ticket) {
+            entry.warned_timeout = Some(until.clone());
+        }
+    }
+
     pub(super) fn is_cancelled(&self, ticket: Ticket) -> bool {
         self.get(ticket)
             .is_some_and(|entry| entry.cancelled.is_some())
@@ -403,27 +467,6 @@ impl Account {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             entry.cancelled = Some(time.clone());
         }
-    }
-
-    /// Until when to wait for a word of an action. `allowed` is until when the present plan allows
-    /// it to run, if that has an end: so long, silence says nothing.
-    pub(super) fn limit(
-        &self,
-        ticket: Ticket,
-        patience: &Patience,
-        allowed: Option<Rational>,
-    ) -> Rational {
-        let Some(entry) = self.get(ticket) else {
-            return Rational::ZERO;
-        };
-        if let Some(cancelled) = &entry.cancelled {
-            return cancelled + &patience.at_least;
-        }
-        let planned = entry.planned.clone().unwrap_or_default();
-        let wait = (planned * &patience.factor).max(patience.at_least.clone());
-        let began = entry.started.as_ref().unwrap_or(&entry.ordered);
-        let limit = began.max(entry.heard.as_ref().unwrap_or(began)) + wait;
-        allowed.map_or(limit.clone(), |allowed| limit.max(allowed))
     }
 
     /// All that was started, did start and is not forgotten, as steps for the judge.
@@ -454,9 +497,12 @@ impl Account {
     }
 }
 
-/// The action with what was measured, and without what did not happen.
+/// Returns the action with the measured amounts, with its planned duration wherever it reads
+/// `?duration` before its end, and without the effects that did not happen.
 fn as_it_was(entry: &Opened, is_whole: bool) -> Action {
-    let mut action = Action::clone(&entry.action);
+    let planned = entry.planned.as_ref();
+    let planned = planned.and_then(|planned| entry.action.with_planned_duration(planned));
+    let mut action = planned.unwrap_or_else(|| Action::clone(&entry.action));
     match &mut action.body {
         Body::Instantaneous(snap) => put_in(snap, &entry.measured[0]),
         Body::Durative(body) => {

@@ -2,14 +2,16 @@
 
 use std::sync::Arc;
 
+use elbowroom_model::validate::{self, Verdict, validate};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use super::beginning::Course;
+use super::beginning::{Course, no_plan};
 use super::stand::TakesUp;
 use super::{Next, Run, Stop};
 use crate::event::{Command, Ticket};
 use crate::executor::{Mission, News};
+use crate::preparation::PrepareError;
 use crate::reason::{Cause, Reason};
 
 /// Something to do. Each takes no time in the world, but for [`Todo::Pass`] and [`Todo::Close`].
@@ -24,14 +26,14 @@ pub(super) enum Todo {
     Send(Command),
     /// Let time pass.
     Pass(Rational),
-    /// Give up what has been silent for too long.
-    GiveUpTheSilent,
-    /// Cancel an action that has been silent since then, and give it up.
-    GiveUp(Ticket, Rational),
-    /// It has been cancelled.
-    NoteSilence(Ticket, Rational),
+    /// Warn of time-outs, and cancel the actions that have reached theirs.
+    CheckTimeouts,
+    /// Cancel an action whose time-out was then, or end the wait for one that was cancelled.
+    TimeOut(Ticket, Rational),
     /// Wait until these have ended; without any named, until all have.
     Settle(Option<Vec<Ticket>>),
+    /// Wait until these actions have ended, unless the goals change or the number of doubts does.
+    Linger(Vec<Ticket>, usize),
     /// See what is to be done instead of the plan.
     Replan(Reason),
     /// Make a plan from here.
@@ -65,8 +67,13 @@ impl Run<'_> {
     pub(super) fn perform(&mut self, todo: Todo) -> Result<Option<Command>, Stop> {
         match todo {
             Todo::Begin(Some(plan)) => {
+                // A plan that is given is not retimed, unlike the rest of one that is late.
+                let verdict = validate(&self.task, &plan, &validate::Settings::default());
+                if let Verdict::Invalid(violation) = verdict {
+                    return Err(no_plan(&PrepareError::Invalid(Box::new(violation))));
+                }
                 let situation = Situation::initial(&self.task);
-                self.take_up(Course::of(&plan, &situation, &[]))?;
+                self.take_up(Course::of(&plan, &situation, &[]));
             }
             Todo::Begin(None) => self.replan(&Reason::new(Cause::NewPlan))?,
             Todo::Decide => self.decide_and_follow()?,
@@ -76,16 +83,13 @@ impl Run<'_> {
                 let until = until.min(self.settings.time_limit.clone());
                 self.asked = Some(Next::Wait { until });
             }
-            Todo::GiveUpTheSilent => self.give_up_the_silent(),
-            Todo::GiveUp(ticket, since) => {
-                self.agenda.push(Todo::NoteSilence(ticket, since));
-                self.cancel(vec![ticket]);
-            }
-            Todo::NoteSilence(ticket, since) => self.note_silence(ticket, since),
+            Todo::CheckTimeouts => self.check_timeouts(),
+            Todo::TimeOut(ticket, since) => self.time_out(ticket, since),
             Todo::Settle(awaited) => self.go_on_settling(awaited),
+            Todo::Linger(tickets, doubts) => self.linger(tickets, doubts),
             Todo::Replan(reason) => self.replan(&reason)?,
             Todo::Plan(reason) => self.plan_from_here(&reason)?,
-            Todo::Adopt(made) => self.adopt(made)?,
+            Todo::Adopt(made) => self.adopt(made),
             Todo::TakeUp(mission) => self.begin_mission(&mission)?,
             Todo::TakeUpAgain(task, it) => {
                 self.agenda.push(Todo::Tell(it.news.clone()));
@@ -95,7 +99,7 @@ impl Run<'_> {
                     running: &it.running,
                     begun: &it.begun,
                 };
-                self.take_up_for(&task, &it.goals, course)?;
+                self.take_up_for(&task, &it.goals, course);
             }
             Todo::Tell(news) => {
                 self.news.splice(0..0, news);

@@ -6,12 +6,13 @@ use std::sync::Arc;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
+use super::pending::Otherwise;
 use super::stand::Goals;
-use super::{Run, Stop, Verdict};
+use super::{MissingPlan, Run, Stop, Verdict};
 use crate::event::Ticket;
 use crate::executor::CAN_HAVE_A_CLOCK;
 use crate::executor::{Mission, News, StepId};
-use crate::preparation::{PrepareError, Wanted};
+use crate::preparation::PrepareError;
 use crate::record::Entry;
 
 /// A plan, and from where.
@@ -42,23 +43,15 @@ impl<'p> Course<'p> {
 }
 
 impl Run<'_> {
-    /// Makes a plan ready and begins with it.
-    pub(super) fn take_up(&mut self, course: Course<'_>) -> Result<(), Stop> {
+    /// Has a plan prepared, and begins with it.
+    pub(super) fn take_up(&mut self, course: Course<'_>) {
         let (task, goals) = (Arc::clone(&self.task), self.goals());
-        self.take_up_for(&task, &goals, course)
+        self.take_up_for(&task, &goals, course);
     }
 
     /// The same with a plan for these goals, which this task has.
-    pub(super) fn take_up_for(
-        &mut self,
-        task: &Task,
-        goals: &Goals,
-        course: Course<'_>,
-    ) -> Result<(), Stop> {
-        match self.prepare(task, course) {
-            Ok(mission) => self.begin_with(course, goals, &mission),
-            Err(error) => Err(no_plan(&error)),
-        }
+    pub(super) fn take_up_for(&mut self, task: &Arc<Task>, goals: &Goals, course: Course<'_>) {
+        self.await_preparation(task, goals, course, Otherwise::End);
     }
 
     /// Begins with a plan for these goals that is ready.
@@ -139,7 +132,7 @@ impl Run<'_> {
     }
 
     /// That it has started, as news.
-    fn beginning(&self, step: StepId, ticket: Ticket) -> Option<(Rational, News)> {
+    pub(super) fn beginning(&self, step: StepId, ticket: Ticket) -> Option<(Rational, News)> {
         let time = self.account.get(ticket)?.started.clone()?;
         let measured = Vec::new();
         let news = News::Started {
@@ -151,7 +144,7 @@ impl Run<'_> {
     }
 
     /// That it has ended, as news. What takes no time has, when it has started.
-    fn ending(&self, step: StepId, ticket: Ticket) -> Option<(Rational, News)> {
+    pub(super) fn ending(&self, step: StepId, ticket: Ticket) -> Option<(Rational, News)> {
         let entry = self.account.get(ticket)?;
         let (time, ending) = entry.ended.clone()?;
         if entry.planned.is_none() && entry.started.is_some() {
@@ -166,31 +159,11 @@ impl Run<'_> {
         };
         Some((time, news))
     }
-
-    pub(super) fn prepare(
-        &mut self,
-        task: &Task,
-        course: Course<'_>,
-    ) -> Result<Mission, PrepareError> {
-        if self.settings.plans_aside {
-            self.plan_task = Some(Arc::new(task.clone()));
-        }
-        let wanted = Wanted {
-            task,
-            plan: course.plan,
-            situation: course.situation,
-            running: course.running,
-            now: &self.now,
-            need: self.ports.executor.need(),
-        };
-        let mut mission = wanted.mission(&mut *self.ports.preparer)?;
-        mission.begun = self.steps_of(&mission, course.begun).unwrap_or_default();
-        Ok(mission)
-    }
 }
 
 /// The end of a run whose plan cannot be made ready.
 pub(super) fn no_plan(error: &PrepareError) -> Stop {
     let why = error.to_string();
-    Stop::Over(Verdict::NoPlan { why })
+    let missing = MissingPlan::NotSearched;
+    Stop::Over(Verdict::NoPlan { why, missing })
 }

@@ -38,6 +38,9 @@ pub(super) enum What {
 /// Limit on the work of reachability for an explanation: about a second.
 const MOST_STEPS: u64 = 10_000_000;
 
+/// The same limit for [`is_goal_unreachable`], which holds up a run: about a tenth of a second.
+const MOST_STEPS_MEANWHILE: u64 = 1_000_000;
+
 /// Limit on the number of parts of the goal that are explained.
 const MOST_NAMED: usize = 3;
 
@@ -60,7 +63,7 @@ impl Run<'_> {
         let mut past = self.past();
         let mut present = past.after(self.history.len());
         let _ = present.advance(&self.now);
-        let Some(lost) = unreachable(&present) else {
+        let Some(lost) = unreachable(&present, MOST_STEPS) else {
             return Vec::new();
         };
         if lost.is_empty() {
@@ -104,7 +107,7 @@ impl Past<'_> {
         if let Some(known) = self.known.get(&count) {
             return known.clone();
         }
-        let found = unreachable(&self.after(count));
+        let found = unreachable(&self.after(count), MOST_STEPS);
         self.known.insert(count, found.clone());
         found
     }
@@ -259,11 +262,16 @@ fn with_event(reason: Reason, event: Behind, time: Rational) -> Reason {
 }
 
 fn is_lost(state: &Progression, goal: &Condition) -> bool {
-    unreachable(state).is_some_and(|lost| lost.contains(goal))
+    unreachable(state, MOST_STEPS).is_some_and(|lost| lost.contains(goal))
+}
+
+/// Returns whether part of the goal can never become true any more. `false` if that cannot be said within a small limit.
+pub(super) fn is_goal_unreachable(state: &Progression) -> bool {
+    unreachable(state, MOST_STEPS_MEANWHILE).is_some_and(|lost| !lost.is_empty())
 }
 
 /// The parts of the goal that are out of reach, if that can be said within the limits.
-fn unreachable(state: &Progression) -> Option<Vec<Condition>> {
+fn unreachable(state: &Progression, step_limit: u64) -> Option<Vec<Condition>> {
     let running = state.running().values().map(|underway| {
         let duration = Interval::point(underway.planned.clone());
         state.running_action(underway, duration)
@@ -275,7 +283,7 @@ fn unreachable(state: &Progression) -> Option<Vec<Condition>> {
     };
     let task = Task::beginning_at(state.task(), &situation);
     let settings = reachability::Settings {
-        step_limit: MOST_STEPS,
+        step_limit,
         ..reachability::Settings::default()
     };
     match reachability::ground(&task, &settings) {

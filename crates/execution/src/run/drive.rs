@@ -1,14 +1,18 @@
-//! What drives a run: its questions to the world, and the answers.
+//! Interface to the driver: the requests of a run, and the answers.
 
 use elbowroom_model::ground::{FactId, FluentId};
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, work};
 
 use super::agenda::Todo;
 use super::{Report, Run, Stop, Verdict};
 use crate::event::{Command, Observation};
 use crate::reason::{About, Cause, Reason};
 use crate::record::Entry;
+use crate::request::{PlanRequest, PrepareRequest, RequestId, Workers};
 use crate::world::{Passage, World, WorldError};
+
+/// Work that is counted for each decision.
+const DECISION_WORK: u64 = 5_000;
 
 /// The next request of a run to its driver.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +31,13 @@ pub enum Next {
         /// Fluents.
         fluents: Vec<FluentId>,
     },
+    /// A plan is needed; then [`Run::planned`]. Repeated until then if the run waits for it
+    /// ([`Urgency::Awaited`](crate::Urgency::Awaited)); otherwise [`Run::next`] again.
+    Plan(PlanRequest),
+    /// A plan is to be prepared for the executor; then [`Run::prepared`], likewise.
+    Prepare(PrepareRequest),
+    /// The answer to this request is not needed any more; then [`Run::next`] again.
+    Abandon(RequestId),
     /// Nothing: the run is over.
     Over(Report),
 }
@@ -40,13 +51,16 @@ pub struct NotAsked {
 }
 
 impl Run<'_> {
-    /// The whole run in a world that blocks.
-    pub fn go(mut self, world: &mut dyn World) -> Report {
+    /// The whole run in a world that blocks, with workers that plan and prepare.
+    pub fn go(mut self, world: &mut dyn World, workers: &mut dyn Workers) -> Report {
         loop {
             let answered = match self.next() {
                 Next::Command(command) => world.command(&self.now, &command),
                 Next::Wait { until } => {
-                    let passage = world.wait(&until);
+                    let passage = workers.wait(world, &until);
+                    for answer in workers.answers() {
+                        self.answer(answer);
+                    }
                     passage.map(|passage| self.take_passage(passage))
                 }
                 Next::Look { facts, fluents } => {
@@ -59,6 +73,10 @@ impl Run<'_> {
                     }
                     Ok(())
                 }
+                request => {
+                    self.delegate(request, workers);
+                    Ok(())
+                }
             };
             if let Err(error) = answered {
                 self.fail(error);
@@ -66,16 +84,36 @@ impl Run<'_> {
         }
     }
 
-    /// What the run needs of the world next. As long as a question is open, it is asked again.
-    ///
-    /// Plans are made and made ready in here, so that this can take as long as the planner, but for those
-    /// that are made beside the run ([`RunSettings::plans_aside`](super::RunSettings::plans_aside)).
+    /// Has the workers answer a request for a plan or a prepared plan, or abandon it. Requests to the world are none of
+    /// theirs, and ignored.
+    pub fn delegate(&mut self, request: Next, workers: &mut dyn Workers) {
+        match request {
+            Next::Plan(request) => {
+                if let Some(planned) = workers.plan(&request) {
+                    self.planned(request.id, planned);
+                }
+            }
+            Next::Prepare(request) => {
+                if let Some(prepared) = workers.prepare(&request) {
+                    self.prepared(request.id, prepared);
+                }
+            }
+            Next::Abandon(id) => workers.abandon(id),
+            Next::Command(_) | Next::Wait { .. } | Next::Look { .. } | Next::Over(_) => {}
+        }
+    }
+
+    /// Returns the next request to the driver. A question for which the run waits is returned again until it is
+    /// answered.
     #[expect(
         clippy::should_implement_trait,
         reason = "a run is no iterator: what comes next depends on the answers"
     )]
     pub fn next(&mut self) -> Next {
         loop {
+            if let Some(request) = self.outbox.pop_front() {
+                return request;
+            }
             if let Some(report) = &self.report {
                 return Next::Over(report.clone());
             }
@@ -83,6 +121,7 @@ impl Run<'_> {
                 return asked.clone();
             }
             let todo = self.agenda.pop().unwrap_or(Todo::Decide);
+            work::spend(DECISION_WORK);
             match self.perform(todo) {
                 Ok(Some(command)) => return Next::Command(command),
                 Ok(None) => {}
@@ -120,6 +159,7 @@ impl Run<'_> {
     /// The world has failed, and is asked nothing more.
     pub fn fail(&mut self, error: WorldError) {
         self.asked = None;
+        self.pending = None;
         if self.report.is_none() {
             self.stop(Stop::World(error));
         }
@@ -131,10 +171,14 @@ impl Run<'_> {
     }
 
     /// Takes in an answer of the world to [`Next::Wait`].
-    fn take_passage(&mut self, passage: Passage) {
+    fn take_passage(&mut self, mut passage: Passage) {
         let Some(Next::Wait { until }) = self.asked.take() else {
             return;
         };
+        if is_rounded(&passage.now, &until) {
+            passage.now.clone_from(&until);
+        }
+        passage.observations.extend(self.arrivals(&passage.now));
         self.ports.recorder.record(&Entry::Passed {
             until: &until,
             now: &passage.now,
@@ -177,6 +221,9 @@ impl Run<'_> {
 
     fn after_look(&mut self) -> Result<(), Stop> {
         self.heed()?;
+        if std::mem::take(&mut self.lost.inquiry.is_open) {
+            return Ok(());
+        }
         if self.is_to_turn() {
             return Ok(());
         }
@@ -186,4 +233,11 @@ impl Run<'_> {
         self.news.clear();
         self.replan(&Reason::new(Cause::Surprise).about(About::SeenAtTheEnd))
     }
+}
+
+/// Returns whether a time is less than another one, but equal up to the rounding of a world that computes with doubles.
+/// If it counted as less, such a world could be asked for the same time for ever.
+fn is_rounded(time: &Rational, exact: &Rational) -> bool {
+    let least_distinct = exact * &Rational::new(1, 1 << 50);
+    time < exact && exact - time <= least_distinct
 }

@@ -15,6 +15,7 @@ use super::here::Guess;
 use crate::event::Ticket;
 use crate::executor::CAN_HAVE_A_CLOCK;
 use crate::executor::StepId;
+use crate::request::Urgency;
 
 /// Where a plan will be needed if what is late does not end, as the planner was told.
 pub(super) struct Foreseen {
@@ -61,7 +62,7 @@ impl Run<'_> {
         let until = self.next_need().unwrap_or_else(|| until.clone());
         let time = &until + self.margin() + self.task.epsilon();
         let prospect = self.what_is_foreseen(&until, &until, time);
-        self.ports.planner.expect(&self.task, &prospect.situation);
+        self.request_plan(&prospect.situation, Urgency::Foreseen);
         self.foreseen = Some(Foreseen {
             prospect,
             since: self.now.clone(),

@@ -1,26 +1,36 @@
 //! From one plan to the next.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
-use elbowroom_model::Situation;
+use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 
 use super::agenda::{Made, Todo};
 use super::beginning::Course;
 use super::here::{Guess, situation_at};
-use super::{PlanningTime, Run, RunningRule, Stop, Verdict};
+use super::{MissingPlan, PlanningTime, Run, RunningRule, Stop, Verdict};
 use crate::event::Ticket;
-use crate::planning::PlanAnswer;
+use crate::planning::{PlanAnswer, Planned};
 use crate::reason::Reason;
 use crate::record::Entry;
 
-/// An answer of the planner, and to what.
-struct Attempt {
-    answer: PlanAnswer,
-    situation: Situation,
+/// Request for a plan for which the run waits.
+pub(super) struct Attempt {
+    reason: Reason,
+    guess: Guess,
+    pub(super) situation: Situation,
     running: Vec<Ticket>,
-    /// When the time has passed that planning took.
-    ready: Rational,
+}
+
+/// The next attempt after no plan was found.
+pub(super) enum NextAttempt {
+    /// A plan with this guess about overdue actions.
+    Guess(Guess),
+    /// A plan without the overdue actions.
+    CancelOverdue,
+    /// The present plan.
+    CarryOn,
 }
 
 impl Run<'_> {
@@ -41,8 +51,8 @@ impl Run<'_> {
         }
     }
 
-    /// Waits for what is awaited, if it has not ended. Each wait ends by the end of somebody's
-    /// patience: what stays silent is given up.
+    /// Waits for the awaited actions that have not ended. Each wait ends at a warning or a time-out at
+    /// the latest.
     pub(super) fn go_on_settling(&mut self, awaited: Option<Vec<Ticket>>) {
         if let Some(lost) = &awaited {
             // Until it has stopped, it counts as running.
@@ -51,11 +61,29 @@ impl Run<'_> {
                 return;
             }
         }
-        let Some(until) = self.next_silence() else {
+        self.wait_until_timeout(Todo::Settle(awaited));
+    }
+
+    /// Waits for these actions, although a plan could be requested without their ends. The wait ends if that has become
+    /// more urgent: the goals have changed, or doubts have been settled or have arisen.
+    pub(super) fn linger(&mut self, tickets: Vec<Ticket>, doubts: usize) {
+        let mut running = tickets.iter();
+        if running.any(|ticket| self.belief.running().contains_key(ticket))
+            && self.belief.doubt_count() == doubts
+            && !self.is_to_turn()
+        {
+            self.wait_until_timeout(Todo::Linger(tickets, doubts));
+        }
+    }
+
+    /// Waits until the next time-out or its warning at the latest, and goes on with this then. If nothing can time out,
+    /// nothing is running.
+    fn wait_until_timeout(&mut self, todo: Todo) {
+        let Some(until) = self.next_timeout() else {
             return;
         };
-        self.agenda.push(Todo::Settle(awaited));
-        self.agenda.push(Todo::GiveUpTheSilent);
+        self.agenda.push(todo);
+        self.agenda.push(Todo::CheckTimeouts);
         let until = until.max(self.now.clone());
         self.agenda.push(Todo::Pass(until));
     }
@@ -71,7 +99,7 @@ impl Run<'_> {
         self.account.open_tickets().filter(is_lost).collect()
     }
 
-    /// Asks the planner; the plan is taken up when the time that this takes has passed.
+    /// Requests a plan; see [`Run::take_plan`] for its answer.
     pub(super) fn plan_from_here(&mut self, reason: &Reason) -> Result<(), Stop> {
         if self.is_to_turn() {
             return Ok(());
@@ -81,6 +109,10 @@ impl Run<'_> {
             self.stay();
             return Ok(());
         }
+        if self.inquire(reason) {
+            return Ok(());
+        }
+        self.stop_if_goal_is_in_doubt()?;
         if self.plans_aside() {
             self.search_from_here(reason);
             return Ok(());
@@ -89,50 +121,40 @@ impl Run<'_> {
         if self.go_without_plan(reason) {
             return Ok(());
         }
-        let mut attempt = self.attempt(reason, Guess::AQuarterLonger)?;
-        let overdue = self.overdue();
-        let has_none = |attempt: &Attempt| !matches!(attempt.answer, PlanAnswer::Plan(_));
-        if self.settings.watches_room && has_none(&attempt) && !overdue.is_empty() {
-            // What is overdue may still end in time.
-            attempt = self.attempt(reason, Guess::AnyMoment)?;
-            if has_none(&attempt) {
-                // No plan can bear that it goes on: it has failed, and the next one does without.
-                self.agenda.push(Todo::Plan(reason.clone()));
-                self.agenda.push(Todo::Settle(Some(overdue.clone())));
-                self.agenda.push(Todo::Cancel(overdue));
-                return Ok(());
-            }
-        }
-        let plan = match attempt.answer {
-            PlanAnswer::Unsolvable => return Err(Stop::Over(Verdict::Unsolvable)),
-            PlanAnswer::NotFound { why } => return Err(Stop::Over(Verdict::NoPlan { why })),
-            PlanAnswer::Failed { why } => return Err(Stop::Over(Verdict::PlannerFailed { why })),
-            PlanAnswer::Plan(plan) => plan,
-        };
-        // What ends from now on is no step of the plan that was given up, and not yet one of the
-        // new plan: what it changes is news, and the new plan is told of its end.
-        self.account.begin_plan(&BTreeMap::new());
-        self.agenda.push(Todo::Adopt(Box::new(Made {
-            plan,
-            situation: attempt.situation,
-            running: attempt.running,
-            ready: attempt.ready,
-        })));
-        Ok(())
+        self.attempt(reason, Guess::AQuarterLonger)
     }
 
-    /// Asks the planner once.
-    fn attempt(&mut self, reason: &Reason, guess: Guess) -> Result<Attempt, Stop> {
+    /// Requests a plan, for which the run waits.
+    fn attempt(&mut self, reason: &Reason, guess: Guess) -> Result<(), Stop> {
         let foreseen = self.as_foreseen(guess);
         let foreseen = foreseen.map(|it| (it.prospect.situation, it.prospect.running));
         let (situation, running) =
             foreseen.unwrap_or_else(|| self.situation(&self.allowance, guess));
+        let is_known = |(task, known, before): &(Arc<Task>, Situation, Guess)| {
+            Arc::ptr_eq(task, &self.task) && *known == situation && *before == guess
+        };
+        if self.planned_for.as_ref().is_some_and(is_known) {
+            let why = format!("the executor rejects the plan that exists: {reason}");
+            let missing = MissingPlan::Rejected;
+            return self.carry_on_or_stop(Verdict::NoPlan { why, missing });
+        }
         self.ports.recorder.record(&Entry::Planning {
             now: &self.now,
             reason,
             situation: &situation,
         });
-        let planned = self.ports.planner.plan(&self.task, &situation);
+        self.await_plan(Attempt {
+            reason: reason.clone(),
+            guess,
+            situation,
+            running,
+        });
+        Ok(())
+    }
+
+    /// Takes in the answer to a request for which the run has waited. The plan is adopted when the time has passed
+    /// that planning took.
+    pub(super) fn take_plan(&mut self, attempt: Attempt, planned: Planned) -> Result<(), Stop> {
         let took = match &self.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             // The world's time begins when there is a first plan.
@@ -151,12 +173,61 @@ impl Run<'_> {
             remark: planned.remark.as_deref(),
         });
         self.heed()?;
-        Ok(Attempt {
-            answer: planned.answer,
-            situation,
-            running,
+        let plan = match planned.answer {
+            PlanAnswer::Plan(_) if attempt.guess == Guess::Cancelled => {
+                self.cancel_overdue(attempt.reason);
+                return Ok(());
+            }
+            PlanAnswer::Plan(plan) => {
+                let task = Arc::clone(&self.task);
+                self.planned_for = Some((task, attempt.situation.clone(), attempt.guess));
+                plan
+            }
+            answer => {
+                let next = self.next_attempt(attempt.guess);
+                return match next {
+                    NextAttempt::Guess(guess) => self.attempt(&attempt.reason, guess),
+                    NextAttempt::CancelOverdue => {
+                        self.cancel_overdue(attempt.reason);
+                        Ok(())
+                    }
+                    NextAttempt::CarryOn => self.go_on_without_plan(&answer, attempt.reason),
+                };
+            }
+        };
+        // Actions that end before the adoption belong to neither plan. Their effects are news, and the new plan
+        // receives their ends.
+        self.account.begin_plan(&BTreeMap::new());
+        self.agenda.push(Todo::Adopt(Box::new(Made {
+            plan,
+            situation: attempt.situation,
+            running: attempt.running,
             ready,
-        })
+        })));
+        Ok(())
+    }
+
+    /// Returns the next attempt after no plan was found with this guess about overdue actions.
+    pub(super) fn next_attempt(&self, guess: Guess) -> NextAttempt {
+        if !self.settings.watches_room || self.overdue().is_empty() {
+            return NextAttempt::CarryOn;
+        }
+        match guess {
+            // Overdue actions may still end in time.
+            Guess::AQuarterLonger => NextAttempt::Guess(Guess::AnyMoment),
+            // They are not cancelled in vain.
+            Guess::AnyMoment if self.may_carry_on() => NextAttempt::Guess(Guess::Cancelled),
+            Guess::AnyMoment => NextAttempt::CancelOverdue,
+            Guess::Cancelled => NextAttempt::CarryOn,
+        }
+    }
+
+    /// Cancels the overdue actions, which count as failed then, and requests a plan.
+    pub(super) fn cancel_overdue(&mut self, reason: Reason) {
+        let overdue = self.overdue();
+        self.agenda.push(Todo::Plan(reason));
+        self.agenda.push(Todo::Settle(Some(overdue.clone())));
+        self.agenda.push(Todo::Cancel(overdue));
     }
 
     /// Learns from what a plan took what the next one will take: as much, if that is more than was
@@ -168,20 +239,20 @@ impl Run<'_> {
     }
 
     /// Takes up a plan, as soon as the time is over that it took to make it.
-    pub(super) fn adopt(&mut self, made: Box<Made>) -> Result<(), Stop> {
+    pub(super) fn adopt(&mut self, made: Box<Made>) {
         if self.is_to_turn() {
             // It was made for other goals.
-            return Ok(());
+            return;
         }
         if self.now < made.ready {
             let ready = made.ready.clone();
             self.agenda.push(Todo::Adopt(made));
             self.agenda.push(Todo::Pass(ready));
-            return Ok(());
+            return;
         }
         let surprises = std::mem::take(&mut self.news);
         self.agenda.push(Todo::Tell(surprises));
-        self.take_up(Course::of(&made.plan, &made.situation, &made.running))
+        self.take_up(Course::of(&made.plan, &made.situation, &made.running));
     }
 
     /// Where things will stand when the new plan can begin: after the time that planning is
@@ -201,6 +272,13 @@ impl Run<'_> {
 
     /// The same at this time, or ε after the timed initials that come just before it.
     pub(super) fn situation_at(&self, time: Rational, guess: Guess) -> (Situation, Vec<Ticket>) {
-        situation_at(&self.belief, time, guess)
+        if guess != Guess::Cancelled {
+            return situation_at(&self.belief, time, guess);
+        }
+        let mut belief = self.belief.clone();
+        for ticket in self.overdue() {
+            belief.stop(ticket);
+        }
+        situation_at(&belief, time, guess)
     }
 }

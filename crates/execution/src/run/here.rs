@@ -17,6 +17,8 @@ pub enum Guess {
     AQuarterLonger,
     /// As soon as it can: if there is no plan even then, there is none with it.
     AnyMoment,
+    /// It does not end: it is cancelled.
+    Cancelled,
 }
 
 /// Where things will stand at `time` if nothing ends before that, or ε after the timed initials
@@ -46,7 +48,7 @@ pub fn situation_at(
             let expected = match guess {
                 _ if underway.planned > elapsed => underway.planned.clone(),
                 Guess::AQuarterLonger => elapsed * Rational::new(5, 4),
-                Guess::AnyMoment => elapsed + epsilon,
+                Guess::AnyMoment | Guess::Cancelled => elapsed + epsilon,
             };
             state.running_action(underway, Interval::point(expected))
         })

@@ -1,10 +1,11 @@
 //! Taking in what the world reports: each report once, and no report against reason.
 
+use std::sync::Arc;
+
 use elbowroom_model::ground::{Action, Body, Change, Expression};
 use elbowroom_num::Rational;
 
 use super::Run;
-use super::agenda::Todo;
 use super::dead_end::What;
 use crate::event::{Ending, Event, Measured, Observation, Ticket};
 use crate::executor::{Amount, News, Planned};
@@ -24,7 +25,7 @@ impl Run<'_> {
     /// Believes what is reported, as far as it can be believed, and notes what is new.
     pub(super) fn take_in(&mut self, observations: Vec<Observation>) {
         for observation in observations {
-            let planned = self.planned(&observation.event);
+            let planned = self.planned_window(&observation.event);
             let remark = self.take(&observation);
             self.ports.recorder.record(&Entry::Taken {
                 now: &self.now,
@@ -39,7 +40,7 @@ impl Run<'_> {
         (self.listener)(&self.belief);
     }
 
-    fn planned(&self, event: &Event) -> Planned {
+    fn planned_window(&self, event: &Event) -> Planned {
         let (ticket, is_end) = match event {
             Event::Started { ticket, .. } => (*ticket, false),
             Event::Ended { ticket, .. } => (*ticket, true),
@@ -66,7 +67,9 @@ impl Run<'_> {
                 ending,
                 measured,
             } => self.ended(*ticket, &time, ending, measured),
-            Event::Feedback { ticket, .. } => self.heard(*ticket, &time),
+            Event::Feedback {
+                ticket, completion, ..
+            } => self.progressed(*ticket, &time, completion.as_ref()),
             Event::Fact { fact, truth } => {
                 self.believe_until(&time);
                 if self.task.is_derived(*fact) {
@@ -99,13 +102,15 @@ impl Run<'_> {
         remark.or(is_early.then_some("its time is in the future; taken as now"))
     }
 
-    /// An action gives a sign of life: so long it has not been silent.
-    fn heard(&mut self, ticket: Ticket, time: &Rational) -> Remark {
+    /// An action reports the part of it that is done.
+    fn progressed(&mut self, ticket: Ticket, time: &Rational, done: Option<&Rational>) -> Remark {
         match self.account.recent(ticket) {
             None => Some(self.unknown(ticket)),
             Some(entry) if entry.ended.is_some() => Some("it had ended already"),
             Some(_) => {
-                self.account.note_heard(ticket, time);
+                if let Some(done) = done {
+                    self.account.note_progress(ticket, time, done);
+                }
                 None
             }
         }
@@ -122,7 +127,7 @@ impl Run<'_> {
 
     /// The belief is never taken back in time, so a late report changes the present state. What is
     /// reported of one time is one group.
-    fn believe_until(&mut self, time: &Rational) {
+    pub(super) fn believe_until(&mut self, time: &Rational) {
         let _ = self.belief.arrive(time);
     }
 
@@ -177,6 +182,9 @@ impl Run<'_> {
             return Some(self.unknown(ticket));
         };
         if let Some((_, earlier)) = &entry.ended {
+            if entry.is_in_doubt {
+                return self.ended_after_all(ticket, time, ending, measured);
+            }
             let is_same = std::mem::discriminant(earlier) == std::mem::discriminant(ending);
             let are_both_without_end =
                 *earlier != Ending::Succeeded && *ending != Ending::Succeeded;
@@ -220,6 +228,11 @@ impl Run<'_> {
             .is_some_and(|entry| entry.ended.is_some());
         if is_over {
             return was_silent.then_some("its start was not reported");
+        }
+        let timed_out = self.account.get(ticket).and_then(|it| it.timed_out.clone());
+        if let Some(since) = timed_out.filter(|_| *ending != Ending::Succeeded) {
+            self.end_timed_out(ticket, &time, since);
+            return None;
         }
         self.account.note_end(ticket, &time, ending, measured);
         match step {
@@ -272,10 +285,7 @@ impl Run<'_> {
             return;
         };
         let action = entry.action.clone();
-        match &action.body {
-            Body::Instantaneous(snap) => self.belief.doubt(snap),
-            Body::Durative(body) => self.belief.doubt(&body.end),
-        }
+        self.doubt(ticket, &action, true);
         self.note_disagreement();
         self.news.push(News::Contradiction {
             action: action.name.clone(),
@@ -300,53 +310,40 @@ impl Run<'_> {
         }
     }
 
-    /// Until when to wait for a word of each action that has not ended.
-    fn limits(&self) -> impl Iterator<Item = (Ticket, Rational)> + '_ {
-        self.account.open_tickets().map(|ticket| {
-            let step = self.account.get(ticket).and_then(|entry| entry.step);
-            let window = step.and_then(|step| self.ports.executor.window(step, true));
-            let allowed = window.and_then(|window| window.latest);
-            let limit = self.account.limit(ticket, &self.settings.patience, allowed);
-            (ticket, limit)
-        })
-    }
-
-    /// When patience with an action ends next.
-    pub(super) fn next_silence(&self) -> Option<Rational> {
-        self.limits().map(|(_, limit)| limit).min()
-    }
-
-    /// Gives up the actions of which nothing has been heard for too long.
-    pub(super) fn give_up_the_silent(&mut self) {
-        let limits = self.limits();
-        let silent: Vec<_> = limits.filter(|(_, limit)| *limit <= self.now).collect();
-        let silent = silent.into_iter().rev();
-        let given_up = silent.map(|(ticket, since)| Todo::GiveUp(ticket, since));
-        self.agenda.extend(given_up);
-    }
-
-    /// An action that was silent for too long has been cancelled.
-    pub(super) fn note_silence(&mut self, ticket: Ticket, since: Rational) {
-        let entry = self.account.get(ticket);
-        let Some((action, step)) = entry.map(|entry| (entry.action.clone(), entry.step)) else {
+    /// Cancels an action that has reached its time-out. If it was cancelled before and has not ended, it counts as
+    /// failed, and it is unknown whether it has come to its end.
+    pub(super) fn time_out(&mut self, ticket: Ticket, since: Rational) {
+        let Some(entry) = self.account.get(ticket) else {
             return;
         };
+        if entry.cancelled.is_none() {
+            self.account.note_timeout(ticket, &since);
+            self.cancel(vec![ticket]);
+            return;
+        }
+        let since = entry.timed_out.clone().unwrap_or(since);
+        let (action, has_started) = (Arc::clone(&entry.action), entry.started.is_some());
         self.belief.stop(ticket);
         self.note_disagreement();
         let now = self.now.clone();
         self.note(&now, What::Stopped(ticket));
-        // Whether its end took place is not known.
-        if let Body::Durative(body) = &action.body {
-            self.belief.doubt(&body.end);
-        }
-        let why = "nothing was heard of it".to_owned();
+        self.doubt(ticket, &action, has_started);
+        self.account.note_doubt(ticket, true);
+        self.end_timed_out(ticket, &now, since);
+    }
+
+    /// An action that has timed out has ended without its effects, or counts as ended.
+    fn end_timed_out(&mut self, ticket: Ticket, time: &Rational, since: Rational) {
+        let entry = self.account.get(ticket);
+        let Some((action, step)) = entry.map(|entry| (entry.action.name.clone(), entry.step))
+        else {
+            return;
+        };
+        let why = "it timed out".to_owned();
         self.account
-            .note_end(ticket, &now, &Ending::Failed { why }, &[]);
+            .note_end(ticket, time, &Ending::Failed { why }, &[]);
         if step.is_some() {
-            self.news.push(News::Silence {
-                action: action.name.clone(),
-                since,
-            });
+            self.news.push(News::Silence { action, since });
         }
     }
 }

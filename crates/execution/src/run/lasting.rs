@@ -30,6 +30,7 @@ use super::beginning::Course;
 use super::goals::OpenGoal;
 use super::here::{Guess, rest_of};
 use super::intake::Remark;
+use super::pending::Otherwise;
 use super::search::Lost;
 use super::{Run, Stop, Verdict};
 use crate::event::{Request, Ticket};
@@ -283,14 +284,9 @@ impl<'a> Run<'a> {
             }
             let (plan, situation, running) = rest;
             let course = Course::of(&plan, &situation, &running);
-            if let Ok(mission) = self.prepare(&Arc::clone(&self.task), course) {
-                self.ports.recorder.record(&Entry::Kept {
-                    now: &self.now,
-                    reason: &turn.reason,
-                });
-                let goals = self.goals();
-                return self.begin_with(course, &goals, &mission);
-            }
+            let (task, goals) = (Arc::clone(&self.task), self.goals());
+            self.await_preparation(&task, &goals, course, Otherwise::PlanForOthers(turn));
+            return Ok(());
         }
         self.plan_for_others(&turn)
     }
@@ -379,15 +375,15 @@ impl<'a> Run<'a> {
 
     /// Lets time pass without asking the executor.
     pub(super) fn stay(&mut self) {
-        let silence = self.next_silence();
+        let timeout = self.next_timeout();
         let soon = self.lasting.as_ref().and_then(|lasting| {
             let since = lasting.rests_since.as_ref()?;
             let is_waiting = !lasting.is_paused && !self.news.is_empty();
             is_waiting.then(|| since + Rational::from(BREATH))
         });
-        let until = silence.into_iter().chain(soon).min();
+        let until = timeout.into_iter().chain(soon).min();
         let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
-        self.agenda.push(Todo::GiveUpTheSilent);
+        self.agenda.push(Todo::CheckTimeouts);
         self.agenda.push(Todo::Pass(until.max(self.now.clone())));
     }
 

@@ -55,9 +55,9 @@ impl Run<'_> {
             return false;
         }
         self.agenda.push(Todo::Replan(reason.clone()));
-        self.agenda.push(Todo::GiveUpTheSilent);
-        let silence = self.next_silence().into_iter();
-        let until = silence.chain([until]).min().unwrap_or_default();
+        self.agenda.push(Todo::CheckTimeouts);
+        let timeout = self.next_timeout().into_iter();
+        let until = timeout.chain([until]).min().unwrap_or_default();
         self.agenda.push(Todo::Pass(until.max(self.now.clone())));
         true
     }

@@ -5,7 +5,7 @@ use elbowroom_num::Rational;
 use super::Run;
 use crate::event::Ticket;
 use crate::executor::{CAN_HAVE_A_CLOCK, StepId};
-use crate::record::Entry;
+use crate::record::{Entry, WarningCause};
 
 /// What is under way and late, and until when the plan can bear it.
 struct Late {
@@ -48,6 +48,7 @@ impl Run<'_> {
                 ticket: late.ticket,
                 action: &late.action,
                 until: &late.until,
+                cause: WarningCause::Slack,
             });
             next = next.into_iter().chain([late.until]).min();
         }
@@ -106,12 +107,18 @@ impl Run<'_> {
         })
     }
 
-    /// What runs for longer than it was planned to, and was not told to stop.
+    /// Returns the overdue actions: those that run for longer than planned and have not been cancelled.
     pub(super) fn overdue(&self) -> Vec<Ticket> {
+        let mut overdue = self.longer_than_planned();
+        overdue.retain(|ticket| !self.account.is_cancelled(*ticket));
+        overdue
+    }
+
+    /// Returns the actions that run for longer than planned.
+    pub(super) fn longer_than_planned(&self) -> Vec<Ticket> {
         let running = self.belief.running().iter();
-        let overdue = running.filter(|(ticket, underway)| {
-            !self.account.is_cancelled(**ticket) && &self.now - &underway.start >= underway.planned
-        });
+        let overdue =
+            running.filter(|(_, underway)| &self.now - &underway.start >= underway.planned);
         overdue.map(|(ticket, _)| *ticket).collect()
     }
 }

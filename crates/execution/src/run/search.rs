@@ -11,8 +11,12 @@ use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use super::agenda::Todo;
+use super::carrying_on::Abandoned;
+use super::dead_end::is_goal_unreachable;
+use super::doubts::Inquiry;
 use super::expectation::{Expected, Prospect};
 use super::foresight::Ahead;
+use super::handover::NextAttempt;
 use super::here::Guess;
 use super::intake::Remark;
 use super::lasting::Turn;
@@ -26,6 +30,7 @@ use crate::planning::{PlanAnswer, Planned};
 use crate::progression::Progression;
 use crate::reason::{About, Cause, Reason};
 use crate::record::Entry;
+use crate::request::{RequestId, Urgency};
 use ready::Readying;
 
 /// So many searches in a row are ended at once because goals were abandoned. The next one is let go on
@@ -47,7 +52,11 @@ const WORD: i64 = 1;
 
 /// A plan in the making, or one that waits to take over.
 pub(super) struct Search {
-    reason: Reason,
+    /// The request for the plan.
+    request: RequestId,
+    /// The answer, until it is taken in.
+    answer: Option<Planned>,
+    pub(super) reason: Reason,
     guess: Guess,
     /// With the goals that it is made for.
     task: Arc<Task>,
@@ -66,6 +75,8 @@ pub(super) struct Search {
     /// Whether its situation was foreseen, and things stood otherwise by a little when it was begun.
     is_guess: bool,
     course: Goes,
+    /// The number of timed initials after which the goal was last known not to be out of reach.
+    timed: usize,
     is_made: bool,
     /// Whether something has happened since that nobody expected.
     is_overtaken: bool,
@@ -79,6 +90,33 @@ pub(super) struct Search {
     left_behind: BTreeMap<StepId, Ticket>,
     /// Which change of the goals the plan is kept for, if none was looked for.
     kept_for: Option<Turn>,
+}
+
+impl Search {
+    /// Takes the answer to the request for the plan. If the run waits in the world, the end of the wait notes it.
+    pub(super) fn take_answer(&mut self, id: RequestId, planned: Planned, is_waiting: bool) {
+        if id == self.request && self.answer.is_none() && !self.is_made {
+            self.answer = Some(planned);
+            self.is_made = !is_waiting;
+        }
+    }
+
+    /// Returns whether answers have arrived that are not noted yet: a plan, and a prepared plan.
+    pub(super) fn arrived(&self) -> (bool, bool) {
+        let is_made = self.answer.is_some() && !self.is_made;
+        (
+            is_made,
+            self.readying.as_ref().is_some_and(Readying::has_arrived),
+        )
+    }
+
+    /// Returns the request that has no answer yet.
+    fn open_request(&self) -> Option<RequestId> {
+        match &self.readying {
+            Some(readying) => readying.open_request(),
+            None => (!self.is_made && self.answer.is_none()).then_some(self.request),
+        }
+    }
 }
 
 /// What goes on during a search.
@@ -95,6 +133,10 @@ enum Goes {
 pub(super) struct Lost {
     /// Whether the present plan works no more.
     pub(super) plan: bool,
+    /// The doubts that the world has been asked about.
+    pub(super) inquiry: Inquiry,
+    /// The plan that the executor abandoned, until another one is adopted.
+    pub(super) abandoned: Option<Abandoned>,
     /// How many plans in a row were outdated when they came.
     outdated: usize,
     /// How many searches in a row were ended because goals were abandoned.
@@ -117,7 +159,7 @@ impl Run<'_> {
     /// The planner says that it is done.
     pub(super) fn note_plan_made(&mut self) -> Remark {
         match &mut self.search {
-            Some(search) if !search.is_made => {
+            Some(search) if !search.is_made && search.answer.is_some() => {
                 search.is_made = true;
                 None
             }
@@ -212,9 +254,10 @@ impl Run<'_> {
             reason: &reason,
             situation: &prospect.situation,
         });
-        // Who cannot plan beside the run is waited for.
-        let is_made = !self.ports.planner.begin(&self.task, &prospect.situation);
+        let request = self.request_plan(&prospect.situation, Urgency::Background);
         self.search = Some(Search {
+            request,
+            answer: None,
             reason,
             guess,
             task: Arc::clone(&self.task),
@@ -223,10 +266,11 @@ impl Run<'_> {
             running: prospect.running,
             expected: prospect.expected,
             begun: self.now.clone(),
+            timed: self.belief.timed_past(),
             since: ahead.since,
             is_guess: ahead.is_guess,
             course,
-            is_made,
+            is_made: false,
             is_overtaken: false,
             plan: None,
             readying: None,
@@ -239,10 +283,10 @@ impl Run<'_> {
     /// Ends a search whose plan is not needed any more.
     pub(super) fn give_up_search(&mut self) {
         if let Some(search) = self.search.take() {
-            if search.readying.is_some() {
-                self.ports.preparer.give_up();
+            let open = search.open_request();
+            if let Some(id) = open {
+                self.abandon(id);
             }
-            self.ports.planner.give_up();
         }
     }
 
@@ -284,8 +328,18 @@ impl Run<'_> {
         }
         match &search.course {
             Goes::Plan { until: Some(until) } => until.clone(),
-            // Whoever makes the plan says when it is there.
-            _ => self.settings.time_limit.clone(),
+            Goes::Plan { until: None } => self.settings.time_limit.clone(),
+            // A deadline may pass before the planner answers.
+            Goes::UnderWay => {
+                let timed = self.belief.next_timed();
+                let limit = &self.settings.time_limit;
+                timed
+                    .into_iter()
+                    .chain([limit])
+                    .min()
+                    .unwrap_or(limit)
+                    .clone()
+            }
         }
     }
 
@@ -343,7 +397,23 @@ impl Run<'_> {
         {
             self.let_go_of_plan();
         }
+        self.restart_if_out_of_reach();
         Ok(self.waits_for_plan())
+    }
+
+    /// Restarts a search that is in vain, because deadlines have passed since it began. From here, that is known at
+    /// once, with a certificate.
+    fn restart_if_out_of_reach(&mut self) {
+        let timed = self.belief.timed_past();
+        let Some(search) = self.search.as_mut().filter(|it| it.timed < timed) else {
+            return;
+        };
+        search.timed = timed;
+        if search.course == Goes::UnderWay && is_goal_unreachable(&self.belief) {
+            let (reason, guess) = (search.reason.clone(), search.guess);
+            self.give_up_search();
+            self.search(reason, guess, Goes::UnderWay);
+        }
     }
 
     /// Lets time pass, if nothing goes on but what is under way.
@@ -358,10 +428,10 @@ impl Run<'_> {
 
     /// Lets time pass, until something about the search is to be decided.
     fn wait_for_search(&mut self) {
-        let silence = self.next_silence().into_iter();
-        let until = silence.chain(self.next_of_search()).min();
+        let timeout = self.next_timeout().into_iter();
+        let until = timeout.chain(self.next_of_search()).min();
         let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
-        self.agenda.push(Todo::GiveUpTheSilent);
+        self.agenda.push(Todo::CheckTimeouts);
         self.agenda.push(Todo::Pass(until.max(self.now.clone())));
     }
 
@@ -370,8 +440,9 @@ impl Run<'_> {
         let Some(mut search) = self.search.take() else {
             return Ok(());
         };
-        let Planned { answer, remark, .. } =
-            self.ports.planner.collect(&self.task, &search.situation);
+        let Some(Planned { answer, remark, .. }) = search.answer.take() else {
+            return Ok(());
+        };
         let took = &self.now - &search.begun;
         self.expect(&took);
         self.ports.recorder.record(&Entry::Planned {
@@ -385,6 +456,10 @@ impl Run<'_> {
         });
         self.heed()?;
         match answer {
+            PlanAnswer::Plan(_) if search.guess == Guess::Cancelled => {
+                self.cancel_overdue(search.reason);
+                Ok(())
+            }
             PlanAnswer::Plan(plan) if search.course == Goes::UnderWay => {
                 search.plan = Some((plan.clone(), self.now.clone()));
                 self.take_over_from_nothing(search, &plan, true)
@@ -406,35 +481,25 @@ impl Run<'_> {
                 self.search_from_here(&search.reason);
                 Ok(())
             }
-            answer => self.without_plan(&search, answer),
+            answer => self.without_plan(&search, &answer),
         }
     }
 
     /// There is no plan from where nothing more is started.
-    fn without_plan(&mut self, search: &Search, answer: PlanAnswer) -> Result<(), Stop> {
-        let overdue = self.overdue();
-        if self.settings.watches_room && !overdue.is_empty() {
-            let reason = search.reason.clone();
-            if search.guess == Guess::AQuarterLonger {
-                // What is overdue may still end in time.
-                self.search(reason, Guess::AnyMoment, Goes::UnderWay);
-                return Ok(());
+    fn without_plan(&mut self, search: &Search, answer: &PlanAnswer) -> Result<(), Stop> {
+        let reason = search.reason.clone();
+        match self.next_attempt(search.guess) {
+            NextAttempt::Guess(guess) => self.search(reason, guess, Goes::UnderWay),
+            NextAttempt::CancelOverdue => self.cancel_overdue(reason),
+            NextAttempt::CarryOn => {
+                return self.go_on_without_plan(answer, reason);
             }
-            // No plan can bear that it goes on: it has failed, and the next one does without.
-            self.agenda.push(Todo::Plan(reason));
-            self.agenda.push(Todo::Settle(Some(overdue.clone())));
-            self.agenda.push(Todo::Cancel(overdue));
-            return Ok(());
         }
-        Err(Stop::Over(match answer {
-            PlanAnswer::NotFound { why } => Verdict::NoPlan { why },
-            PlanAnswer::Failed { why } => Verdict::PlannerFailed { why },
-            _ => Verdict::Unsolvable,
-        }))
+        Ok(())
     }
 
     /// The plan that was made is outdated.
-    fn search_again(&mut self, first: &Reason) -> Result<(), Stop> {
+    pub(super) fn search_again(&mut self, first: &Reason) -> Result<(), Stop> {
         let about = "what has happened while the plan was made".to_owned();
         let reason = Reason::new(Cause::Surprise).about(About::Said(about));
         let reason = if self.is_to_turn() { first } else { &reason };

@@ -5,7 +5,9 @@ use std::str::FromStr;
 
 use elbowroom_num::Rational;
 
+use super::TimeoutRule;
 use super::account::ExecutedStep;
+use crate::planning::PlanAnswer;
 use crate::reason::Reason;
 
 /// Settings of a run.
@@ -17,8 +19,8 @@ pub struct RunSettings {
     pub planning_time: PlanningTime,
     /// How often a new plan may be made.
     pub most_replans: usize,
-    /// The rule by which an action without reports is given up.
-    pub patience: Patience,
+    /// The rule that sets the time-out of each action.
+    pub timeout: TimeoutRule,
     /// Whether the room of what is under way is watched. Then there is a warning before a late
     /// action makes a new plan necessary ([`Entry::Warning`](crate::Entry::Warning)), and an action
     /// that no plan can bear any longer has failed: it is cancelled, and the next plan does without.
@@ -44,7 +46,7 @@ impl Default for RunSettings {
             running: RunningRule::Keep,
             planning_time: PlanningTime::Measured,
             most_replans: 10,
-            patience: Patience::default(),
+            timeout: TimeoutRule::default(),
             watches_room: false,
             plans_aside: false,
             readies_aside: false,
@@ -148,38 +150,20 @@ pub struct UnknownSetting {
     pub expected: &'static str,
 }
 
-/// An action is given up when it is silent for longer than `factor` times its planned duration,
-/// and for at least `at_least`; not while the plan allows it to run: a long time within the
-/// guarantee is no silence.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Patience {
-    /// How many times as long as planned.
-    pub factor: Rational,
-    /// In any case so long.
-    pub at_least: Rational,
-}
-
-impl Default for Patience {
-    /// Ten times as long as planned, at least ten minutes.
-    fn default() -> Self {
-        Self {
-            factor: Rational::from(10),
-            at_least: Rational::from(600),
-        }
-    }
-}
-
 /// The outcome of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The goal is reached.
     GoalReached,
-    /// No plan reaches the goal from where the run ended.
+    /// No plan reaches the goal from where the run ended, with a certificate
+    /// ([`PlanAnswer::Unsolvable`](crate::PlanAnswer::Unsolvable)).
     Unsolvable,
     /// There may be a plan, but there is none to go on with.
     NoPlan {
         /// The reason.
         why: String,
+        /// The kind of the reason, which decides on the advice.
+        missing: MissingPlan,
     },
     /// The planner has failed, so that nobody knows whether there is a plan.
     PlannerFailed {
@@ -199,6 +183,33 @@ pub enum Verdict {
     },
 }
 
+/// The cause of a run without a plan, as far as something else may provide one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MissingPlan {
+    /// No planner was asked, or the given plan cannot be executed.
+    NotSearched,
+    /// A planner has found none. Another planner, or greater limits, may find one.
+    NotFound,
+    /// There may be one, or the goal may be reached, depending on facts and values that are in doubt.
+    InDoubt,
+    /// There is one, but the executor rejects it.
+    Rejected,
+}
+
+impl MissingPlan {
+    /// Returns the option or the report that may help, in words.
+    pub fn advice(self) -> Option<&'static str> {
+        match self {
+            Self::NotSearched => None,
+            Self::NotFound => Some("another planner may find one (--planner)"),
+            Self::InDoubt => Some(
+                "reports of the world on these facts and numbers, or on the action's end, settle the doubt",
+            ),
+            Self::Rejected => Some("try another executor (--executor)"),
+        }
+    }
+}
+
 impl Verdict {
     /// The word by which traces and tables name it.
     pub fn name(&self) -> &'static str {
@@ -214,10 +225,27 @@ impl Verdict {
         }
     }
 
+    /// The verdict of a run whose planner has answered this, and no plan.
+    pub(super) fn without_plan(answer: &PlanAnswer) -> Self {
+        let why = answer.why_not().unwrap_or_default().to_owned();
+        match answer {
+            PlanAnswer::Unsolvable => Self::Unsolvable,
+            PlanAnswer::Failed { .. } => Self::PlannerFailed { why },
+            PlanAnswer::NoPlanner => Self::NoPlan {
+                why,
+                missing: MissingPlan::NotSearched,
+            },
+            PlanAnswer::NotFound { .. } | PlanAnswer::Plan(_) => Self::NoPlan {
+                why,
+                missing: MissingPlan::NotFound,
+            },
+        }
+    }
+
     /// Details of the verdict, if there are any.
     pub fn why(&self) -> Option<&str> {
         match self {
-            Self::NoPlan { why } | Self::PlannerFailed { why } | Self::WorldFailed { why } => {
+            Self::NoPlan { why, .. } | Self::PlannerFailed { why } | Self::WorldFailed { why } => {
                 Some(why)
             }
             _ => None,

@@ -8,7 +8,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use elbowroom_execution::executors::{EXECUTORS, Orders};
 use elbowroom_execution::run::{Next, Report, Run, RunSettings, Verdict};
-use elbowroom_execution::{Command, Entry, Passage, Recorder, Ticket, World, WorldError};
+use elbowroom_execution::{
+    Command, Entry, Passage, PortWorkers, Recorder, Ticket, World, WorldError,
+};
 use elbowroom_num::Rational;
 use scene::{Scene, Toy, Whims};
 
@@ -42,7 +44,10 @@ struct Books {
 }
 
 /// Drives a run to its end.
-fn drive(mut run: Run<'_>, world: &mut dyn World) -> (Report, Books) {
+fn drive(
+    (mut run, mut workers): (Run<'_>, PortWorkers<'_>),
+    world: &mut dyn World,
+) -> (Report, Books) {
     let mut books = Books::default();
     loop {
         let answered = match run.next() {
@@ -75,6 +80,10 @@ fn drive(mut run: Run<'_>, world: &mut dyn World) -> (Report, Books) {
                 .look(&facts, &fluents)
                 .map(|seen| run.see(seen).expect("it was asked for")),
             Next::Over(report) => return (report, books),
+            request => {
+                run.delegate(request, &mut workers);
+                Ok(())
+            }
         };
         if let Err(error) = answered {
             run.fail(error);
@@ -206,11 +215,13 @@ fn a_world_that_fails_at_any_moment_ends_the_run_at_once() {
 fn a_run_can_be_moved_to_another_thread_between_two_steps() {
     let scene = Scene::new();
     for registered in EXECUTORS {
-        let mut run = scene.run(
+        let (mut run, mut workers) = scene.run(
             &registered.example(),
             Notes::default(),
             RunSettings::default(),
         );
+        let preparation = run.next();
+        run.delegate(preparation, &mut workers);
         let Next::Command(first) = run.next() else {
             panic!("the plan begins with a start");
         };
@@ -218,7 +229,7 @@ fn a_run_can_be_moved_to_another_thread_between_two_steps() {
             let mut world = Toy::new(Whims::None);
             let told = world.command(&Rational::ZERO, &first);
             told.expect("the toy takes everything");
-            run.go(&mut world)
+            run.go(&mut world, &mut workers)
         });
         let report = moved.join().expect("nobody panics");
         assert_eq!(report.verdict, Verdict::GoalReached, "{}", registered.name);

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, Orders};
 use elbowroom_execution::run::{Ports, Run, RunSettings};
 use elbowroom_execution::{
-    Command, Ending, Event, Forms, Need, NoPlanner, Observation, Passage, PrepareError, Prepared,
-    Preparer, Recorder, Region, Ticket, World, WorldError,
+    Command, Ending, Event, Forms, Need, NoPlanner, Observation, Passage, PortWorkers,
+    PrepareError, Prepared, Preparer, Recorder, Region, Ticket, World, WorldError,
 };
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -53,17 +53,15 @@ impl Scene {
         }
     }
 
-    /// A run of the plan that has not begun. When the plan no longer works, it is over.
+    /// A run of the plan that has not begun, and its workers. When the plan no longer works, it is over.
     pub(crate) fn run(
         &self,
         executor: &str,
         recorder: impl Recorder + 'static,
         settings: RunSettings,
-    ) -> Run<'static> {
+    ) -> (Run<'static>, PortWorkers<'static>) {
         let spec: ExecutorSpec = executor.parse().expect("a registered executor");
         let ports = Ports {
-            planner: Box::new(NoPlanner),
-            preparer: Box::new(ByHand),
             executor: spec.build(Means {
                 outlook: None,
                 rehearsal: None,
@@ -76,7 +74,8 @@ impl Scene {
             recorder: Box::new(recorder),
         };
         let plan = Some(self.plan.clone());
-        Run::new(Arc::clone(&self.task), plan, settings, ports)
+        let run = Run::new(Arc::clone(&self.task), plan, settings, ports);
+        (run, PortWorkers::new(NoPlanner, ByHand))
     }
 }
 

@@ -2,11 +2,12 @@
 
 mod file;
 
+use elbowroom::answers::envelope::objective_of;
 use elbowroom::envelope::Objective;
-use elbowroom::execute::FirstPlan;
+use elbowroom::execute::{FirstPlan, PLANNING_BUDGET};
 use elbowroom::timed::Settings;
 use elbowroom_execution::executors::ExecutorSpec;
-use elbowroom_execution::run::{Patience, RunSettings};
+use elbowroom_execution::run::{RunSettings, TimeoutRule};
 use elbowroom_num::Rational;
 use elbowroom_plan::parametrize::VarySpec;
 use elbowroom_text::{Diagnostic, Diagnostics, Severity, Source, Span};
@@ -46,8 +47,10 @@ pub struct Experiment {
     pub settings: RunSettings,
     /// How close to its limit each end of an envelope should come.
     pub precision: Rational,
-    /// What envelopes are to be the best of; without one, they are IRR's.
+    /// The objective of envelopes; `None`: they are IRR's.
     pub objective: Option<Objective>,
+    /// The text of the plan that every executor begins with; `None`: the planner makes it.
+    pub plan: Option<String>,
     /// By what the first plan is chosen, where the planner is the embedded one.
     pub first_plan: FirstPlan,
     /// The planner.
@@ -56,6 +59,8 @@ pub struct Experiment {
     pub planner_states: u64,
     /// How many of them for a better plan than the first.
     pub improve_states: u64,
+    /// Work limit for each plan, in seconds of one processor ([`elbowroom_num::work`]).
+    pub planning_budget: Rational,
     /// How many states the table of `policy` may have, which no file says: with 0, there is none,
     /// and moves are tried out.
     pub table_states: usize,
@@ -155,17 +160,19 @@ impl Experiment {
             settings,
             precision,
             objective,
+            plan,
             first_plan,
             planner,
             planner_states,
             improve_states,
+            planning_budget,
             table_states,
         } = self;
         let RunSettings {
             running,
             planning_time,
             most_replans,
-            patience: Patience { factor, at_least },
+            timeout,
             // Worlds of experiments have no clock.
             watches_room: _,
             plans_aside: _,
@@ -191,6 +198,12 @@ impl Experiment {
                 json!([name, seconds.as_ref().map(ToString::to_string)])
             }
         };
+        let timeout = match timeout {
+            TimeoutRule::Off => json!(["none"]),
+            TimeoutRule::After { factor, at_least } => {
+                json!([factor.to_string(), at_least.to_string()])
+            }
+        };
         let identity = json!([
             domain,
             problem,
@@ -203,7 +216,7 @@ impl Experiment {
             running.to_string(),
             planning_time.to_string(),
             most_replans,
-            [factor.to_string(), at_least.to_string()],
+            timeout,
             time_limit.to_string(),
             precision.to_string(),
             planner,
@@ -211,20 +224,16 @@ impl Experiment {
             improve_states,
         ]);
         // Nothing else depends on these, so results without them stay what they are.
-        let identity = match objective {
-            Some(objective) => json!([identity, "objective", objective.name()]),
-            None => identity,
-        };
-        let identity = if first_plan.is_shortest() {
-            identity
-        } else {
-            json!([identity, "first plan", first_plan.name()])
-        };
-        let identity = if *table_states == Settings::default().most_states {
-            identity
-        } else {
-            json!([identity, "table", table_states])
-        };
+        let identity = and(identity, "objective", objective.map(|it| json!(it.name())));
+        let identity = and(identity, "plan", plan.as_ref().map(|it| json!(it)));
+        let is_usual = first_plan.is_shortest();
+        let chosen = (!is_usual).then(|| json!(first_plan.name()));
+        let identity = and(identity, "first plan", chosen);
+        let is_usual = *planning_budget == Rational::from(PLANNING_BUDGET);
+        let budget = (!is_usual).then(|| json!(planning_budget.to_string()));
+        let identity = and(identity, "planning budget", budget);
+        let is_usual = *table_states == Settings::default().most_states;
+        let identity = and(identity, "table", (!is_usual).then(|| json!(table_states)));
         if *optimum {
             json!([identity, "optimum"])
         } else {
@@ -280,27 +289,8 @@ impl Experiment {
         let rows = rows(&executors, read.clairvoyant);
         read.check_published(&rows)
             .map_err(|(at, message)| wrong(at, message))?;
-        let mut together = Vec::new();
-        for group in &read.together {
-            let width = group.names.len();
-            if let Some(row) = group
-                .rows
-                .get_ref()
-                .iter()
-                .find(|row| row.get_ref().len() != width)
-            {
-                let message = format!("write {width} values, one for each name");
-                return Err(wrong(row.span(), message));
-            }
-            let rows = group.rows.get_ref().iter();
-            together.push(Together {
-                names: group.names.clone(),
-                rows: rows
-                    .map(|row| row.get_ref().iter().map(text_of).collect())
-                    .collect(),
-            });
-        }
         let wrong_at = |(at, message)| wrong(at, message);
+        let together = read.together().map_err(wrong_at)?;
         let settings = read.settings().map_err(wrong_at)?;
         let planner = read.planning().map_err(wrong_at)?;
         let first_plan = read.first_plan().map_err(wrong_at)?;
@@ -310,6 +300,18 @@ impl Experiment {
                 .filter(Rational::is_positive)
                 .ok_or_else(|| wrong(given.span(), "it must be positive".to_owned()))?,
         };
+        let planning_budget = match &read.planning_budget {
+            None => Rational::from(PLANNING_BUDGET),
+            Some(given) => exact(*given.get_ref())
+                .filter(Rational::is_positive)
+                .ok_or_else(|| wrong(given.span(), "it must be positive".to_owned()))?,
+        };
+        let method = read.method.as_ref().map(|method| *method.get_ref());
+        let objective = objective_of(method, read.objective, read.precision.is_some());
+        let objective = objective.map_err(|error| {
+            let at = read.method.as_ref().map_or(0..0, Spanned::span);
+            wrong(at, format!("{error}: leave out `method`, or `objective`"))
+        })?;
         Ok(Self {
             domain: named(&read.domain)?,
             problem: named(&read.problem)?,
@@ -328,11 +330,13 @@ impl Experiment {
             seed: read.seed,
             settings,
             precision,
-            objective: read.objective,
+            objective,
+            plan: read.plan.as_ref().map(named).transpose()?,
             first_plan,
             planner,
             planner_states: read.planner_states.unwrap_or(20_000),
             improve_states: read.improve_states.unwrap_or(20_000),
+            planning_budget,
             table_states: Settings::default().most_states,
             published: read
                 .published
@@ -383,3 +387,11 @@ fn rows(executors: &[ExecutorSpec], clairvoyant: bool) -> Vec<String> {
 
 /// The row for plans that are made knowing what will happen.
 pub(crate) const CLAIRVOYANT: &str = "clairvoyant";
+
+/// The identity with one more member, if it has a value. Without one, it is the identity of older results.
+fn and(identity: Value, label: &str, value: Option<Value>) -> Value {
+    match value {
+        Some(value) => json!([identity, label, value]),
+        None => identity,
+    }
+}

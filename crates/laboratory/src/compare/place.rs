@@ -40,7 +40,7 @@ pub(super) struct Place {
 }
 
 impl Setting<'_> {
-    /// A column, with the plan that each executor begins with; `first` is the planner's.
+    /// A column, with the plan that each executor begins with; `first` is the experiment's or the planner's.
     pub(super) fn place(
         &self,
         place: usize,
@@ -107,11 +107,12 @@ impl Setting<'_> {
         for (row, spec) in self.experiment.executors.iter().enumerate() {
             // Who tries out what can be done does so with plans to begin with, too.
             let tries_out = spec.asks_outlook() && rehearse.is_some();
-            let chooses = tries_out || !self.experiment.first_plan.is_shortest();
+            let is_given = self.experiment.plan.is_some();
+            let chooses = !is_given && (tries_out || !self.experiment.first_plan.is_shortest());
             let known = (&**task, &world, &likelihoods);
             let chosen = chooses.then(|| self.chosen(spec, column, known, goes_on));
             let chosen = chosen.flatten();
-            let likely = (chosen.is_none() && spec.asks_outlook()).then(|| {
+            let likely = (!is_given && chosen.is_none() && spec.asks_outlook()).then(|| {
                 let answer = likeliest.plan(task, &Situation::initial(task)).answer;
                 match answer {
                     PlanAnswer::Plan(plan) => Some(plan),
@@ -155,6 +156,7 @@ impl Setting<'_> {
         let chooser = Chooser {
             most_states: embedded.most_states,
             improve_states: embedded.improve_states,
+            work: embedded.work,
             known: Known::World(self.rollouts(spec, column, (world, likelihoods))),
             settings: embedded.settings,
             goes_on,

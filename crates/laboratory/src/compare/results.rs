@@ -67,6 +67,40 @@ pub struct Cell {
     /// How the runs failed that did not reach the goal.
     #[serde(default, skip_serializing_if = "Failures::is_empty")]
     pub failures: Failures,
+    /// Executions that the validator rejects: bugs of the program, whether or not they reached the goal.
+    #[serde(default, skip_serializing_if = "Invalid::is_empty")]
+    pub invalid: Invalid,
+}
+
+/// Executions that the validator rejects.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Invalid {
+    /// The number of runs.
+    pub runs: u64,
+    /// The first of them, with its violation.
+    pub first: Option<(TrialId, String)>,
+}
+
+impl Invalid {
+    fn is_empty(&self) -> bool {
+        self.runs == 0
+    }
+
+    pub(super) fn count(&mut self, found: &[String], id: TrialId) {
+        if let Some(first) = found.first() {
+            self.add(&Self {
+                runs: 1,
+                first: Some((id, first.clone())),
+            });
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.runs += other.runs;
+        let both = [self.first.take(), other.first.clone()];
+        self.first = both.into_iter().flatten().min();
+    }
 }
 
 /// Trials in which one of two executors reached the goal and the other did not.
@@ -256,8 +290,27 @@ impl Results {
 }
 
 impl Results {
+    /// Returns notes on the executions that the validator rejects, by row and column.
+    pub fn invalid_notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        for (row, cells) in self.rows.iter().zip(&self.cells) {
+            for (column, cell) in self.columns.iter().zip(cells) {
+                let Invalid { runs, first } = &cell.invalid;
+                notes.extend(first.as_ref().map(|(id, what)| {
+                    format!(
+                        "bug: {runs} executions of `{row}` in {column} are not valid; the first is trial {} of \
+                         problem {}: {what}",
+                        id.trial, id.problem
+                    )
+                }));
+            }
+        }
+        notes
+    }
+
     fn notes(&self) -> Vec<String> {
         let mut notes = notes(&self.rows);
+        notes.extend(self.invalid_notes());
         if !self.optimum.is_empty() {
             notes.push(format!("`{}`: {}", optimum::ROW, optimum::SUMMARY));
         }
@@ -328,6 +381,7 @@ impl Partial for Results {
             merge(&mut mine.verdicts, &theirs.verdicts);
             merge(&mut mine.causes, &theirs.causes);
             mine.failures.merge(&theirs.failures);
+            mine.invalid.add(&theirs.invalid);
         }
         for (mine, theirs) in self
             .pairs

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{Report, Verdict};
-use elbowroom_execution::{PlanAnswer, Planner};
+use elbowroom_execution::{NoRecord, PlanAnswer, Planner, Recorder};
 use elbowroom_external as external;
-use elbowroom_model::{Situation, Task};
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan, validate};
 use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
 use elbowroom_planner::embedded;
@@ -18,8 +18,12 @@ use super::place::Place;
 use super::{
     Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, beginnings, clairvoyant,
 };
-use elbowroom::execute::{Embedded, Execution, NamedText, RememberingPlanner, RunSpec, SpecError};
-use elbowroom::flow;
+use elbowroom::answers::envelope::Search;
+use elbowroom::execute::{
+    Embedded, Execution, NamedText, RememberingPlanner, RunSpec, SpecError, Validated,
+    planning_work,
+};
+use elbowroom::{RoundingRule, flow};
 
 use crate::record::{TrialRecord, TrialRecords};
 
@@ -73,7 +77,7 @@ impl Setting<'_> {
         }
         for trial in part.numbers().skip(self.piece).step_by(self.pieces) {
             for column in 0..experiment.columns.len() {
-                self.trial((trial, column), records, &mut common, &mut results);
+                self.trial((trial, column), records, &mut common, &mut results, goes_on);
                 if !tell() {
                     return Ok(results);
                 }
@@ -90,19 +94,19 @@ impl Setting<'_> {
         let (domain, problem) = self.texts()?;
         let task = Self::task(&domain, &problem)?;
         // Whoever plans: a plan of another planner could not be carried out.
-        if let Some(feature) = task.left_to_the_judge() {
+        if let Some(feature) = task.only_judged() {
             return Err(self.wrong(&SpecError::Unheeded(feature).to_string()));
         }
-        let situation = Situation::initial(&task);
         let mut planner = self.planner(domain, problem, goes_on)?;
-        let first = match planner.plan(&task, &situation).answer {
-            PlanAnswer::Plan(plan) => plan,
-            PlanAnswer::Unsolvable => {
-                return Err(self.wrong("no plan exists, so there is nothing to execute"));
-            }
-            PlanAnswer::NotFound { why } | PlanAnswer::Failed { why } => {
-                return Err(self.wrong(&why));
-            }
+        let first = match &self.experiment.plan {
+            Some(text) => self.given(&task, text)?,
+            None => match planner.plan(&task, &Situation::initial(&task)).answer {
+                PlanAnswer::Plan(plan) => plan,
+                PlanAnswer::Unsolvable => {
+                    return Err(self.wrong("no plan exists, so there is nothing to execute"));
+                }
+                other => return Err(self.wrong(&in_words_of_files(&other))),
+            },
         };
         let task = Arc::new(task);
         let columns = 0..self.experiment.columns.len();
@@ -114,25 +118,48 @@ impl Setting<'_> {
         })
     }
 
-    /// Every executor in the same world.
+    /// The plan that the experiment names.
+    fn given(&self, task: &Task, text: &str) -> Result<TimeTriggeredPlan, ExperimentError> {
+        let (plan, _) = RoundingRule::default()
+            .read_plan(&Source::new("plan", text), task)
+            .map_err(ExperimentError::Text)?;
+        let verdict = validate::validate(task, &plan, &validate::Settings::default());
+        if verdict.is_valid() {
+            Ok(plan)
+        } else {
+            Err(self.wrong("`plan` is not valid for it; `elbowroom check` says why"))
+        }
+    }
+
+    /// Every executor in the same world. A trial that is interrupted does not count.
     fn trial(
         &self,
         (trial, column): (u64, usize),
         records: Option<&TrialRecords>,
         common: &mut Common<'_>,
         results: &mut Results,
+        goes_on: &(dyn Fn() -> bool + Sync),
     ) {
         let seed = self.seed(trial);
         let executors = &self.experiment.executors;
-        let mut reached = Vec::with_capacity(executors.len() + 1);
+        let mut reports = Vec::with_capacity(executors.len());
         for (row, spec) in executors.iter().enumerate() {
-            let report = self.execute(seed, (row, spec), column, common, None);
+            // Trials are distributed over threads: with a table of its own, each is independent of the others.
+            let task = Arc::new(common.task.with_own_table());
+            reports.push(self.execute(&task, seed, (row, spec), column, common, None));
+            if !goes_on() {
+                return;
+            }
+        }
+        let mut reached = Vec::with_capacity(executors.len() + 1);
+        for (row, (report, invalid)) in reports.into_iter().enumerate() {
             reached.push(report.verdict == Verdict::GoalReached);
             let id = TrialId {
                 problem: self.problem,
                 trial,
             };
             results.cells[row][column].count(&report, id);
+            results.cells[row][column].invalid.count(&invalid, id);
             if let Some(records) = records {
                 records.add(self.record((trial, seed), column, row, &report));
             }
@@ -175,10 +202,19 @@ impl Setting<'_> {
         let executor = &self.experiment.executors[row];
         let mut lines = String::new();
         let mut sink = |line: &str| lines.push_str(line);
-        let mut writer = TraceWriter::new(Arc::clone(&common.task), &mut sink);
+        // The trace names facts that only the world mentions, so it shares the table of the trial.
+        let task = Arc::new(common.task.with_own_table());
+        let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
         let written = writer.header(&self.spec(column, executor, seed)?);
         written.map_err(|error| self.wrong(&error.to_string()))?;
-        self.execute(seed, (row, executor), column, &mut common, Some(writer));
+        self.execute(
+            &task,
+            seed,
+            (row, executor),
+            column,
+            &mut common,
+            Some(writer),
+        );
         Ok(lines)
     }
 
@@ -214,6 +250,7 @@ impl Setting<'_> {
             executor: executor.clone(),
             seed,
             planner_states: experiment.planner_states,
+            planning_budget: Some(experiment.planning_budget.clone()),
             improve_states: experiment.improve_states,
             vary: column.vary.clone(),
             precision: Some(experiment.precision.clone()),
@@ -258,15 +295,14 @@ impl Setting<'_> {
 
     fn execute(
         &self,
+        task: &Arc<Task>,
         seed: u64,
         (row, spec): (usize, &ExecutorSpec),
         column: usize,
         common: &mut Common<'_>,
         writer: Option<TraceWriter<'_>>,
-    ) -> Report {
+    ) -> (Report, Vec<String>) {
         let settings = &self.experiment.settings;
-        // Trials are shared out among threads, and each is the same whichever came before.
-        let task = Arc::new(common.task.with_own_table());
         let Place {
             world,
             likelihoods,
@@ -286,7 +322,7 @@ impl Setting<'_> {
         } else {
             &mut common.planner
         };
-        let execution = Execution::of(&task)
+        let execution = Execution::of(task)
             .beginning_with(firsts[row].clone())
             .by(spec.clone())
             .with_settings(settings.clone())
@@ -298,11 +334,16 @@ impl Setting<'_> {
             .planned_by(planner)
             .prepared_by(preparer);
         // Nobody reads why there is no way on but those who look at a single run.
-        let execution = match writer {
-            Some(writer) => execution.recorded_by(writer).explaining(),
-            None => execution,
+        let (execution, recorder): (_, Box<dyn Recorder>) = match writer {
+            Some(writer) => (execution.explaining(), Box::new(writer)),
+            None => (execution, Box::new(NoRecord)),
         };
-        execution.run_in(&mut *world.world(&task, seed))
+        let (recorder, validation) = Validated::new(recorder, task, None);
+        let report = execution
+            .recorded_by(recorder)
+            .run_in(&mut *world.world(task, seed));
+        let invalid = validation.found();
+        (report, invalid.iter().map(ToString::to_string).collect())
     }
 
     fn planner<'a>(
@@ -312,7 +353,10 @@ impl Setting<'_> {
         goes_on: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Box<dyn Planner + 'a>, ExperimentError> {
         match &self.experiment.planner {
-            Planning::Embedded => Ok(Box::new(self.embedded())),
+            Planning::Embedded => Ok(Box::new(Embedded {
+                goes_on: Some(goes_on),
+                ..self.embedded()
+            })),
             Planning::Another { name, seconds } => {
                 another(name, seconds.as_ref(), domain, problem, goes_on)
             }
@@ -327,21 +371,22 @@ impl Setting<'_> {
             },
             most_states: self.experiment.planner_states,
             improve_states: self.experiment.improve_states,
-            clock: None,
-            goes_on: None,
+            work: planning_work(&self.experiment.planning_budget),
+            ..Embedded::default()
         }
     }
 
     pub(super) fn flow(&self, column: &Column, world: &WorldModel) -> flow::Settings {
-        let mut flow = flow::Settings {
+        flow::Settings {
             vary: column.vary.clone(),
-            objective: self.experiment.objective,
+            search: match self.experiment.objective {
+                Some(objective) => Search::best(objective),
+                None => Search::irr(),
+            }
+            .with_precision(self.experiment.precision.clone()),
             world: Some(Arc::new(world.clone())),
             ..flow::Settings::default()
-        };
-        flow.search.precision = self.experiment.precision.clone();
-        flow.search.relative = None;
-        flow
+        }
     }
 
     fn task(domain: &Source, problem: &Source) -> Result<Task, ExperimentError> {
@@ -378,6 +423,13 @@ impl Setting<'_> {
         }
         ExperimentError::other(format!("the problem with {}: {message}", self.words()))
     }
+}
+
+/// Why there is no plan. The planner names options of `run`; an experiment has members for them.
+fn in_words_of_files(answer: &PlanAnswer) -> String {
+    let why = answer.why_not().unwrap_or_default();
+    why.replace("--planning-budget", "planning_budget")
+        .replace("--planner-states", "planner_states")
 }
 
 pub(super) fn world(column: &Column, task: &Task) -> Result<WorldModel, ExperimentError> {

@@ -197,7 +197,9 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
                 at_end,
                 ..
             } => {
-                relaxation.is_possible(over_all, true, &mut binding, &mut blockers)
+                let is_vacuous = !over_all.is_trivial()
+                    && relaxation.may_take_no_time(duration, &binding, &mut blockers);
+                (is_vacuous || relaxation.is_possible(over_all, true, &mut binding, &mut blockers))
                     && relaxation.is_possible(at_end, true, &mut binding, &mut blockers)
                     && relaxation.is_duration_possible(duration, true, &binding, &mut blockers)
             }

@@ -245,6 +245,66 @@ impl<'a> Relaxation<'a> {
         is_possible
     }
 
+    /// Returns `true` if the constraints may allow a duration of 0. Blockers as in
+    /// [`Self::is_possible`].
+    pub(super) fn may_take_no_time(
+        &self,
+        constraints: &[DurationConstraint],
+        binding: &[ObjectId],
+        blockers: &mut Vec<Event>,
+    ) -> bool {
+        let is_possible =
+            constraints
+                .iter()
+                .all(|constraint| match self.value(&constraint.bound, binding) {
+                    Value::Number(bound) => constraint.comparison.holds(&Rational::ZERO, &bound),
+                    Value::Varies => true,
+                    Value::Undefined => false,
+                });
+        if !is_possible {
+            for constraint in constraints {
+                self.block_on_fluents(&constraint.bound, binding, blockers);
+            }
+        }
+        is_possible
+    }
+
+    /// Returns `true` unless the constraints exclude a duration of 0 for all objects.
+    pub(super) fn may_some_take_no_time(&self, constraints: &[DurationConstraint]) -> bool {
+        !constraints.iter().any(|constraint| {
+            let bound = &constraint.bound;
+            match constraint.comparison {
+                Comparison::Less | Comparison::AtMost => false,
+                Comparison::Equal | Comparison::AtLeast => self.is_positive(bound),
+                Comparison::Greater => {
+                    let is_zero = matches!(bound, Expression::Constant(bound) if bound.is_zero());
+                    is_zero || self.is_positive(bound)
+                }
+            }
+        })
+    }
+
+    /// Returns `true` if the expression is positive for all objects and at all times. `false` if that is
+    /// not known.
+    fn is_positive(&self, expression: &Expression) -> bool {
+        match expression {
+            Expression::Constant(value) => value.is_positive(),
+            Expression::Fluent(fluent) => {
+                let symbol = Symbol::Changed(fluent.function);
+                let mut values = self
+                    .values
+                    .iter()
+                    .filter(|(event, _)| event.symbol == symbol);
+                !self.is_written(symbol) && values.all(|(_, value)| value.is_positive())
+            }
+            Expression::Add(parts) | Expression::Multiply(parts) => {
+                parts.iter().all(|part| self.is_positive(part))
+            }
+            Expression::Divide(left, right) => self.is_positive(left) && self.is_positive(right),
+            _ => false,
+        }
+    }
+
     /// The value if nothing reached so far changes it.
     pub(super) fn value(&self, expression: &Expression, binding: &[ObjectId]) -> Value {
         Value::of(expression, &mut |fluent| self.fluent_value(fluent, binding))

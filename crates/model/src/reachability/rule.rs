@@ -131,12 +131,17 @@ pub(super) fn rules_of<'a>(
                 at_end,
                 ..
             } => {
-                and_end = is_start_silent(schema);
+                // With a duration of 0, the over-all condition is vacuous.
+                let may_be_vacuous =
+                    !over_all.is_trivial() && relaxation.may_some_take_no_time(duration);
+                and_end = is_start_silent(schema) && !may_be_vacuous;
                 drafts.require(at_start, true, &scope);
                 drafts.require_duration(duration, and_end, &scope);
                 // What never changes need not wait for the effects of the start.
                 drafts.only_static = !and_end;
-                drafts.require(over_all, true, &scope);
+                if !may_be_vacuous {
+                    drafts.require(over_all, true, &scope);
+                }
                 drafts.require(at_end, true, &scope);
             }
         }

@@ -126,6 +126,7 @@ impl fmt::Display for Mistake {
                 when,
                 condition,
                 reasons,
+                too_late,
                 ..
             } => {
                 match when {
@@ -137,7 +138,7 @@ impl fmt::Display for Mistake {
                 for (position, reason) in reasons.iter().enumerate() {
                     write!(f, "{} {reason}", if position == 0 { ":" } else { ";" })?;
                 }
-                Ok(())
+                write_late_changes(f, too_late)
             }
             Self::Constraint {
                 constraint,
@@ -182,6 +183,18 @@ impl fmt::Display for Mistake {
                 write!(f, "divides by {divisor}, which is 0, in {within}")
             }
         }
+    }
+}
+
+/// Writes the happenings that make a condition true after it is read.
+fn write_late_changes(f: &mut fmt::Formatter<'_>, changes: &[Occurrence]) -> fmt::Result {
+    for (position, change) in changes.iter().enumerate() {
+        write!(f, "{} {change}", if position == 0 { ";" } else { " and" })?;
+    }
+    match changes.len() {
+        0 => Ok(()),
+        1 => write!(f, " changes this only after the condition is read"),
+        _ => write!(f, " change this only after the condition is read"),
     }
 }
 

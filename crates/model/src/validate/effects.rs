@@ -57,6 +57,9 @@ impl<'a> Judge<'a> {
         for happening in &group.happenings {
             self.collect(happening.what, &group.time, &mut changes)?;
         }
+        if self.settings.refuses_equal_writes {
+            self.refuse_equal_writes(&changes, &group.time)?;
+        }
         for (fluent, updates) in &changes.updates {
             self.update(*fluent, updates, &group.time)?;
         }
@@ -148,6 +151,25 @@ impl<'a> Judge<'a> {
                 };
                 changes.updates.entry(*fluent).or_default().push(update);
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses that two steps, or a step and a timed initial, write the same fact.
+    fn refuse_equal_writes(&self, changes: &Changes<'a>, time: &Rational) -> Result<(), Stop> {
+        let mut writers: BTreeMap<FactId, What<'a>> = BTreeMap::new();
+        for (fact, what) in changes.deletes.iter().chain(&changes.adds) {
+            let first = *writers.entry(*fact).or_insert(*what);
+            if first.step() == what.step() {
+                continue;
+            }
+            let mistake = Mistake::Interference {
+                first: self.occurrence(first, time),
+                second: self.occurrence(*what, time),
+                over: self.task.fact_name(*fact),
+                separation: None,
+            };
+            return Err(self.violation(time, what.step().or(first.step()), mistake));
         }
         Ok(())
     }

@@ -138,12 +138,8 @@ fn compare<'a>(
 ) -> Result<(), Stop> {
     // The plan is not to blame for when timed initials happen.
     let are_both_timed = matches!((first.what, second.what), (What::Timed(_), What::Timed(_)));
-    let interfere = if judge.settings.allows_simultaneous_reads {
-        first.footprint.overwrites(&second.footprint)
-    } else {
-        first.footprint.interferes_with(&second.footprint)
-    };
-    if are_both_timed || !interfere {
+    let interfere = first.footprint.interferes_with(&second.footprint);
+    if are_both_timed || !interfere || judge.settings.allows_simultaneous_reads {
         return Ok(());
     }
     // The later one is to blame, unless it is not of the plan.

@@ -23,6 +23,8 @@ use crate::plan::{Step, TimeTriggeredPlan};
 use crate::situation::Situation;
 use crate::task::Task;
 
+static NO_SLACK: Rational = Rational::ZERO;
+
 /// The course of events up to some moment.
 pub(super) struct Judge<'a> {
     pub(super) task: &'a Task,
@@ -108,7 +110,11 @@ impl<'a> Judge<'a> {
         if let Some(course) = &self.course {
             course.violation(self, &end)?;
         }
-        self.require(self.task.goal(), When::Goal, None, &end)
+        let at_end = Group {
+            time: end,
+            happenings: Vec::new(),
+        };
+        self.require(self.task.goal(), When::Goal, None, &at_end)
     }
 
     /// Notes the state from `time` on for the constraints on the course.
@@ -183,7 +189,7 @@ impl<'a> Judge<'a> {
             motion,
             length,
             derivation: &self.derivation,
-            slack: &self.settings.slack,
+            slack: self.slack(When::OverAll),
             part,
         };
         let mut first: Option<(Break, Place<'_>)> = None;
@@ -239,14 +245,14 @@ impl<'a> Judge<'a> {
                 What::Timed(_) | What::Event(_) => {}
                 What::Instant(position) => {
                     if let Body::Instantaneous(snap) = &self.plan.steps[position].action.body {
-                        self.require(&snap.condition, When::Now, Some(position), time)?;
+                        self.require(&snap.condition, When::Now, Some(position), group)?;
                         self.prefer(position, Part::Start, time);
                     }
                 }
                 What::Start(position) => {
                     let (_, body) = self.durative(position);
                     self.check_duration(position, false, time)?;
-                    self.require(&body.start.condition, When::Start, Some(position), time)?;
+                    self.require(&body.start.condition, When::Start, Some(position), group)?;
                     self.prefer(position, Part::Start, time);
                     let running = self.begin(position, time)?;
                     self.running.insert(position, running);
@@ -254,7 +260,7 @@ impl<'a> Judge<'a> {
                 What::End(position) => {
                     let (_, body) = self.durative(position);
                     self.check_duration(position, true, time)?;
-                    self.require(&body.end.condition, When::End, Some(position), time)?;
+                    self.require(&body.end.condition, When::End, Some(position), group)?;
                     self.prefer(position, Part::End, time);
                 }
             }
@@ -322,19 +328,32 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
-    /// Checks a condition in the current state, conjunct by conjunct.
+    /// Checks a condition in the current state, on arrival at a group, conjunct by conjunct.
     fn require(
         &mut self,
         condition: &Condition,
         when: When,
         step: Option<usize>,
-        time: &Rational,
+        group: &Group<'a>,
     ) -> Result<(), Stop> {
+        let time = &group.time;
         for (index, conjunct) in condition.conjuncts().into_iter().enumerate() {
             let place = Place::condition(time, step, when, conjunct);
             match self.reads(conjunct, step) {
                 Ok(true) => {}
-                Ok(false) => return Err(self.fails(&place, &self.now, None)),
+                Ok(false) => {
+                    let violation = self.fails(&place, &self.now, None);
+                    let late = self.late_changes(conjunct, group);
+                    // Validation ends here, so the effects are applied for the message only.
+                    let becomes_true = !late.is_empty()
+                        && self.apply(group).is_ok()
+                        && matches!(self.reads(conjunct, step), Ok(true));
+                    return Err(if becomes_true {
+                        violation.with_late_changes(late)
+                    } else {
+                        violation
+                    });
+                }
                 Err(fault) => return Err(self.stop(fault, &place)),
             }
             if let Some(demand) = Demand::of(conjunct) {
@@ -346,25 +365,38 @@ impl<'a> Judge<'a> {
         Ok(())
     }
 
+    /// By how much comparisons may fail in such a condition.
+    fn slack(&self, when: When) -> &'a Rational {
+        match when {
+            When::OverAll => &NO_SLACK,
+            _ => &self.settings.slack,
+        }
+    }
+
     /// Whether a condition of a step, or the goal, holds in the current state.
     pub(super) fn reads(&self, condition: &Condition, step: Option<usize>) -> Result<bool, Fault> {
         let current = (&self.now, &self.derived);
-        self.with_moment(condition, current, step, &|_, moment| {
+        let reader = (step, &self.settings.slack);
+        self.with_moment(condition, current, reader, &|_, moment| {
             holds(condition, moment)
         })
     }
 
     /// Numbers in the current state as a step reads them.
     pub(super) fn reading(&self, step: Option<usize>) -> Reading<'_> {
-        self.reading_of(&self.now, step)
+        self.reading_of(&self.now, (step, &self.settings.slack))
     }
 
-    fn reading_of<'b>(&'b self, now: &'b Now, step: Option<usize>) -> Reading<'b> {
+    fn reading_of<'b>(
+        &'b self,
+        now: &'b Now,
+        (step, slack): (Option<usize>, &'b Rational),
+    ) -> Reading<'b> {
         let duration = step.and_then(|position| self.plan.steps[position].duration.as_ref());
         Reading {
             now,
             duration,
-            slack: &self.settings.slack,
+            slack,
         }
     }
 
@@ -373,13 +405,13 @@ impl<'a> Judge<'a> {
         &self,
         condition: &Condition,
         (now, derived): (&Now, &OnceCell<Derived<Fault>>),
-        step: Option<usize>,
+        (step, slack): (Option<usize>, &Rational),
         look: &dyn Fn(&Reading<'_>, &dyn Moment<Fault>) -> T,
     ) -> T {
-        let reading = self.reading_of(now, step);
+        let reading = self.reading_of(now, (step, slack));
         if self.derivation.is_read_by(condition) {
             // Rules know no `?duration`.
-            let derive = || self.derivation.derive(&self.reading_of(now, None));
+            let derive = || self.derivation.derive(&self.reading_of(now, (None, slack)));
             let derived = derived.get_or_init(derive);
             look(&reading, &self.derivation.on_top_of(&reading, derived))
         } else {
@@ -392,12 +424,12 @@ impl<'a> Judge<'a> {
         &self,
         condition: &Condition,
         now: &Now,
-        step: Option<usize>,
+        (step, when): (Option<usize>, When),
     ) -> Vec<Reason> {
         self.with_moment(
             condition,
             (now, &OnceCell::new()),
-            step,
+            (step, self.slack(when)),
             &|reading, moment| {
                 let since = |fact| {
                     let (time, what) = self.since.get(&fact)?;

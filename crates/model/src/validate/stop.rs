@@ -1,16 +1,18 @@
 //! Where and why the judge stops before the end of the plan.
 
+use std::collections::BTreeSet;
+
 use elbowroom_num::Rational;
 
 use super::judge::Judge;
 use super::piece::Break;
 use super::reading::Fault;
 use super::state::Now;
-use super::timeline::What;
+use super::timeline::{Group, What};
 use super::violation::{
     ActionInstance, Difficulty, Mistake, Occurrence, Point, Undecided, Violation, When,
 };
-use crate::ground::{Condition, DurationConstraint, Expression, FluentId};
+use crate::ground::{Change, Condition, DurationConstraint, Expression, FluentId};
 use crate::task::Task;
 
 /// The end of the matter; boxed, because nearly all calls return nothing of the kind.
@@ -28,6 +30,16 @@ impl Stop {
                 fluent: task.fluent_name(fluent),
             },
         }))
+    }
+
+    /// The same, with the happenings that make the violated condition true after it is read.
+    pub(super) fn with_late_changes(mut self, late: Vec<Occurrence>) -> Self {
+        if let Self::Violation(violation) = &mut self
+            && let Mistake::Condition { too_late, .. } = &mut violation.mistake
+        {
+            *too_late = late;
+        }
+        self
     }
 }
 
@@ -129,12 +141,59 @@ impl<'a> Judge<'a> {
         };
         let mistake = Mistake::Condition {
             when,
-            condition: self.task.describe_condition(condition),
+            condition: self.as_written(condition, place.step),
             is_after: broken.is_some_and(|broken| broken.is_after),
             is_exact: broken.is_none_or(|broken| broken.is_exact),
-            reasons: self.explain(condition, then, place.step),
+            reasons: self.explain(condition, then, (place.step, when)),
+            too_late: Vec::new(),
         };
         self.violation(&time, place.step, mistake)
+    }
+
+    /// Returns the happenings of the group that may make a condition true which is false on arrival.
+    pub(super) fn late_changes(&self, condition: &Condition, group: &Group<'a>) -> Vec<Occurrence> {
+        let happenings = group.happenings.iter();
+        let late = happenings.filter(|own| self.may_make_true(own.what, condition));
+        late.map(|own| self.occurrence(own.what, &own.time))
+            .collect()
+    }
+
+    /// Returns `true` if an effect of the happening can make the false condition true.
+    fn may_make_true(&self, what: What<'a>, condition: &Condition) -> bool {
+        let literal = match condition {
+            Condition::Fact(fact) => Some((*fact, true)),
+            Condition::Not(part) => match **part {
+                Condition::Fact(fact) => Some((fact, false)),
+                _ => None,
+            },
+            _ => None,
+        };
+        let literal = literal.filter(|(fact, _)| !self.task.is_derived(*fact));
+        let (mut facts, mut fluents) = (BTreeSet::new(), BTreeSet::new());
+        self.task.visit_facts_of(condition, &mut |fact| {
+            facts.insert(fact);
+        });
+        self.task.visit_fluents_of(condition, &mut |fluent| {
+            fluents.insert(fluent);
+        });
+        let suits = |change: &Change| match (change, literal) {
+            (Change::Add(fact), Some(wanted)) => wanted == (*fact, true),
+            (Change::Delete(fact), Some(wanted)) => wanted == (*fact, false),
+            (Change::Add(fact) | Change::Delete(fact), None) => facts.contains(fact),
+            (Change::Update { fluent, .. }, _) => fluents.contains(fluent),
+        };
+        if let What::Timed(timed) = what {
+            timed.changes.iter().any(suits)
+        } else {
+            let effects = self.snap(what).into_iter().flat_map(|snap| &snap.effects);
+            effects.map(|effect| &effect.change).any(suits)
+        }
+    }
+
+    /// The condition of a step, or the goal, as PDDL writes it.
+    fn as_written(&self, condition: &Condition, step: Option<usize>) -> String {
+        let action = step.map(|position| &*self.plan.steps[position].action);
+        self.task.describe_condition_of(action, condition)
     }
 
     /// The consequence of something that cannot be read.

@@ -5,6 +5,7 @@ mod constraints;
 mod continuous;
 mod durations;
 mod effects;
+mod executions;
 mod explanations;
 mod forms;
 mod groups;

@@ -71,7 +71,7 @@ impl<'a> Course<'a> {
             let now = &judge.now;
             let explain = || match modal.conditions().first() {
                 Some(condition) if is_hard && explains(modal) => {
-                    judge.explain(condition, now, None)
+                    judge.explain(condition, now, (None, When::Course))
                 }
                 _ => Vec::new(),
             };

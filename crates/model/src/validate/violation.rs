@@ -82,6 +82,9 @@ pub enum Mistake {
         is_exact: bool,
         /// The reasons why it is false.
         reasons: Vec<Reason>,
+        /// Happenings of the same time that may make it true, but too late: conditions read the
+        /// state before them.
+        too_late: Vec<Occurrence>,
     },
     /// A constraint on the course of the plan is not kept.
     Constraint {

@@ -3,7 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Combination, VariableId};
-use crate::Rational;
+use crate::{Rational, work};
+
+/// Work that is counted for each term of a row that is added to another row.
+const TERM_WORK: u64 = 200;
 
 /// `basic = Σ coefficient · other`, over variables that are not basic, without zeros.
 pub(super) type Row = BTreeMap<VariableId, Rational>;
@@ -78,6 +81,8 @@ impl Tableau {
     /// Solves the row of `leaving` for `entering`, and replaces `entering` everywhere.
     pub(super) fn pivot(&mut self, leaving: VariableId, entering: VariableId) {
         let mut row = self.take(leaving);
+        let column = self.columns[entering.index()].len();
+        work::spend(TERM_WORK * (1 + column as u64) * (1 + row.len() as u64));
         let pivot = row
             .remove(&entering)
             .expect("the entering variable occurs in the leaving one's row");
@@ -114,6 +119,7 @@ impl Tableau {
     }
 
     fn insert(&mut self, basic: VariableId, row: Row) {
+        work::spend(TERM_WORK * (1 + row.len() as u64));
         for term in row.keys() {
             self.columns[term.index()].insert(basic);
         }

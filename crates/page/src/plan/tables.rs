@@ -44,6 +44,7 @@ pub(super) fn rooms(rooms: &[Room], texts: &mut Texts) -> Table {
             nearest(&quantity.nominal).into(),
             lower.into(),
             upper.into(),
+            timeout(&room.range).into(),
             limit(&room.lower_limit),
             limit(&room.upper_limit),
         ]);
@@ -56,12 +57,18 @@ pub(super) fn rooms(rooms: &[Room], texts: &mut Texts) -> Table {
             ("nominal", true),
             ("lower", true),
             ("upper", true),
+            ("time-out", true),
             ("what limits the lower end", false),
             ("what limits the upper end", false),
         ]),
         rows,
         ..Table::default()
     }
+}
+
+/// The time-out of the action, if the quantity is its duration.
+fn timeout(range: &Range) -> String {
+    range.timeout.as_ref().map(nearest).unwrap_or_default()
 }
 
 pub(super) fn ranges(ranges: &[Range]) -> Table {

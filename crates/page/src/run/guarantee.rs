@@ -107,13 +107,19 @@ impl Guarantees {
 /// How good a promise is, and what it means.
 fn meaning(promise: &str) -> (i8, &'static str) {
     match promise {
-        "envelope" => (3, "works whatever happens within the envelope"),
-        "part-of-envelope" => (2, "works whatever happens within a part of the envelope"),
+        "envelope" => (
+            3,
+            "works whatever happens within the envelope, unless an action times out",
+        ),
+        "part-of-envelope" => (
+            2,
+            "works whatever happens within a part of the envelope, unless an action times out",
+        ),
         "planned" => (
             1,
-            "works if what is still to start takes as long as planned",
+            "no guarantee, feasible at nominal durations: works if each action still to start takes as long as planned",
         ),
-        "luck" => (0, "can still work, with luck"),
+        "luck" => (0, "no guarantee, may still work"),
         _ => (-1, "none"),
     }
 }

@@ -26,10 +26,11 @@ test("the intervals on the page are those of the document", async () => {
   const cells = await cellsOf(rowsOf(tab, "How far each quantity may deviate"));
   assert.equal(cells.length, parameters.length);
   for (const [index, parameter] of parameters.entries()) {
-    const [name, quantity, nominal, lower, upper, low, high] = cells[index];
+    const [name, quantity, nominal, lower, upper, timeout, low, high] = cells[index];
     assert.deepEqual([name, quantity, low, high],
       [parameter.name, parameter.quantity, parameter.lower_limit ?? "", parameter.upper_limit ?? ""]);
     assert.equal(Number(nominal), parameter.nominal.decimal);
+    assert.equal(Number(timeout), parameter.timeout.decimal);
     // Rounded inwards, to three digits.
     assert.ok(Number(lower) >= parameter.lower.decimal && Number(lower) - parameter.lower.decimal < 0.001);
     assert.ok(Number(upper) <= parameter.upper.decimal && parameter.upper.decimal - Number(upper) < 0.001);

@@ -36,7 +36,7 @@ const SUPPORTED: &[(&str, &str)] = &[
     ),
     (
         "Durations",
-        "`=`, `<=`, `>=`, several of them, read at start or at end, dependent on fluents; `?duration` in conditions and effects",
+        "`=`, `<=`, `>=`, several of them, read at start or at end, dependent on fluents; `?duration` in conditions and effects: the planned duration until the action ends, the real one at its end",
     ),
     (
         "Continuous effects",

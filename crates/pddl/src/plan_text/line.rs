@@ -1,6 +1,11 @@
-//! One line of a plan, or of a planner's log.
+//! One line of a plan, or of a planner's log. The domain is not known here.
+
+mod cursor;
 
 use std::ops::Range;
+
+use crate::plan_text::form::Form;
+use cursor::Cursor;
 
 /// The kind of a line of a planner's log, for programs that read a log while it is being written.
 ///
@@ -16,7 +21,7 @@ pub enum LineKind {
     Noise,
     /// Actions with times.
     Timed,
-    /// It begins like an action with a time, but is none.
+    /// It begins like an action with a time, but may be none: the domain decides.
     Broken,
     /// Actions without times: a classical plan, or something else in parentheses.
     Untimed,
@@ -26,12 +31,16 @@ impl LineKind {
     /// The kind of this line.
     pub fn of(text: &str) -> Self {
         match line(text.trim_end(), 0) {
-            Line::Blank => Self::Blank,
-            Line::Separator => Self::Separator,
+            Line::Blank | Line::Rule => Self::Blank,
+            Line::Heading => Self::Separator,
             Line::Noise => Self::Noise,
-            Line::Steps(steps) if steps.iter().all(|step| step.time.is_none()) => Self::Untimed,
-            Line::Steps(_) => Self::Timed,
             Line::Broken(..) => Self::Broken,
+            Line::Steps(steps) => match steps.first() {
+                Some(step) if step.form == Form::Words => Self::Broken,
+                Some(step) if step.time.is_some() => Self::Timed,
+                Some(step) if step.form == Form::Ipc => Self::Untimed,
+                _ => Self::Noise,
+            },
         }
     }
 }
@@ -42,7 +51,9 @@ pub(super) enum Line<'s> {
     /// Nothing, or a comment that says nothing.
     Blank,
     /// The line begins another plan of the same log.
-    Separator,
+    Heading,
+    /// A ruler, such as `-----`.
+    Rule,
     /// Anything else a planner may say.
     Noise,
     /// Actions.
@@ -52,17 +63,28 @@ pub(super) enum Line<'s> {
 }
 
 /// An action as written. Places are bytes from the beginning of the text.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct RawStep<'s> {
-    /// The time before the colon.
+    /// The notation.
+    pub(super) form: Form,
+    /// The number before the action: its time, or its position where [`Form::is_sequential`].
     pub(super) time: Option<Word<'s>>,
     /// The action's name and arguments; at least the name.
     pub(super) words: Vec<Word<'s>>,
-    /// The duration in brackets.
+    /// The duration.
     pub(super) duration: Option<Word<'s>>,
-    /// What stands beside the duration, or in its place, and is not read: a unit of time, or a
-    /// number without brackets.
-    pub(super) stray: Option<Word<'s>>,
+    /// The unit behind the duration, which is not read.
+    pub(super) unit: Option<Word<'s>>,
+    /// Counter of equal actions in happenings.
+    pub(super) counter: Option<Word<'s>>,
+}
+
+impl RawStep<'_> {
+    /// The place of the action's name and arguments.
+    pub(super) fn range(&self) -> Range<usize> {
+        let first = self.words.first().map_or(0, |word| word.range.start);
+        first..self.words.last().map_or(first, |word| word.range.end)
+    }
 }
 
 /// A word and its place.
@@ -74,270 +96,93 @@ pub(super) struct Word<'s> {
 
 /// Takes a line apart that begins at byte `start` of its text.
 pub(super) fn line(text: &str, start: usize) -> Line<'_> {
-    let mut cursor = Cursor { text, at: 0, start };
+    let mut cursor = Cursor::new(text, start);
     cursor.skip_space();
-    if cursor.is_done() {
-        return match text.find(';') {
-            Some(comment) if is_announcement(&text[comment..]) => Line::Separator,
-            _ => Line::Blank,
+    if cursor.is_done_or_comment() {
+        return if is_heading(text) {
+            Line::Heading
+        } else {
+            Line::Blank
         };
     }
-    let mut steps = Vec::new();
-    while !cursor.is_done() {
+    if is_rule(text) {
+        return Line::Rule;
+    }
+    if !text.trim_start().starts_with('(') && is_heading(text) {
+        return Line::Heading;
+    }
+    let mut steps: Vec<RawStep<'_>> = Vec::new();
+    while !cursor.is_done_or_comment() {
+        let at = cursor.place();
         match cursor.step() {
             Ok(Some(step)) => steps.push(step),
-            Ok(None) if steps.is_empty() && is_announcement(text) => return Line::Separator,
-            Ok(None) if steps.is_empty() => return Line::Noise,
-            // What planners add behind an action.
-            Ok(None) => {
-                let last = steps.last_mut();
-                if let Some(step) = last.filter(|step: &&mut RawStep<'_>| step.duration.is_none()) {
-                    step.stray = cursor.bare_number();
-                }
-                break;
+            Ok(None) if steps.iter().any(|step| step.time.is_some()) => {
+                return Line::Broken(at, "expected the end of the line after the action");
             }
-            Err((at, expected)) => return Line::Broken(start + at, expected),
+            Ok(None) => return Line::Noise,
+            Err((at, expected)) => return Line::Broken(at, expected),
         }
         cursor.skip_space();
     }
-    Line::Steps(steps)
+    match steps.as_slice() {
+        [] => Line::Noise,
+        // ENHSP prints the time that passes between two actions.
+        [step] if step.form == Form::Words && is_waiting(step) => Line::Blank,
+        _ => Line::Steps(steps),
+    }
 }
 
-/// Whether planners print this before a plan, or between a plan and a better one.
-fn is_announcement(text: &str) -> bool {
-    const ANNOUNCEMENTS: &[&str] = &[
+/// Returns `true` for `0.0: -----waiting---- [10.0]`.
+fn is_waiting(step: &RawStep<'_>) -> bool {
+    let name = step.words.first().map_or("", |word| word.text);
+    step.words.len() == 1 && name.starts_with("--") && name.trim_matches('-') == "waiting"
+}
+
+/// Returns `true` for three or more times the same sign.
+fn is_rule(text: &str) -> bool {
+    let text = text.trim();
+    ['-', '=', '*', '_', '~', '#']
+        .iter()
+        .any(|&sign| text.len() >= 3 && text.chars().all(|c| c == sign))
+}
+
+/// Returns `true` if planners print this before a plan, or between a plan and a better one.
+fn is_heading(text: &str) -> bool {
+    /// Beginnings, behind signs.
+    const BEGINNINGS: &[&str] = &[
+        "all goal deadlines now no later than",
+        "ff: found legal plan",
+        "ff: found plan",
+        "found new plan",
+        "found plan",
+        "found solution",
+        "plan computed",
         "plan found",
+        "sequentialplan:",
         "solution found",
         "solution number",
-        "plan computed",
-        "found plan",
-        "found new plan",
         "states evaluated",
+        "timetriggeredplan:",
     ];
-    let text = text.to_ascii_lowercase();
-    ANNOUNCEMENTS.iter().any(|words| text.contains(words))
-}
-
-/// The number in brackets, and what stands behind it.
-type Duration<'s> = (Option<Word<'s>>, Option<Word<'s>>);
-
-/// A place in a line.
-struct Cursor<'s> {
-    text: &'s str,
-    at: usize,
-    /// Where the line begins in its text.
-    start: usize,
-}
-
-impl<'s> Cursor<'s> {
-    fn rest(&self) -> &'s str {
-        &self.text[self.at..]
+    /// Whole lines, without signs.
+    const LINES: &[&str] = &["plan", "new plan", "rescheduled plan", "the plan"];
+    let mut text = text.trim();
+    // Fast Downward: `[t=0.003s, 10084 KB] Solution found!`.
+    if let Some((_, behind)) = text.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+        text = behind;
     }
-
-    fn is_done(&self) -> bool {
-        self.rest().is_empty()
-    }
-
-    /// Skips spaces, and a comment.
-    fn skip_space(&mut self) {
-        let rest = self.rest();
-        let trimmed = rest.trim_start_matches(|c: char| c.is_whitespace() || c == '\0');
-        self.at += rest.len() - trimmed.len();
-        if trimmed.starts_with(';') {
-            self.at = self.text.len();
-        }
-    }
-
-    fn eat(&mut self, character: char) -> bool {
-        let found = self.rest().starts_with(character);
-        if found {
-            self.at += character.len_utf8();
-        }
-        found
-    }
-
-    fn word(&mut self, ends: impl Fn(char) -> bool) -> Word<'s> {
-        let rest = self.rest();
-        let text = &rest[..rest.find(ends).unwrap_or(rest.len())];
-        let from = self.start + self.at;
-        self.at += text.len();
-        Word {
-            text,
-            range: from..from + text.len(),
-        }
-    }
-
-    /// `time: (name argument …) [duration]`, all but the parenthesis optional. `None` if this
-    /// is something else.
-    fn step(&mut self) -> Result<Option<RawStep<'s>>, (usize, &'static str)> {
-        let begin = self.at;
-        let time = self.time();
-        if !self.eat('(') {
-            self.at = begin;
-            return if time.is_some() {
-                Err((begin, "expected `(` after the time"))
-            } else {
-                Ok(None)
-            };
-        }
-        let mut words = Vec::new();
-        loop {
-            self.skip_space();
-            if self.eat(')') {
-                break;
-            }
-            let word = self.word(|c| c.is_whitespace() || matches!(c, '(' | ')' | '[' | ';'));
-            if word.text.is_empty() {
-                return broken(
-                    time.is_some(),
-                    self.at,
-                    "expected `)` at the end of the action",
-                );
-            }
-            words.push(word);
-        }
-        if words.is_empty() {
-            return broken(
-                time.is_some(),
-                begin,
-                "expected the name of an action in the parentheses",
-            );
-        }
-        self.skip_space();
-        while self.eat(')') {
-            self.skip_space();
-        }
-        let (duration, stray) = self.duration()?;
-        Ok(Some(RawStep {
-            time,
-            words,
-            duration,
-            stray,
-        }))
-    }
-
-    /// `12.5 :`
-    fn time(&mut self) -> Option<Word<'s>> {
-        let begin = self.at;
-        let word = self.word(|c| c.is_whitespace() || matches!(c, ':' | '(' | ';'));
-        self.skip_space();
-        let is_number = word
-            .text
-            .trim_start_matches(['-', '+', '.'])
-            .starts_with(|c: char| c.is_ascii_digit());
-        if is_number && self.eat(':') {
-            self.skip_space();
-            Some(word)
-        } else {
-            self.at = begin;
-            None
-        }
-    }
-
-    /// A number that stands alone, as a duration does to which somebody gave no brackets.
-    fn bare_number(&mut self) -> Option<Word<'s>> {
-        let word = self.word(char::is_whitespace);
-        word.text.parse::<f64>().is_ok().then_some(word)
-    }
-
-    /// `[10.0]`, `[D:10.0; C:0.1]`; the second word is what stands behind the number.
-    fn duration(&mut self) -> Result<Duration<'s>, (usize, &'static str)> {
-        if !self.eat('[') {
-            return Ok((None, None));
-        }
-        self.skip_space();
-        if self.rest().starts_with(['D', 'd']) {
-            self.at += 1;
-            self.skip_space();
-            self.eat(':');
-            self.skip_space();
-        }
-        let duration = self.word(|c| c.is_whitespace() || matches!(c, ']' | ';'));
-        let Some(end) = self.rest().find(']') else {
-            return Err((self.at, "expected `]` after the duration"));
-        };
-        let behind = &self.rest()[..end];
-        let unit = behind.trim();
-        let from = self.start + self.at + (behind.len() - behind.trim_start().len());
-        let stray = (!unit.is_empty() && !unit.starts_with(';')).then_some(Word {
-            text: unit,
-            range: from..from + unit.len(),
-        });
-        self.at += end + 1;
-        if duration.text.is_empty() {
-            return Err((self.at - 1, "expected a duration in the brackets"));
-        }
-        Ok((Some(duration), stray))
-    }
-}
-
-/// A line with a time is meant as an action; others may be anything.
-fn broken<T>(
-    has_time: bool,
-    at: usize,
-    expected: &'static str,
-) -> Result<Option<T>, (usize, &'static str)> {
-    if has_time {
-        Err((at, expected))
-    } else {
-        Ok(None)
-    }
+    let text = text.trim_start_matches(|c: char| !c.is_alphanumeric());
+    // Steps are longer than all of these words.
+    let head: String = text
+        .chars()
+        .take(48)
+        .collect::<String>()
+        .to_ascii_lowercase();
+    // unified-planning: `plan: TimeTriggeredPlan:`.
+    let head = head.strip_prefix("plan: ").unwrap_or(&head);
+    let whole = head.trim_end_matches(|c: char| !c.is_alphanumeric());
+    BEGINNINGS.iter().any(|words| head.starts_with(words)) || LINES.contains(&whole)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// `time/word word/duration` of each step.
-    fn shown(text: &str) -> String {
-        match line(text, 0) {
-            Line::Steps(steps) => steps
-                .iter()
-                .map(|step| {
-                    let text =
-                        |word: &Option<Word>| word.as_ref().map_or("", |w| w.text).to_owned();
-                    let words: Vec<_> = step.words.iter().map(|w| w.text).collect();
-                    format!(
-                        "{}/{}/{}",
-                        text(&step.time),
-                        words.join(" "),
-                        text(&step.duration)
-                    )
-                })
-                .collect::<Vec<_>>()
-                .join(", "),
-            other => format!("{other:?}"),
-        }
-    }
-
-    #[test]
-    fn each_planner_has_its_own_way_to_write_an_action() {
-        assert_eq!(
-            shown("0.000: (move a b)  [12.000]"),
-            "0.000/move a b/12.000"
-        );
-        assert_eq!(
-            shown("0.0002:   (SWAP_6_7 Q6 Q7) [D:2.0000; C:0.1000]"),
-            "0.0002/SWAP_6_7 Q6 Q7/2.0000"
-        );
-        assert_eq!(shown(" 3 : ( go )) ; home"), "3/go/");
-        assert_eq!(shown("(a b)"), "/a b/");
-        assert_eq!(shown("0: (a) [1] 1: (b) [2]"), "0/a/1, 1/b/2");
-    }
-
-    #[test]
-    fn what_is_not_an_action_is_noise() {
-        assert_eq!(shown("b (10.000 | 0.100)b (8.000 | 0.200)"), "Noise");
-        assert_eq!(shown("; Plan found with metric 12.0"), "Separator");
-        assert_eq!(shown(";;;; Solution Found"), "Separator");
-        assert_eq!(shown("; then go home"), "Blank");
-        assert_eq!(shown("Total time: 0.03"), "Noise");
-    }
-
-    #[test]
-    fn a_broken_action_says_what_is_expected_where() {
-        assert!(matches!(line("0.0: (a b", 0), Line::Broken(9, _)));
-        assert!(matches!(line("0.0: a b", 0), Line::Broken(0, _)));
-        assert!(matches!(line("0.0: (a b) [3", 0), Line::Broken(13, _)));
-    }
-}
+mod tests;

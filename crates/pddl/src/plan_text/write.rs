@@ -10,16 +10,49 @@ const FEWEST_DIGITS: usize = 3;
 /// The number of digits tried before a number is written as a fraction.
 const MOST_DIGITS: u32 = 300;
 
-/// The plan as text that [`read_plan`](crate::read_plan) and other tools read: one
+/// The plan as text that [`read_plan`](crate::read_plan) reads: one
 /// `0.000: (action argument …) [10.000]` on each line, by start time.
 ///
 /// Numbers are written exactly; one without a finite decimal is written as `p/q`, which other
 /// tools may refuse.
 pub fn write_plan(task: &Task, plan: &TimeTriggeredPlan) -> String {
+    written(task, plan, &|step| {
+        let duration = step.duration.as_ref().map(decimal);
+        (decimal(&step.start), duration)
+    })
+}
+
+/// The plan as [`write_plan`] writes it, with all times rounded to `digits` digits after the point.
+///
+/// A duration is the difference of the rounded end and the rounded start. So happenings keep their
+/// order, simultaneous happenings stay simultaneous, and a distance with at most `digits` digits does
+/// not shrink.
+pub fn write_rounded_plan(task: &Task, plan: &TimeTriggeredPlan, digits: u32) -> String {
+    let rounded = |value: &Rational| -> Rational {
+        let nearest = value.to_decimal(digits).parse();
+        nearest.unwrap_or_else(|_| value.clone())
+    };
+    written(task, plan, &|step| {
+        let start = rounded(&step.start);
+        let duration = step
+            .duration
+            .as_ref()
+            .map(|_| rounded(&step.end()) - &start);
+        (decimal(&start), duration.as_ref().map(decimal))
+    })
+}
+
+/// The lines of a plan, with the start and the duration of each step as `numbers` gives them.
+fn written(
+    task: &Task,
+    plan: &TimeTriggeredPlan,
+    numbers: &dyn Fn(&Step) -> (String, Option<String>),
+) -> String {
     let mut text = String::new();
     for step in Step::by_start(&plan.steps) {
         let action = &step.action;
-        text.push_str(&decimal(&step.start));
+        let (start, duration) = numbers(step);
+        text.push_str(&start);
         text.push_str(": ");
         if task.problem().controls.contains_key(&action.schema) {
             // The numbers that the plan chooses stand in the name only.
@@ -27,9 +60,9 @@ pub fn write_plan(task: &Task, plan: &TimeTriggeredPlan) -> String {
         } else {
             text.push_str(&task.action_name(action.schema, &action.arguments));
         }
-        if let Some(duration) = &step.duration {
+        if let Some(duration) = duration {
             // Writing to a string cannot fail.
-            let _ = write!(text, " [{}]", decimal(duration));
+            let _ = write!(text, " [{duration}]");
         }
         text.push('\n');
     }

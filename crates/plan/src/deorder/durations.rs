@@ -98,7 +98,7 @@ fn bounds(interval: Interval) -> Option<(Bound, Bound)> {
 }
 
 /// The durations that each instance may have, `None` where that depends on the schedule.
-fn intervals(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<Option<Interval>> {
+pub(super) fn intervals(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<Option<Interval>> {
     let mut nodes: Vec<(NodeId, Node)> = plan.nodes().collect();
     nodes.sort_by(|(a, _), (b, _)| times[*a].cmp(&times[*b]));
     let mut values = Values::new(task.initial());

@@ -51,8 +51,12 @@ pub fn keeps_all_that_is_read(task: &Task, plan: &ParametrizedPlan, nominal: &Sc
             return true;
         };
         let ends = ends[InstanceId::from(index).index()];
+        // A condition over no time may be false, and is broken as soon as the action takes time.
+        let is_vacuous = nominal[ends.0] == nominal[ends.1] && !body.over_all.is_trivial();
         let mut conjuncts = body.over_all.conjuncts().into_iter();
-        changes.keep_durations(body) && conjuncts.all(|it| changes.keep(task, it, ends))
+        !is_vacuous
+            && changes.keep_durations(body)
+            && conjuncts.all(|it| changes.keep(task, it, ends))
     })
 }
 

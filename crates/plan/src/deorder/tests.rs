@@ -73,6 +73,25 @@ c: n1.end - n1.start in [15, 15];"
 }
 
 #[test]
+fn instances_of_one_action_stay_apart_unless_they_overlap_in_the_plan() {
+    let both = "c: n0.end - n0.start in [15, 15];\nc: n1.end - n1.start in [15, 15];";
+    assert_eq!(
+        constraints(
+            "0: collect s1 [15]
+             15: collect s1 [15]"
+        ),
+        format!("{both}\nc: n1.start - n0.end in [0, inf];")
+    );
+    assert_eq!(
+        constraints(
+            "0: collect s1 [15]
+             14: collect s1 [15]"
+        ),
+        both
+    );
+}
+
+#[test]
 fn a_writer_of_an_over_all_condition_stays_outside() {
     assert_eq!(
         constraints(

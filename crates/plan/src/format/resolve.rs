@@ -55,13 +55,14 @@ pub(super) fn resolve(
     let parameters = parameters::parameters(file, task, &plan, kinds, &open, mistakes)?;
     let mut goal = task.goal().clone();
     unknowns::fill(&mut plan, &mut goal, &open);
-    Some(ParametrizedPlan {
+    let plan = ParametrizedPlan {
         plan,
         parameters,
         initial: BTreeMap::new(),
         told: BTreeMap::new(),
         goal,
-    })
+    };
+    Some(plan.with_planned_durations())
 }
 
 /// The names that constraints can mention.

@@ -61,12 +61,6 @@ impl<'a> Opening<'a> {
         })
     }
 
-    /// Leaves to the executor what the domain does: no duration that it does not fix is opened.
-    pub(super) fn leave_to_executor(&mut self) {
-        let told = self.told();
-        self.controllable.extend(told.into_keys());
-    }
-
     /// Applies all specifications.
     pub(super) fn apply_all(&mut self, specs: &[VarySpec]) -> Result<(), ParametrizeError> {
         // What the executor chooses is not opened, wherever in the list that stands.
@@ -212,7 +206,7 @@ impl<'a> Opening<'a> {
         }
         unknowns::fill(&mut plan.plan, &mut plan.goal, &self.open_numbers);
         self.plan.told = self.told();
-        Ok(self.plan)
+        Ok(self.plan.with_planned_durations())
     }
 
     /// How long those actions are planned to take that the executor tells how long to.

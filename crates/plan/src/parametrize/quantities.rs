@@ -6,7 +6,7 @@ use std::sync::Arc;
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::FluentId;
 use elbowroom_model::problem::{Comparison, FunctionId};
-use elbowroom_num::Rational;
+use elbowroom_num::{End, Interval, Rational};
 
 use super::constants::{self, Place};
 use super::opening::{Opening, Quantity};
@@ -44,11 +44,39 @@ impl Opening<'_> {
             let kind = ParameterKind::Duration(id);
             let parameter = self.parameter(spec, Quantity::Duration(id), name, kind, nominal)?;
             if is_new {
+                if spec.range.is_none() {
+                    self.limit_to_domain(id, parameter);
+                }
                 set.push((id, start, end, parameter));
             }
         }
         self.set_durations(&set);
         Ok(())
+    }
+
+    /// Limits a duration for which the domain gives an interval to that interval. (Where the domain gives one number,
+    /// that is the planned duration, and the real one may be any.)
+    fn limit_to_domain(&mut self, id: InstanceId, parameter: ParameterId) {
+        let mut constraints = self.plan.plan.constraints.iter();
+        let Some(domain) = constraints.find(|it| it.reason == Reason::Duration(id)) else {
+            return;
+        };
+        if domain.lower == domain.upper {
+            return;
+        }
+        let end = |bound: &Bound| match bound {
+            Bound::Finite(value) => End::Closed(value.clone()),
+            Bound::Infinite | Bound::Parameter(_) => End::Infinite,
+        };
+        let parameter = &mut self.plan.parameters[parameter.index()];
+        let allowed = parameter.range.intersection(&Interval {
+            lower: end(&domain.lower),
+            upper: end(&domain.upper),
+        });
+        // A schedule that was rounded may miss the interval by a little.
+        if allowed.contains(&parameter.nominal) {
+            parameter.range = allowed;
+        }
     }
 
     /// The parameters that stand for durations already.

@@ -189,7 +189,9 @@ fn run(options: &Options, instance: &Instance) {
             }
             ("unsolvable".to_owned(), String::new(), *counts)
         }
-        Answer::NoneFound { stopped, counts } => (
+        Answer::NoneFound {
+            stopped, counts, ..
+        } => (
             format!("none-{stopped:?}").to_lowercase(),
             String::new(),
             *counts,

@@ -22,6 +22,9 @@ pub struct Settings {
     /// The names of ground actions, `(drive rover depot shelf)`, that plans must do without. What is
     /// proved then is proved of plans without them.
     pub without: BTreeSet<String>,
+    /// `true` if a ground action may overlap itself: two of its instances each start before the other one has
+    /// ended.
+    pub self_overlap: bool,
     /// How many threads may work at the same time. The answer and what is reported are the same
     /// whatever their number. More than two are of use before the first plan only. WebAssembly has one.
     pub threads: usize,
@@ -41,13 +44,14 @@ pub enum Objective {
 }
 
 impl Default for Settings {
-    /// Memory 2 GiB, any number of plans with any action, the problem's own metric, one thread.
+    /// Memory 2 GiB, any number of plans with any action, no self-overlap, the problem's own metric, one thread.
     fn default() -> Self {
         Self {
             max_memory: 2 << 30,
             first_plan_only: false,
             objective: Objective::Metric,
             without: BTreeSet::new(),
+            self_overlap: false,
             threads: 1,
             tuning: Tuning::default(),
         }
@@ -94,6 +98,8 @@ pub struct Counts {
     /// States made and estimated, and states made again for candidates that came to nothing: that the
     /// judge refused, or that were no better than the best plan.
     pub evaluated: u64,
+    /// The work so far, in the units of [`elbowroom_num::work`].
+    pub work: u64,
     /// About how many bytes the states take.
     pub memory: usize,
 }
@@ -124,7 +130,9 @@ pub enum Answer {
         /// Statistics.
         counts: Counts,
     },
-    /// No plan exists.
+    /// No plan exists, as far as the search's own rules go; or, by [`Proof::WithoutSelfOverlap`], none
+    /// without self-overlap. Front ends report it only with a certificate of
+    /// `elbowroom-verify`.
     Unsolvable {
         /// The reason.
         proof: Proof,
@@ -135,6 +143,8 @@ pub enum Answer {
     NoneFound {
         /// Why the search did not go on.
         stopped: Stopped,
+        /// `true` if plans were excluded with self-overlap.
+        without_self_overlap: bool,
         /// Statistics.
         counts: Counts,
     },
@@ -143,6 +153,16 @@ pub enum Answer {
 }
 
 impl Answer {
+    /// The statistics; `None` where nothing was searched.
+    pub fn counts(&self) -> Option<&Counts> {
+        match self {
+            Self::Plan { counts, .. }
+            | Self::Unsolvable { counts, .. }
+            | Self::NoneFound { counts, .. } => Some(counts),
+            Self::Unsupported(_) => None,
+        }
+    }
+
     /// The plan, if one was found.
     pub fn found(&self) -> Option<&Found> {
         match self {
@@ -186,6 +206,15 @@ pub enum Proof {
         "no plan exists: every order in which things can happen was tried, {states} states in all"
     )]
     Exhausted {
+        /// The number of states.
+        states: u64,
+    },
+    /// All orders of happenings were tried without self-overlap.
+    #[error(
+        "no plan exists without self-overlap: every order in which things can happen was tried, {states} states \
+         in all"
+    )]
+    WithoutSelfOverlap {
         /// The number of states.
         states: u64,
     },

@@ -2,7 +2,7 @@
 
 mod conditions;
 mod durations;
-mod effects;
+pub(super) mod effects;
 mod places;
 
 use elbowroom_model::problem::UpdateOperator;
@@ -13,9 +13,10 @@ use super::compile::{Compiled, NONE};
 use super::expressions::{Form, Moment};
 use super::formula::set;
 use super::network::{NodeId, SETTLED};
-use super::state::{Open, State};
+use super::state::{Joint, Open, State};
 use super::symbolic;
 use super::time::{NEVER, Ticks};
+use conditions::Side;
 use durations::demand_duration;
 use places::{forget_past, insert, reach_foreseen_end, reach_timed, settle};
 
@@ -45,9 +46,16 @@ pub(crate) struct Stepper<'a> {
     pub(crate) log: Option<Log>,
     /// Whether what is chosen later happens no earlier.
     pub(crate) is_chronological: bool,
+    /// `true` if an over-all condition may be false until the moment is complete.
+    pub(crate) joins: bool,
+    /// The node of the happening chosen last, in a search that joins happenings.
+    newest: NodeId,
     /// Whether a duration had to be rounded to a tick, so that nothing is proved.
     pub(crate) has_rounded: bool,
 }
+
+/// The most happenings that are joined at one moment.
+const MOST_JOINED: u8 = 6;
 
 /// The exact data of a network's nodes, whose times are rounded to ticks.
 #[derive(Clone, Debug, Default)]
@@ -65,6 +73,8 @@ impl<'a> Stepper<'a> {
             limit: None,
             log: None,
             is_chronological: false,
+            joins: false,
+            newest: SETTLED,
             has_rounded: false,
         }
     }
@@ -75,11 +85,12 @@ impl<'a> Stepper<'a> {
         if let Step::Start(action) | Step::Compressed(action) = step {
             let action = self.compiled.action(action);
             let snap = self.compiled.snap(action.start);
-            if !snap
-                .condition
-                .literals
-                .iter()
-                .all(|l| l.holds(&state.facts))
+            if state.excludes(self.compiled, action)
+                || !snap
+                    .condition
+                    .literals
+                    .iter()
+                    .all(|l| l.holds(&state.facts))
             {
                 return None;
             }
@@ -115,7 +126,7 @@ impl<'a> Stepper<'a> {
         if self.settles(state) && self.is_chronological {
             forget_past(state, self.compiled.longest_distance);
         }
-        self.keeps_conditions(state)?;
+        self.keeps_conditions_or_joins(state)?;
         let is_in_time = state.earliest_end() <= self.horizon;
         (is_in_time && self.has_times(state)).then_some(())
     }
@@ -130,13 +141,32 @@ impl<'a> Stepper<'a> {
 
     /// Whether happenings may leave the network.
     fn settles(&self, state: &State) -> bool {
-        self.log.is_none() && state.symbolic.is_none()
+        self.log.is_none() && state.symbolic.is_none() && !self.joins
+    }
+
+    /// Returns `Some` if all over-all conditions hold, or further happenings of the same moment may still
+    /// bring them about.
+    fn keeps_conditions_or_joins(&self, state: &mut State) -> Option<()> {
+        let before = state.joint.take();
+        let is_kept = self.keeps_conditions(state);
+        if is_kept.is_some() || !self.joins || self.newest == SETTLED {
+            return is_kept;
+        }
+        let count = before.map_or(1, |joint| joint.count + 1);
+        state.joint = Some(Joint {
+            node: self.newest,
+            count,
+        });
+        (count < MOST_JOINED).then_some(())
     }
 
     /// Starts a durative action and returns its place among those under way, or lets an
     /// instantaneous action happen.
     fn start(&mut self, state: &mut State, number: u32) -> Option<usize> {
         let action = self.compiled.action(number);
+        if state.excludes(self.compiled, action) {
+            return None;
+        }
         let snap = self.compiled.snap(action.start);
         if action.end == NONE {
             let place = self.place(state, snap);
@@ -189,9 +219,9 @@ impl<'a> Stepper<'a> {
         self.take_effect(state, snap, guards, duration.as_ref(), &moment)?;
         for (fluent, rate) in &flows {
             symbolic::flow(state, *fluent, rate, &moment.time)?;
-            self.watch(state, &[*fluent], &moment)?;
+            self.watch(state, &[*fluent], (Side::After, &moment))?;
         }
-        let open = Open {
+        let mut open = Open {
             action: number,
             node,
             start: state.network.earliest(node),
@@ -201,8 +231,10 @@ impl<'a> Stepper<'a> {
             guards,
             end,
             flows,
+            beginnings: Vec::new(),
+            chosen: Vec::new(),
         };
-        self.watch_all(state, &open, &moment)?;
+        self.watch_all(state, &mut open, (Side::Beginning, &moment))?;
         self.nest(state, &open)?;
         let place = state.open.partition_point(|other| other.action <= number);
         state.open.insert(place, open);
@@ -251,20 +283,21 @@ impl<'a> Stepper<'a> {
             } else {
                 duration_form(open.duration.as_ref(), open.node, node)
             };
-            (Form::node(node), Some(duration))
+            (symbolic::end_form(&open, node), Some(duration))
         });
         self.demand(state, &snap.condition, open.duration.as_ref(), &moment)?;
         if state.symbolic.is_some() {
-            self.watch_all(state, &open, &moment)?;
+            self.watch_all(state, &mut open, (Side::Arrival, &moment))?;
             demand_duration(state, action, true, &moment)?;
             for (fluent, _) in &open.flows {
-                self.watch(state, &[*fluent], &moment)?;
+                self.watch(state, &[*fluent], (Side::Arrival, &moment))?;
             }
         }
         state.open.remove(place);
         self.take_effect(state, snap, open.guards, open.duration.as_ref(), &moment)?;
         for (fluent, rate) in &open.flows {
             symbolic::flow(state, *fluent, &-rate, &moment.time)?;
+            self.watch(state, &[*fluent], (Side::After, &moment))?;
         }
         if self.settles(state) && !self.is_chronological {
             settle(state);
@@ -302,6 +335,10 @@ impl<'a> Stepper<'a> {
         if self.is_chronological {
             reach_timed(state, timed.time)?;
         }
+        if self.joins {
+            let node = state.network.add_node(timed.time, timed.time, &[]).ok()?;
+            self.join(state, node)?;
+        }
         for &fact in &timed.deletes {
             set(&mut state.facts, fact, false);
         }
@@ -314,10 +351,10 @@ impl<'a> Stepper<'a> {
         };
         for (fluent, value) in &timed.assigns {
             if state.symbolic.is_some() {
-                self.watch(state, &[*fluent], &moment)?;
+                self.watch(state, &[*fluent], (Side::Arrival, &moment))?;
                 let value = Form::constant(value.clone());
                 symbolic::update(state, *fluent, UpdateOperator::Assign, &value, &moment)?;
-                self.watch(state, &[*fluent], &moment)?;
+                self.watch(state, &[*fluent], (Side::After, &moment))?;
             } else {
                 state.values[*fluent as usize] = Some(value.clone());
             }

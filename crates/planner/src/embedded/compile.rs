@@ -14,14 +14,21 @@ mod completeness;
 mod compressibility;
 mod compression;
 mod directions;
+mod fixed_durations;
+mod guarded;
 mod interference;
 mod metric;
+mod own_start;
 mod reads;
 mod rules;
 mod shortened;
 mod symbols;
 mod times;
+mod unfolded;
 mod unsupported;
+mod without_duration;
+
+use std::borrow::Borrow;
 
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
@@ -41,6 +48,10 @@ pub(crate) const NONE: u32 = u32::MAX;
 
 /// A problem from a situation on.
 #[derive(Debug)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a property of the whole problem"
+)]
 pub(crate) struct Compiled {
     pub(crate) scale: Scale,
     pub(crate) epsilon: Ticks,
@@ -82,6 +93,11 @@ pub(crate) struct Compiled {
     pub(crate) incomplete_because: Option<&'static str>,
     /// The same for a form in which numbers, and what is reached once, are never lost.
     pub(crate) relaxation_incomplete_because: Option<&'static str>,
+    /// `true` if several happenings of one moment may keep an over-all condition that none of them keeps
+    /// alone, in any order.
+    pub(crate) needs_joining: bool,
+    /// `true` if starts of one moment may need each other's effects.
+    pub(crate) starts_depend_on_each_other: bool,
     /// Whether some value depends on when things happen.
     pub(crate) is_symbolic: bool,
 }
@@ -153,6 +169,9 @@ pub(crate) struct Action {
     pub(crate) is_compression_safe: bool,
     /// Whether it cannot start while another instance of it runs.
     pub(crate) excludes_itself: bool,
+    /// The annotation of the latest end of the ground action, which no instance may overlap; [`NONE`] if
+    /// instances may overlap, or never do. All forms of the ground action share it.
+    pub(crate) exclusion: u32,
     /// Whether something reads `?duration`, or changes continuously.
     pub(crate) uses_duration: bool,
 }
@@ -218,6 +237,11 @@ pub(crate) struct Rule {
 }
 
 impl Compiled {
+    /// Returns `true` if plans with self-overlap are excluded.
+    pub(crate) fn excludes_self_overlap(&self) -> bool {
+        self.actions.iter().any(|action| action.exclusion != NONE)
+    }
+
     /// Whether a goal that is out of reach of a relaxation is out of reach.
     pub(crate) fn is_relaxation_exact(&self) -> bool {
         self.is_exact && self.relaxation_incomplete_because.is_none()
@@ -242,4 +266,16 @@ impl Compiled {
     pub(crate) fn action(&self, number: u32) -> &Action {
         &self.actions[number as usize]
     }
+}
+
+/// Returns `true` if a fluent has several updates that do not commute. The validator rejects them.
+pub(super) fn is_conflict<U: Borrow<Update>>(updates: &[U]) -> bool {
+    updates.iter().enumerate().any(|(place, update)| {
+        let update = update.borrow();
+        let mut others = updates[..place].iter().map(Borrow::borrow);
+        others.any(|other| {
+            let is_additive = other.operator.is_additive() && update.operator.is_additive();
+            other.fluent == update.fluent && !is_additive
+        })
+    })
 }

@@ -20,11 +20,14 @@
 //! What timed initials would break, an observer sees and locks before (`timed`). Observers and what
 //! waits are left out of the plan, and the judge sees it under the constraints as they are. There
 //! are a little fewer plans then: what an observer sees lasts for ε, and happenings of one time do
-//! not keep a clause together. So nothing is proved this way. What is proved without the
-//! constraints, is true with them.
+//! not keep a clause together. So nothing is proved this way. Where nothing is found, or a constraint has no
+//! such form, a search ignores the constraints, and the judge rejects the plans that break them. A proof
+//! for the problem without constraints holds with them.
 
 mod actions;
 mod clauses;
+mod consequences;
+mod delay;
 mod regression;
 mod rewriting;
 mod timed;
@@ -38,6 +41,8 @@ use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 
 use super::answer::{Answer, Counts, Found, Objective, Progress, Proof, Settings, Stopped};
 use super::compile::Unsupported;
+pub(super) use delay::delayed;
+use rewriting::Coverage;
 
 /// Why a problem has no form without constraints.
 enum Obstacle {
@@ -49,6 +54,9 @@ enum Obstacle {
 
 /// How many states are evaluated for each preference that is tried.
 const TRIAL: u64 = 20_000;
+
+/// Most states of each of the short searches, under the constraints and without them, before the whole search.
+const QUICK: u64 = 60;
 
 /// Whether plans of a task are looked for here.
 pub(super) fn concerns(task: &Task, situation: &Situation, settings: &Settings) -> bool {
@@ -90,11 +98,12 @@ pub(super) fn plan(
         observe,
         best: None,
         is_interrupted: false,
+        spent: Counts::default(),
     };
     let is_improving = !settings.first_plan_only && counts_violations(task);
     let mut demanded = Vec::new();
     if is_improving {
-        let first = match search.under(&demanded, None, true) {
+        let first = match search.under((&demanded, Coverage::All), None, true) {
             Ok(answer) => answer,
             Err(answer) => return *answer,
         };
@@ -104,7 +113,7 @@ pub(super) fn plan(
         for soft in 0..task.constraints().soft.len() {
             demanded.push(soft);
             let before = search.best.as_ref().map(|best| best.value.clone());
-            let tried = search.under(&demanded, Some(TRIAL), true);
+            let tried = search.under((&demanded, Coverage::All), Some(TRIAL), true);
             let after = search.best.as_ref().map(|best| best.value.clone());
             if tried.is_err() || after == before {
                 demanded.pop();
@@ -117,10 +126,23 @@ pub(super) fn plan(
             return search.answer(first);
         }
     }
-    match search.under(&demanded, None, settings.first_plan_only) {
+    if search.best.is_none()
+        && let Some(answer) = search.quickly(&demanded)
+    {
+        return answer;
+    }
+    match search.under((&demanded, Coverage::All), None, settings.first_plan_only) {
         Ok(answer) => {
-            let proof = search.proof_without();
+            let proof = search.without(None);
             proof.unwrap_or_else(|| search.answer(answer))
+        }
+        Err(answer) if matches!(*answer, Answer::Unsupported(_)) => {
+            let is_first = settings.first_plan_only;
+            let expressible = (&demanded[..], Coverage::Expressible);
+            // An obstacle there is none of the problem itself.
+            let _ = search.under(expressible, Some(TRIAL), is_first);
+            let proof = search.without(None);
+            proof.unwrap_or_else(|| search.answer_without_form(*answer))
         }
         Err(answer) => *answer,
     }
@@ -133,6 +155,8 @@ struct Search<'a> {
     observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     best: Option<Found>,
     is_interrupted: bool,
+    /// The states that finished searches made.
+    spent: Counts,
 }
 
 impl Search<'_> {
@@ -140,11 +164,11 @@ impl Search<'_> {
     /// constraints. `Err` if there is no such problem: the answer, then, about the task.
     fn under(
         &mut self,
-        demanded: &[usize],
+        (demanded, coverage): (&[usize], Coverage),
         most_states: Option<u64>,
         first_plan_only: bool,
     ) -> Result<Answer, Box<Answer>> {
-        let free = match rewriting::without_constraints(self.task, demanded) {
+        let free = match rewriting::without_constraints(self.task, demanded, coverage) {
             Ok(problem) => free_task(self.task, problem),
             Err(Obstacle::Feature(feature)) => {
                 return Err(Box::new(unsupported(self.task, feature)));
@@ -160,54 +184,100 @@ impl Search<'_> {
             first_plan_only,
             ..self.settings.clone()
         };
-        let begin = Situation::initial(&free);
-        let answer = super::search_for_plans(&free, &begin, &settings, &mut |progress| {
+        let constrained = (coverage == Coverage::Expressible).then_some(self.task);
+        Ok(self.search(&free, constrained, &settings, most_states))
+    }
+
+    /// Searches for plans of a task without constraints; evaluates about `most_states` states at most.
+    fn search(
+        &mut self,
+        free: &Task,
+        constrained: Option<&Task>,
+        settings: &Settings,
+        most_states: Option<u64>,
+    ) -> Answer {
+        let begin = Situation::initial(free);
+        let mut counts = Counts::default();
+        let mut observe = |progress: &Progress| {
+            counts = progress.counts;
             let is_over = most_states.is_some_and(|most| progress.counts.evaluated > most);
             match self.look(progress) {
                 ControlFlow::Continue(()) if !is_over => ControlFlow::Continue(()),
                 _ => ControlFlow::Break(()),
             }
-        });
-        Ok(answer)
+        };
+        let answer = super::search_for_plans(free, constrained, &begin, settings, &mut observe);
+        self.spent.expanded += counts.expanded;
+        self.spent.generated += counts.generated;
+        self.spent.evaluated += counts.evaluated;
+        self.spent.work += counts.work;
+        answer
     }
 
-    /// The proof that there is no plan even without the constraints, where a search that ended has
-    /// found none.
-    fn proof_without(&mut self) -> Option<Answer> {
+    /// Searches for a first plan for a few states, under the constraints and then without them: the form of
+    /// the constraints may exclude plans that are found at once without it. The answer if that settles the
+    /// matter.
+    fn quickly(&mut self, demanded: &[usize]) -> Option<Answer> {
+        let whole = self.under((demanded, Coverage::All), Some(QUICK), true);
+        let answer = match whole {
+            Ok(answer) => answer,
+            Err(answer) if matches!(*answer, Answer::Unsupported(_)) => {
+                let part = self.under((demanded, Coverage::Expressible), Some(QUICK), true);
+                part.unwrap_or(*answer)
+            }
+            Err(answer) => return Some(*answer),
+        };
+        if self.best.is_none() && !self.is_interrupted {
+            let proof = self.without(Some(QUICK));
+            if proof.is_some() {
+                return proof;
+            }
+        }
+        let is_settled =
+            self.is_interrupted || self.best.is_some() && self.settings.first_plan_only;
+        is_settled.then(|| self.answer(answer))
+    }
+
+    /// Searches without the constraints if the search under them has found nothing: for plans that satisfy
+    /// them by chance, and for a proof that excludes plans even without them.
+    fn without(&mut self, most_states: Option<u64>) -> Option<Answer> {
         if self.best.is_some() || self.is_interrupted {
             return None;
         }
-        let loose = free_task(self.task, rewriting::loosened(self.task));
+        let task = self.task;
+        let loose = free_task(task, rewriting::loosened(task));
         let settings = Settings {
             first_plan_only: true,
             ..self.settings.clone()
         };
-        let observe = &mut self.observe;
-        let mut is_interrupted = false;
-        let begin = Situation::initial(&loose);
-        let answer = super::search_for_plans(&loose, &begin, &settings, &mut |progress| {
-            // Its plans are none of the task.
-            let flow = observe(&Progress {
-                plan: None,
-                best: None,
-                ..progress.clone()
-            });
-            is_interrupted |= flow.is_break();
-            flow
-        });
-        self.is_interrupted |= is_interrupted;
-        matches!(answer, Answer::Unsolvable { .. }).then_some(answer)
+        let answer = self.search(&loose, Some(task), &settings, most_states);
+        match answer {
+            // A rejected plan may represent others that satisfy the constraints.
+            Answer::Unsolvable {
+                proof: Proof::Exhausted { .. } | Proof::WithoutSelfOverlap { .. },
+                ..
+            } => None,
+            Answer::Unsolvable { .. } => Some(answer),
+            _ => None,
+        }
     }
 
     /// Takes over what a search reports.
     fn look(&mut self, progress: &Progress) -> ControlFlow<()> {
         let found = progress.plan.as_ref();
-        let found = found.and_then(|found| judged(self.task, self.settings, &found.plan));
+        let found =
+            found.and_then(|found| judged_without_observers(self.task, self.settings, &found.plan));
         let worth = |found: &Found| (found.value.clone(), found.makespan.clone());
         let best = &self.best;
         let better =
             found.filter(|found| best.as_ref().is_none_or(|best| worth(found) < worth(best)));
+        let mut counts = progress.counts;
+        counts.expanded += self.spent.expanded;
+        counts.generated += self.spent.generated;
+        counts.evaluated += self.spent.evaluated;
+        counts.work += self.spent.work;
         let report = Progress {
+            counts,
             plan: better.clone(),
             best: better
                 .as_ref()
@@ -223,13 +293,38 @@ impl Search<'_> {
         flow
     }
 
+    /// The answer about the task where there is no problem without constraints.
+    fn answer_without_form(&mut self, unsupported: Answer) -> Answer {
+        let stopped = if self.is_interrupted {
+            Stopped::Interrupted
+        } else {
+            Stopped::Exhausted
+        };
+        let counts = self.spent;
+        match self.best.take() {
+            Some(found) => Answer::Plan {
+                found,
+                stopped,
+                counts,
+            },
+            None if self.is_interrupted => Answer::NoneFound {
+                stopped,
+                without_self_overlap: false,
+                counts,
+            },
+            None => unsupported,
+        }
+    }
+
     /// The answer about the task, after the last one about a problem without constraints.
-    fn answer(self, last: Answer) -> Answer {
-        let (stopped, counts) = match &last {
+    fn answer(&mut self, last: Answer) -> Answer {
+        let (stopped, mut counts) = match &last {
             Answer::Plan {
                 stopped, counts, ..
             }
-            | Answer::NoneFound { stopped, counts } => (*stopped, *counts),
+            | Answer::NoneFound {
+                stopped, counts, ..
+            } => (*stopped, *counts),
             Answer::Unsolvable { counts, .. } => (Stopped::Exhausted, *counts),
             Answer::Unsupported(_) if self.best.is_none() => return last,
             Answer::Unsupported(_) => (Stopped::Exhausted, Counts::default()),
@@ -239,13 +334,29 @@ impl Search<'_> {
             Stopped::FirstPlan if self.best.is_none() => Stopped::Exhausted,
             stopped => stopped,
         };
-        match self.best {
+        let without_self_overlap = match &last {
+            Answer::NoneFound {
+                without_self_overlap,
+                ..
+            } => *without_self_overlap,
+            Answer::Unsolvable { proof, .. } => matches!(proof, Proof::WithoutSelfOverlap { .. }),
+            _ => false,
+        };
+        counts.expanded = self.spent.expanded;
+        counts.generated = self.spent.generated;
+        counts.evaluated = self.spent.evaluated;
+        counts.work = self.spent.work;
+        match self.best.take() {
             Some(found) => Answer::Plan {
                 found,
                 stopped,
                 counts,
             },
-            None => Answer::NoneFound { stopped, counts },
+            None => Answer::NoneFound {
+                stopped,
+                without_self_overlap,
+                counts,
+            },
         }
     }
 }
@@ -262,7 +373,11 @@ fn unsupported(task: &Task, feature: &str) -> Answer {
 }
 
 /// The plan without observers, if the judge accepts it.
-fn judged(task: &Task, settings: &Settings, plan: &TimeTriggeredPlan) -> Option<Found> {
+pub(super) fn judged_without_observers(
+    task: &Task,
+    settings: &Settings,
+    plan: &TimeTriggeredPlan,
+) -> Option<Found> {
     let own = plan
         .steps
         .iter()

@@ -11,7 +11,7 @@ use super::compile::{Compiled, NONE};
 use super::network::{Network, NodeId, SETTLED};
 use super::root::root;
 use super::state::State;
-use super::symbolic::{self, Exact, KnownEnd, not_before};
+use super::symbolic::{self, Exact, KnownEnd, exact_distance, not_before};
 use super::time::{NEVER, Ticks};
 
 /// A step of the plan to be.
@@ -88,6 +88,7 @@ impl<'a> Replay<'a> {
     fn new(compiled: &'a Compiled) -> Self {
         let mut stepper = Stepper::new(compiled);
         stepper.log = Some(Log::default());
+        stepper.joins = compiled.needs_joining;
         let under_way = compiled.beginning.running.len();
         let timings = (0..).take(under_way).map(|action| Timing {
             action,
@@ -153,11 +154,11 @@ fn written(
         }
         let action = compiled.action(timing.action);
         let start = at(timing.start?);
+        let ground = task.instantiate(action.schema, &action.arguments).ok()?;
         let duration = match action.end {
-            NONE => None,
+            NONE => ground.durative().map(|_| Rational::ZERO),
             _ => Some(at(timing.end?) - &start),
         };
-        let ground = task.instantiate(action.schema, &action.arguments).ok()?;
         plan.steps.push(PlanStep {
             start,
             action: Arc::new(ground),
@@ -254,13 +255,15 @@ fn exact_times(
     let edges: Vec<(usize, usize, Rational)> = network
         .edges()
         .map(|(from, to, distance)| {
-            let exact = of_end(from, to).unwrap_or_else(|| {
-                if distance == compiled.epsilon {
-                    epsilon.clone()
-                } else {
-                    scale.units(distance)
-                }
-            });
+            let rounded = if distance == compiled.epsilon {
+                epsilon.clone()
+            } else {
+                scale.units(distance)
+            };
+            let exact = match of_end(from, to) {
+                Some(known) => exact_distance(&rounded, &known, compiled),
+                None => rounded,
+            };
             (usize::from(from), usize::from(to), exact)
         })
         .collect();

@@ -75,6 +75,15 @@ impl Formula {
                 .all(|choice| choice.iter().any(|part| part.holds(facts, test)))
     }
 
+    /// Returns `true` if it may hold for some facts. `test` returns `true` for a numeric test that may hold.
+    pub(crate) fn may_hold(&self, test: &mut dyn FnMut(u32) -> bool) -> bool {
+        self.tests.iter().all(|&number| test(number))
+            && self
+                .choices
+                .iter()
+                .all(|choice| choice.iter().any(|part| part.may_hold(test)))
+    }
+
     /// Calls `visit` for each literal anywhere.
     pub(crate) fn visit_literals(&self, visit: &mut dyn FnMut(Literal)) {
         self.literals.iter().copied().for_each(&mut *visit);
@@ -89,6 +98,31 @@ impl Formula {
         for part in self.choices.iter().flatten() {
             part.visit_tests(visit);
         }
+    }
+
+    /// Returns formulas whose disjunction is this one, without the choices that have an alternative for which
+    /// `splits` is `true`. `None` if there are more than `most`.
+    pub(crate) fn alternatives(
+        &self,
+        splits: &dyn Fn(&Self) -> bool,
+        most: usize,
+    ) -> Option<Vec<Self>> {
+        let mut choices = self.choices.iter();
+        let Some(place) = choices.position(|choice| choice.iter().any(splits)) else {
+            return Some(vec![self.clone()]);
+        };
+        let mut rest = self.clone();
+        let choice = rest.choices.remove(place);
+        let mut found = Vec::new();
+        for part in choice {
+            let mut with = rest.clone();
+            with.join(part);
+            found.extend(with.alternatives(splits, most)?);
+            if found.len() > most {
+                return None;
+            }
+        }
+        Some(found)
     }
 
     /// Adds the conjuncts of another formula.

@@ -1,6 +1,7 @@
 //! Why the goal is out of reach of a relaxation: in words, with the deadlines that are to blame.
 
 use elbowroom_model::Task;
+use elbowroom_num::Rational;
 
 use super::answer::Proof;
 use super::compile::{Compiled, Compressibility};
@@ -58,7 +59,7 @@ pub(crate) fn relaxed_proof(names: &Names, compiled: &Compiled) -> Option<Proof>
     let initial = root(compiled);
     let mut relaxed = Relaxed::new(compiled, uncompressed);
     if let Some((literal, end)) = relaxed.lost_goal() {
-        let end = compiled.scale.units(end).to_decimal(3);
+        let end = exact(&compiled.scale.units(end));
         let literal = names.literal(literal);
         let why = format!("`{literal}` no longer holds from {end} on, whatever is done");
         return Some(Proof::Unreachable(vec![why]));
@@ -159,7 +160,7 @@ fn explained(
         return Proof::Unreachable(vec![format!("{goal} cannot be reached")]);
     }
     let deadlines = guilty.iter().map(|&(literal, end)| {
-        let end = compiled.scale.units(end).to_decimal(3);
+        let end = exact(&compiled.scale.units(end));
         let verb = if literal.truth() {
             "closes"
         } else {
@@ -171,6 +172,13 @@ fn explained(
         goal,
         deadline: deadlines.collect::<Vec<_>>().join(" and "),
     }
+}
+
+/// The number as a decimal if it has at most nine digits after the point, else as a fraction.
+fn exact(number: &Rational) -> String {
+    let decimals = (3..=9).map(|digits| number.to_decimal(digits));
+    let mut decimals = decimals.filter(|text| text.parse().as_ref() == Ok(number));
+    decimals.next().unwrap_or_else(|| number.to_string())
 }
 
 /// A smallest set of deadlines without which the goal would be within reach, in the sense that

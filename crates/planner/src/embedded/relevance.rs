@@ -5,6 +5,8 @@
 //! is left reads what they change (Nebel, Dimopoulos & Koehler, "Ignoring irrelevant facts and
 //! operators in plan generation", ECP 1997; this part loses nothing). Where an action builds some
 //! thing out of any two others, most of its instances do not matter.
+//!
+//! Timed initials make no difference: they happen in every plan, and the goal counts after all of them.
 
 use elbowroom_model::ground::{
     Action, Body, Change, Condition, Effect, Expression, FactId, FluentId, SnapAction,
@@ -15,10 +17,6 @@ use elbowroom_model::{Situation, Task};
 
 /// Leaves out the actions that can neither matter to the goal, nor make the metric better.
 pub(crate) fn keep_relevant(task: &Task, grounding: &mut Grounding, situation: &Situation) {
-    // A goal can wait for a timed initial; then anything that ends later will do.
-    if !task.timed().is_empty() {
-        return;
-    }
     let mut relevance = Relevance::of(grounding);
     relevance.read(&grounding.goal);
     for running in &situation.running {

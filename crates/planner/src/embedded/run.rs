@@ -27,7 +27,11 @@ pub(super) use strand::Frame;
 use strand::{Allowance, Best, Outcome, Report, Strand};
 
 pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
-    Answer::NoneFound { stopped, counts }
+    Answer::NoneFound {
+        stopped,
+        without_self_overlap: false,
+        counts,
+    }
 }
 
 /// How the search for a first plan ended.
@@ -127,7 +131,12 @@ impl<'a> Planner<'a> {
                 self.progress.counts.memory -= freed;
                 self.improve()
             }
-            None => self.compete(entrants, (turn, budget)),
+            None => {
+                if turn + 1 < entrants.len() && entrants.last().is_some_and(|e| e.strategy.joins) {
+                    entrants.pop();
+                }
+                self.compete(entrants, (turn, budget))
+            }
         };
         let counts = self.progress.counts;
         match self.best {
@@ -136,13 +145,20 @@ impl<'a> Planner<'a> {
                 stopped,
                 counts,
             },
-            None if is_proof => Answer::Unsolvable {
-                proof: Proof::Exhausted {
-                    states: counts.evaluated,
-                },
+            None if is_proof => {
+                let states = counts.evaluated;
+                let proof = if compiled.excludes_self_overlap() {
+                    Proof::WithoutSelfOverlap { states }
+                } else {
+                    Proof::Exhausted { states }
+                };
+                Answer::Unsolvable { proof, counts }
+            }
+            None => Answer::NoneFound {
+                stopped,
+                without_self_overlap: compiled.excludes_self_overlap(),
                 counts,
             },
-            None => none_found(stopped, counts),
         }
     }
 
@@ -210,7 +226,9 @@ impl<'a> Planner<'a> {
     /// How many states each search looks at in the first round. `size`: the operators of an estimate.
     fn first_budget(&self, size: u64) -> u64 {
         let tuning = &self.frame.compiled.tuning;
-        let budget = if self.needs_concurrency() {
+        let budget = if self.frame.compiled.is_symbolic {
+            return tuning.first_round_symbolic;
+        } else if self.needs_concurrency() {
             tuning.first_round_with_concurrency
         } else if self.has_reservoirs {
             tuning.first_round_with_reservoirs
@@ -235,7 +253,8 @@ impl<'a> Planner<'a> {
         let mut strand = Strand::new(frame, None, unreported, &mut hear);
         let (outcome, spent, _) = strand.work(search, allowance);
         let is_over = outcome == Outcome::Over;
-        self.unreported = strand.end(is_over && !search.is_incomplete());
+        let is_all = !search.is_incomplete() && (search.joins() || !frame.compiled.needs_joining);
+        self.unreported = strand.end(is_over && is_all);
         entrant.is_over = is_over;
         (outcome, spent)
     }
@@ -274,7 +293,8 @@ impl<'a> Planner<'a> {
                 let mut strand = Strand::new(Frame { task, ..frame }, None, unreported, tell);
                 let (outcome, _, _) = strand.work(search, Allowance::turns(turns));
                 let is_over = outcome == Outcome::Over;
-                let unreported = strand.end(is_over && !search.is_incomplete());
+                let is_all = !search.is_incomplete() && (search.joins() || !compiled.needs_joining);
+                let unreported = strand.end(is_over && is_all);
                 (unreported, is_over)
             }));
         }
@@ -336,6 +356,7 @@ impl<'a> Planner<'a> {
         counts.expanded = before.expanded + done.expanded;
         counts.generated = before.generated + done.generated;
         counts.evaluated = before.evaluated + done.evaluated;
+        counts.work = before.work + done.work;
         counts.memory = before.memory + done.memory;
         if report.is_last {
             *base = self.progress.counts;
@@ -398,8 +419,11 @@ impl<'a> Planner<'a> {
 
 /// How many turns a search gets of a round.
 fn share(search: &Search<'_>, budget: u64, compiled: &Compiled) -> u64 {
-    if search.prunes_unsafely() {
+    if search.prunes_unsafely() || compiled.is_symbolic && !search.joins() {
         budget
+    } else if search.joins() {
+        // What only that can find is rare.
+        budget / (8 * compiled.tuning.incomplete_share.max(1))
     } else {
         budget / compiled.tuning.incomplete_share.max(1)
     }

@@ -13,6 +13,7 @@ mod known;
 mod landmarks;
 mod novelty;
 mod queue;
+mod runaway;
 mod strategy;
 mod successors;
 
@@ -32,9 +33,11 @@ use super::time::{NEVER, Ticks};
 use super::tuning::Technique;
 use dead_ends::DeadEnds;
 pub(crate) use goals::is_goal;
+use goals::misses_goal;
 use landmarks::SearchLandmarks;
 use novelty::{Novelty, Progress};
 use queue::Queue;
+use runaway::Drift;
 use strategy::NoveltyOf;
 pub(crate) use strategy::{Aim, Strategy};
 
@@ -106,6 +109,9 @@ struct Node {
     accepted: Vec<u64>,
     /// How much of the goal is left, or how many landmarks, where that matters.
     left: u32,
+    /// The number of steps that led to it.
+    depth: u32,
+    drift: Drift,
 }
 
 /// The stronger bound's verdict on a state.
@@ -143,6 +149,7 @@ impl<'a> Search<'a> {
         }
         let mut stepper = Stepper::new(compiled);
         stepper.is_chronological = strategy.is_chronological;
+        stepper.joins = strategy.joins;
         if strategy.replenishes {
             relaxed.count_resources();
         }
@@ -221,6 +228,11 @@ impl<'a> Search<'a> {
         !self.strategy.is_complete()
     }
 
+    /// Returns `true` if the search joins happenings of one moment.
+    pub(crate) fn joins(&self) -> bool {
+        self.strategy.joins
+    }
+
     /// The aim of the search.
     pub(crate) fn aim(&self) -> Aim {
         self.strategy.aim
@@ -233,6 +245,7 @@ impl<'a> Search<'a> {
             expanded: self.expanded,
             generated: self.generated,
             evaluated: self.evaluated + self.wasted,
+            work: 0,
             memory: self.memory,
         }
     }
@@ -388,6 +401,21 @@ impl<'a> Search<'a> {
         self.memory += state.size() + projection_size + size_of::<Node>() + 64;
         self.memory += 8 * accepted.len();
         let is_goal = is_goal(self.compiled, &state);
+        let due = self.compiled.timed_until_goal.saturating_sub(state.timed);
+        if state.symbolic.is_some() && !is_goal {
+            // The estimate takes tests that depend on times for granted. Where only ends are to come, no times
+            // may meet them.
+            let ends = u32::try_from(state.open.len()).unwrap_or(u32::MAX);
+            let least = due.saturating_add(ends);
+            if estimate.steps <= least && (ends == 0 || misses_goal(self.compiled, &state)) {
+                estimate.steps = self.first_estimate.saturating_add(least).saturating_add(1);
+            }
+        }
+        let drift = self.drift(parent, &state, estimate.steps);
+        let depth = self
+            .nodes
+            .get(parent as usize)
+            .map_or(0, |parent| parent.depth + 1);
         self.nodes.push(Node {
             parent,
             step,
@@ -397,6 +425,8 @@ impl<'a> Search<'a> {
             progress: None,
             accepted,
             left,
+            depth,
+            drift,
         });
         // A state in which the goal holds may still have successors worth looking at: the judge can
         // refuse the plan, and another one can be better.
@@ -417,6 +447,7 @@ impl<'a> Search<'a> {
             DeadEnd::Unchecked => {}
         }
         if self.is_timeless
+            || self.strategy.joins
             || !self.compiled.tuning.uses(Technique::DeadEnds)
             || self.evaluated < self.compiled.tuning.dead_end_checks_after
         {

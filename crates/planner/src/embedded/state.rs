@@ -5,8 +5,8 @@ use std::hash::{Hash, Hasher};
 
 use elbowroom_num::Rational;
 
-use super::compile::{Compiled, Metric};
-use super::expressions::Symbolic;
+use super::compile::{Action, Compiled, Metric, NONE};
+use super::expressions::{Form, Symbolic};
 use super::formula::set;
 use super::hash::Mixer;
 use super::network::{Network, NodeId, SETTLED};
@@ -34,10 +34,21 @@ pub(crate) struct State {
     pub(crate) network: Network,
     /// The last choice, where choices come in the order of time.
     pub(crate) last: Last,
+    /// The incomplete moment, if an over-all condition is false. The next choice happens at the same
+    /// moment.
+    pub(crate) joint: Option<Joint>,
     /// The time of the last settled happening.
     pub(crate) settled_end: Ticks,
     /// The numbers that depend on times, in a problem that has such.
     pub(crate) symbolic: Option<Box<Symbolic>>,
+}
+
+/// Happenings of one moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Joint {
+    /// The node of the last one.
+    pub(crate) node: NodeId,
+    pub(crate) count: u8,
 }
 
 /// The happening that was chosen last.
@@ -88,6 +99,11 @@ pub(crate) struct Open {
     pub(crate) end: NodeId,
     /// The fluents that it changes continuously, with their rates.
     pub(crate) flows: Vec<(u32, Rational)>,
+    /// The strict tests of its over-all condition, with their differences just after its start. Empty once
+    /// a fluent of the over-all condition has jumped, or its rate has changed.
+    pub(crate) beginnings: Vec<(u32, Form)>,
+    /// For each disjunction of its over-all condition, the alternative that was demanded last.
+    pub(crate) chosen: Vec<Option<usize>>,
 }
 
 impl Open {
@@ -103,6 +119,8 @@ impl Open {
             guards: u64::MAX,
             end: SETTLED,
             flows: Vec::new(),
+            beginnings: Vec::new(),
+            chosen: Vec::new(),
         }
     }
 
@@ -113,6 +131,8 @@ impl Open {
             && self.most == other.most
             && (self.node == SETTLED) == (other.node == SETTLED)
             && self.duration == other.duration
+            && self.beginnings == other.beginnings
+            && self.chosen == other.chosen
     }
 }
 
@@ -133,6 +153,12 @@ impl State {
         };
         state.derive(compiled);
         state
+    }
+
+    /// Returns `true` if an instance of the action is running that it must not overlap.
+    pub(crate) fn excludes(&self, compiled: &Compiled, action: &Action) -> bool {
+        let is_same = |open: &Open| compiled.action(open.action).exclusion == action.exclusion;
+        action.exclusion != NONE && self.open.iter().any(is_same)
     }
 
     /// Settles the truth of derived facts.
@@ -204,6 +230,19 @@ impl State {
         for open in &self.open {
             mixer.write_u32(open.action);
             mixer.write_u64(open.guards);
+        }
+        mixer.write_u32(self.timed);
+        mixer.finish()
+    }
+
+    /// A hash of the facts, the running actions and the timed initials to come, without any number.
+    pub(crate) fn fact_hash(&self) -> u64 {
+        let mut mixer = Mixer::default();
+        for word in &self.facts {
+            mixer.write_u64(*word);
+        }
+        for open in &self.open {
+            mixer.write_u32(open.action);
         }
         mixer.write_u32(self.timed);
         mixer.finish()

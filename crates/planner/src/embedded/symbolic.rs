@@ -12,11 +12,12 @@ mod program;
 use elbowroom_model::problem::{Comparison, UpdateOperator};
 use elbowroom_num::Rational;
 
-use super::compile::{Compiled, Update};
+use super::compile::{Change, Compiled, Update};
 use super::expressions::{Course, Form, Moment, Symbolic};
 use super::formula::{Formula, Linear, Numeric};
-use super::state::State;
-pub(crate) use program::{Exact, KnownEnd, is_possible, not_before, solve};
+use super::network::{NodeId, SETTLED};
+use super::state::{Open, State};
+pub(crate) use program::{Exact, KnownEnd, exact_distance, is_possible, not_before, solve};
 
 /// The value of an expression at some moment.
 pub(crate) fn value(state: &State, numeric: &Numeric, moment: &Moment) -> Option<Form> {
@@ -69,7 +70,7 @@ pub(crate) fn demand(state: &mut State, form: Form, comparison: Comparison) -> O
     Some(())
 }
 
-/// Demands a formula. Of a choice, the first alternative that is not plainly false is taken;
+/// Demands a formula. Of a choice, the first alternative that is possible at this stage is taken;
 /// `has_chosen` is set if another one might have been possible.
 pub(crate) fn demand_formula(
     compiled: &Compiled,
@@ -87,18 +88,102 @@ pub(crate) fn demand_formula(
         demand(state, form, test.comparison)?;
     }
     for choice in &formula.choices {
-        let mut is_met = false;
-        for part in choice {
-            let mut attempt = state.clone();
-            if demand_formula(compiled, &mut attempt, part, moment, has_chosen).is_some() {
-                *has_chosen |= attempt.symbolic != state.symbolic;
-                *state = attempt;
-                is_met = true;
-                break;
+        demand_choice(compiled, state, choice, moment, has_chosen)?;
+    }
+    Some(())
+}
+
+/// Demands the first alternative of a choice that is possible at this stage, and returns its position.
+fn demand_choice(
+    compiled: &Compiled,
+    state: &mut State,
+    choice: &[Formula],
+    moment: &Moment,
+    has_chosen: &mut bool,
+) -> Option<usize> {
+    for (number, part) in choice.iter().enumerate() {
+        let mut attempt = state.clone();
+        if demand_formula(compiled, &mut attempt, part, moment, has_chosen).is_some() {
+            let is_conditional = attempt.symbolic != state.symbolic;
+            *has_chosen |= is_conditional;
+            let is_last = number + 1 == choice.len();
+            if is_conditional && !is_last && !is_possible(&attempt, compiled, None) {
+                continue;
             }
+            *state = attempt;
+            return Some(number);
         }
-        if !is_met {
-            return None;
+    }
+    None
+}
+
+/// Part of an over-all condition's open interval that a moment borders on. In such a piece, numbers are
+/// linear in time.
+#[derive(Debug)]
+pub(crate) enum Piece<'a> {
+    /// The first piece begins, excluding the moment.
+    Begins(&'a mut Vec<(u32, Form)>),
+    /// A piece ends, excluding the moment. The first piece: began with these differences of strict tests.
+    Ends(&'a [(u32, Form)]),
+    /// The moment lies inside the interval.
+    Within,
+}
+
+/// Demands an over-all condition at a moment. A strict test need not hold at an open end: it holds
+/// throughout a piece if it holds, not strictly, at both ends, and strictly at one of them. Of a choice, the
+/// alternative at the end of a piece is that of its beginning if it is about numbers: one may hold at one end
+/// and another one at the other end, and none in between.
+pub(crate) fn demand_over_all(
+    compiled: &Compiled,
+    state: &mut State,
+    formula: &Formula,
+    (mut piece, moment, chosen): (Piece<'_>, &Moment, &mut Vec<Option<usize>>),
+    has_chosen: &mut bool,
+) -> Option<()> {
+    let is_open = !matches!(piece, Piece::Within);
+    let is_strict = |test: u32| {
+        let comparison = compiled.tests[test as usize].comparison;
+        matches!(comparison, Comparison::Less | Comparison::Greater)
+    };
+    let (strict, plain): (Vec<u32>, Vec<u32>) = formula
+        .tests
+        .iter()
+        .partition(|&&test| is_open && is_strict(test));
+    for test in strict {
+        let data = &compiled.tests[test as usize];
+        let form = value(state, &data.difference, moment)?;
+        let closed = match data.comparison {
+            Comparison::Less => Comparison::AtMost,
+            _ => Comparison::AtLeast,
+        };
+        demand(state, form.clone(), closed)?;
+        match &mut piece {
+            Piece::Begins(beginnings) => beginnings.push((test, form)),
+            Piece::Ends(beginnings) => {
+                if let Some((_, first)) = beginnings.iter().find(|(known, _)| *known == test) {
+                    demand(state, form.plus(&Rational::ONE, first), data.comparison)?;
+                }
+            }
+            Piece::Within => {}
+        }
+    }
+    let rest = Formula {
+        literals: formula.literals.clone(),
+        tests: plain,
+        choices: Vec::new(),
+    };
+    demand_formula(compiled, state, &rest, moment, has_chosen)?;
+    chosen.resize(formula.choices.len(), None);
+    for (choice, chosen) in formula.choices.iter().zip(chosen) {
+        let mut earlier = None;
+        if matches!(piece, Piece::Ends(_)) {
+            earlier = chosen.filter(|&number| !choice[number].tests.is_empty());
+        }
+        if let Some(number) = earlier {
+            *has_chosen = true;
+            demand_formula(compiled, state, &choice[number], moment, has_chosen)?;
+        } else {
+            *chosen = Some(demand_choice(compiled, state, choice, moment, has_chosen)?);
         }
     }
     Some(())
@@ -144,6 +229,57 @@ pub(crate) fn flow(state: &mut State, fluent: u32, rate: &Rational, time: &Form)
     course.rate += rate;
     set_course(state, fluent, course);
     Some(())
+}
+
+/// The value of a fluent after the ends of all running actions, if nothing else starts and the value does not
+/// depend on times.
+pub(crate) fn settled_value(compiled: &Compiled, state: &State, fluent: u32) -> Option<Rational> {
+    let symbolic = state.symbolic.as_ref()?;
+    let mut to_come = compiled.timed[state.timed as usize..].iter();
+    let is_assigned = |assigns: &[(u32, Rational)]| assigns.iter().any(|(own, _)| *own == fluent);
+    if to_come.any(|timed| is_assigned(&timed.assigns)) {
+        return None;
+    }
+    let mut course = symbolic.course(fluent).cloned();
+    for open in &state.open {
+        let end = compiled.snap(compiled.action(open.action).end);
+        let conditional = end
+            .conditional
+            .iter()
+            .filter_map(|effect| match &effect.change {
+                Change::Update(update) => Some(update),
+                _ => None,
+            });
+        let mut updates = end.updates.iter().chain(conditional);
+        if updates.any(|update| update.fluent == fluent) {
+            return None;
+        }
+        for (own, rate) in &open.flows {
+            if let Some(course) = course.as_mut().filter(|_| *own == fluent) {
+                let time = end_form(open, open.end);
+                course.base = std::mem::take(&mut course.base).plus(rate, &time);
+                course.rate -= rate;
+            }
+        }
+    }
+    match course {
+        None => state.values[fluent as usize].clone(),
+        Some(course) => {
+            let is_settled = course.rate.is_zero();
+            course.base.as_constant().filter(|_| is_settled).cloned()
+        }
+    }
+}
+
+/// The time of an action's end. A fixed duration counts from the start, so that the total of a continuous
+/// change is a constant.
+pub(crate) fn end_form(open: &Open, end: NodeId) -> Form {
+    match &open.duration {
+        Some(duration) if open.node != SETTLED => {
+            Form::constant(duration.clone()).plus(&Rational::ONE, &Form::node(open.node))
+        }
+        _ => Form::node(end),
+    }
 }
 
 fn course_of(state: &State, fluent: u32) -> Option<Course> {

@@ -108,7 +108,8 @@ struct Finder<'a> {
     compiled: &'a Compiled,
     facts: Map<(u32, Vec<ObjectId>), u32>,
     fluents: Map<(u32, Vec<ObjectId>), u32>,
-    actions: Map<(u32, Vec<ObjectId>), u32>,
+    /// By schema, arguments, and whether it takes time.
+    actions: Map<(u32, Vec<ObjectId>, bool), u32>,
     budget: usize,
 }
 
@@ -136,7 +137,10 @@ impl<'a> Finder<'a> {
             facts: facts.zip(0..).collect(),
             fluents: fluents.zip(0..).collect(),
             actions: actions
-                .map(|(number, action)| ((action.schema.0, action.arguments.clone()), number))
+                .map(|(number, action)| {
+                    let arguments = action.arguments.clone();
+                    ((action.schema.0, arguments, action.end != NONE), number)
+                })
                 .collect(),
             budget: compiled.tuning.most_symmetry_comparisons,
         }
@@ -163,7 +167,8 @@ impl<'a> Finder<'a> {
                 }
                 continue;
             }
-            let key = (action.schema.0, swapped(&action.arguments, pair));
+            let arguments = swapped(&action.arguments, pair);
+            let key = (action.schema.0, arguments, action.end != NONE);
             let image = *self.actions.get(&key)?;
             let other = self.compiled.action(image);
             if !images.are_alike(self.compiled, action, other) {

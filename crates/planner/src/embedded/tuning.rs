@@ -223,6 +223,9 @@ constants! {
     /// The same where searches that fill up reservoirs take turns with others. Not measured; less,
     /// as only one of the two kinds usually has a chance.
     first_round_with_reservoirs: u64 = 2_048;
+    /// The same where each state is a linear program. Less, as their estimates take for granted what times
+    /// decide, so that one search alone often never comes near the goal.
+    first_round_symbolic: u64 = 32;
     /// The same where chronological searches take turns with others. Measured together with
     /// `patience`, on the domains with required concurrency, from 256 to 4,096: with less, problems
     /// that one search alone can solve wait less for it, and the sum of all changes little.

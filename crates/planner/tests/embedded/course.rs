@@ -234,7 +234,8 @@ fn what_is_out_of_reach_without_constraints_is_proved() {
 fn what_cannot_be_told_of_the_state_before_is_refused_by_name() {
     let of = |functions: &str, action: &str, constraint: &str| {
         let domain = format!(
-            "(:predicates (p) (q) (both)) {functions} (:derived (both) (and (p) (q)))
+            "(:predicates (p) (q) (both) (same)) {functions}
+             (:derived (both) (or (same) (and (p) (q)))) (:derived (same) (both))
              (:durative-action a :parameters () :duration (= ?duration 2) :condition (and)
                :effect {action})"
         );
@@ -242,9 +243,9 @@ fn what_cannot_be_told_of_the_state_before_is_refused_by_name() {
         describe(&answered(&task(&domain, &problem)))
     };
     let derived = of("", "(at end (p))", "(always (not (both)))");
-    assert!(derived.contains("on derived facts"), "{derived}");
+    assert!(derived.contains("on recursive derived facts"), "{derived}");
     let moving = "(and (at end (p)) (increase (x) (* #t 1)))";
-    let moving = of("(:functions (x))", moving, "(hold-after 3 (> 2 (x)))");
+    let moving = of("(:functions (x))", moving, "(hold-after 3 (< 2 (x)))");
     assert!(moving.contains("change continuously"), "{moving}");
     let guarded = of(
         "",
@@ -252,6 +253,40 @@ fn what_cannot_be_told_of_the_state_before_is_refused_by_name() {
         "(always (q))",
     );
     assert!(guarded.contains("conditions of other moments"), "{guarded}");
+}
+
+#[test]
+fn derived_facts_in_constraints_are_replaced_by_their_rules() {
+    let of = |constraint: &str| {
+        let domain = "(:predicates (p) (q) (both) (full)) (:functions (x))
+             (:derived (both) (and (p) (q))) (:derived (full) (or (both) (> (x) 3)))
+             (:durative-action a :parameters () :duration (= ?duration 2) :condition (and)
+               :effect (at end (p)))
+             (:durative-action b :parameters () :duration (= ?duration 2) :condition (and)
+               :effect (at end (not (q))))
+             (:durative-action c :parameters () :duration (= ?duration 2) :condition (and)
+               :effect (at end (increase (x) 5)))";
+        let problem = format!("(:init (q) (= (x) 0)) (:goal (p)) (:constraints {constraint})");
+        describe(&answered(&task(domain, &problem)))
+    };
+    let never = of("(always (not (both)))");
+    assert!(never.contains("(a)") && never.contains("(b)"), "{never}");
+    let never = of("(always (not (full)))");
+    assert!(never.contains("(b)") && !never.contains("(c)"), "{never}");
+    let before = of("(sometime-before (p) (full))");
+    assert!(before.contains("(c)"), "{before}");
+}
+
+#[test]
+fn constraint_that_only_a_later_start_satisfies_delays_the_plan() {
+    let answer = answered(&task(
+        "(:functions (level))
+         (:durative-action drain :parameters () :duration (= ?duration 5) :condition (and)
+           :effect (decrease (level) (* #t 2)))",
+        "(:init (= (level) 4)) (:goal (< (level) 2))
+         (:constraints (hold-during 2 7 (>= (level) -2)))",
+    ));
+    assert!(answer.found().is_some(), "{}", describe(&answer));
 }
 
 #[test]

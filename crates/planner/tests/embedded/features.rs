@@ -94,10 +94,49 @@ fn the_goal_counts_after_all_timed_initials() {
     );
     let too_early = "(:init (open) (at 17 (not (open))) (at 20 (not (in)))) (:goal (in))";
     assert!(
-        plan(too_early).starts_with("none found"),
+        plan(too_early).starts_with("no plan exists without self-overlap"),
         "{}",
         plan(too_early)
     );
+}
+
+/// Neither the lamp nor its hours matter to the goal. Without them nothing but one action and one window
+/// is left to try, and an exhausted search proves that the second item has no time.
+#[test]
+fn irrelevant_actions_and_their_timed_initials_are_left_out() {
+    let domain = "
+        (:requirements :typing :durative-actions :timed-initial-literals)
+        (:types item)
+        (:predicates (open) (hand) (in ?i - item) (day) (lamp))
+        (:durative-action enter :parameters (?i - item) :duration (= ?duration 10)
+          :condition (and (at start (hand)) (over all (open)))
+          :effect (and (at start (not (hand))) (at end (hand)) (at end (in ?i))))
+        (:durative-action light :parameters () :duration (= ?duration 1)
+          :condition (and (at start (not (lamp))) (over all (day))) :effect (at end (lamp)))
+        (:durative-action dim :parameters () :duration (= ?duration 1)
+          :condition (and (at start (lamp)) (over all (day))) :effect (at end (not (lamp))))";
+    let hours: String = (0..10)
+        .map(|n| format!("(at {} (day)) (at {} (not (day)))", 10 * n + 3, 10 * n + 8))
+        .collect();
+    let problem = |close: u32| {
+        format!(
+            "(:objects a b - item)
+             (:init (hand) (at 7 (open)) (at {close} (not (open))) {hours})
+             (:goal (and (in a) (in b)))"
+        )
+    };
+    let found = answer(domain, &problem(28));
+    assert!(found.found().is_some(), "{}", describe(&found));
+    let counts = found.counts().unwrap();
+    assert_eq!(counts.actions, 2);
+    let none = answer(domain, &problem(27));
+    assert!(
+        describe(&none).starts_with("no plan exists"),
+        "{}",
+        describe(&none)
+    );
+    let evaluated = none.counts().unwrap().evaluated;
+    assert!(evaluated < 40, "{evaluated} states");
 }
 
 #[test]

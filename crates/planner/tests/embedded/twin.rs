@@ -26,23 +26,27 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_planner_finds_a_plan_exactly_when_its_twin_does(draft in drafts()) {
+    fn the_planner_finds_a_plan_exactly_when_its_twin_does(
+        draft in drafts(),
+        self_overlap in any::<bool>(),
+    ) {
         let task = draft.task();
         let situation = Situation::initial(&task);
         let mut turns = 0;
-        let settings = Settings { first_plan_only: true, ..Settings::default() };
+        let settings = Settings { first_plan_only: true, self_overlap, ..Settings::default() };
         let answer = plan(&task, &situation, &settings, &mut |_| {
             turns += 1;
             if turns > 200 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         let actions = draft.ground(&task);
-        let mut twin = Twin::new(&task, actions, 1_200);
+        let mut twin = Twin::new(&task, actions, 1_200).with_self_overlap(self_overlap);
         let found = twin.finds();
         match &answer {
             Answer::Plan { found: ours, .. } => {
                 let verdict =
                     validate_from(&task, &situation, &ours.plan, &Strictness::default());
                 prop_assert!(matches!(verdict, Verdict::Valid(_)));
+                prop_assert!(self_overlap || ours.plan.self_overlap().is_none());
                 if happenings(&ours.plan) <= MOST {
                     prop_assert_ne!(found, Some(false), "{}", describe(&answer));
                 }
@@ -63,12 +67,13 @@ proptest! {
         draft in thrifty_drafts(),
         prices in prop::collection::vec((1..5_u8, 0..5_u8, 0..3_u8), 4),
         metric in 0..METRICS.len(),
+        self_overlap in any::<bool>(),
     ) {
         let task = draft.task_with(&prices, METRICS[metric]);
         let situation = Situation::initial(&task);
         let mut turns = 0;
         // Now and then there is no end to what a search may look at.
-        let settings = Settings { max_memory: 8 << 20, ..Settings::default() };
+        let settings = Settings { max_memory: 8 << 20, self_overlap, ..Settings::default() };
         let answer = plan(&task, &situation, &settings, &mut |_| {
             turns += 1;
             if turns > 100 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -77,11 +82,12 @@ proptest! {
         let verdict = validate_from(&task, &situation, &found.plan, &Strictness::default());
         let Verdict::Valid(report) = verdict else { panic!("an invalid plan") };
         prop_assert_eq!(&report.metric(&task), &found.metric);
+        prop_assert!(self_overlap || found.plan.self_overlap().is_none());
         if *stopped != Stopped::Exhausted {
             return Ok(());
         }
         let actions = draft.ground(&task);
-        let mut twin = Twin::new(&task, actions, 1_500);
+        let mut twin = Twin::new(&task, actions, 1_500).with_self_overlap(self_overlap);
         if let Ok(Some(least)) = twin.least_metric() {
             let metric = found.metric.clone().expect("there is a metric");
             let ours = (metric, found.makespan.clone());

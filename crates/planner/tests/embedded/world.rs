@@ -22,9 +22,13 @@ pub(crate) fn task(domain: &str, problem: &str) -> Task {
 
 /// The first plan, or what is known after so many reports.
 pub(crate) fn answer_from(task: &Task, situation: &Situation, turns: usize) -> Answer {
+    answer_by(task, situation, turns, &Settings::default())
+}
+
+fn answer_by(task: &Task, situation: &Situation, turns: usize, settings: &Settings) -> Answer {
     let settings = Settings {
         first_plan_only: true,
-        ..Settings::default()
+        ..settings.clone()
     };
     let mut left = turns;
     plan(task, situation, &settings, &mut |_| {
@@ -41,6 +45,16 @@ pub(crate) fn answer(domain: &str, problem: &str) -> Answer {
     let task = task(domain, problem);
     let situation = Situation::initial(&task);
     answer_from(&task, &situation, 400)
+}
+
+/// The same, with self-overlap allowed.
+pub(crate) fn answer_with_self_overlap(domain: &str, problem: &str) -> Answer {
+    let task = task(domain, problem);
+    let settings = Settings {
+        self_overlap: true,
+        ..Settings::default()
+    };
+    answer_by(&task, &Situation::initial(&task), 400, &settings)
 }
 
 /// The steps of a plan, or why there is none.

@@ -26,6 +26,8 @@ SHARE = "/usr/share/diagnostic_msgs/msg"
 # How long anything is waited for. Only what hangs takes so long, and is told where it does.
 PATIENCE = 300
 AT_A_TIME = 4
+# How a run ends that finds no plan: with a certificate that none exists, or without one.
+NO_PLAN = (1, 3)
 DRIVERS = {
     "driver1": {"action": "move", "lasts": 2, "only": "r1"},
     "driver2": {"action": "move", "lasts": 2, "only": "r2"},
@@ -175,7 +177,10 @@ def a_failure_has_its_reason(stage):
 def what_is_late_has_its_reason(stage):
     stage.begin({"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 2.2}})
     stage.play(MATCH, speed=10)
-    assert stage.code == 1 and "inspect hull" in stage.out and "allowed" in stage.trace()
+    # The rest of the plan is executed without a guarantee; ROSPlan's interfaces cannot be cancelled, so that the last
+    # inspection may succeed after the light has gone out.
+    assert stage.code in (0, *NO_PLAN) and "too little time is left for end of (inspect hull)" in " ".join(stage.out.split())
+    assert '"cancel"' in stage.trace()
 
 
 def a_refusal_has_its_reason(stage):

@@ -24,6 +24,8 @@ MATCH = [os.path.join(ROOT, "cases", "match", it) for it in ("domain.pddl", "pro
 # How long anything is waited for. Only what hangs takes so long, and is told where it does.
 PATIENCE = 300
 AT_A_TIME = 4
+# How a run ends that finds no plan: with a certificate that none exists, or without one.
+NO_PLAN = (1, 3)
 DRIVERS = {
     "driver1": {"action": "move", "lasts": 2, "only": "r1"},
     "driver2": {"action": "move", "lasts": 2, "only": "r2"},
@@ -143,7 +145,9 @@ def two_robots_at_a_time(stage):
     assert stage.when("begins", second) < stage.when("ends", first)
     assert stage.when("begins", first) < stage.when("ends", second)
     assert stage.when("begins", "(signal r2 gate)") > stage.when("ends", second)
-    assert "performers: driver1 (move), driver2 (move), signaller (signal)" in stage.errors
+    # A second driver may be discovered after the run has begun, which needs one.
+    performers = next(line for line in stage.errors.splitlines() if "performers: " in line)
+    assert "(move)" in performers and "signaller (signal)" in performers
 
 
 def required_concurrency(stage):
@@ -188,7 +192,7 @@ def a_performer_never_says_that_it_has_ended(stage):
     """It is told to cancel when no plan can bear it any longer, and does."""
     crew = {"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 0.9, "mute": True}}
     stage.play(crew, MATCH, speed=10)
-    assert stage.code == 1 and "told to cancel" in stage.events()
+    assert stage.code in NO_PLAN and "told to cancel" in stage.events()
     assert '"cancelled"' in stage.trace()
 
 
@@ -196,7 +200,7 @@ def what_is_late_has_its_reason(stage):
     """A deviation is seen when the interval that the plan can bear is left, and is told with that interval."""
     crew = {"flare": {"action": "burn", "lasts": 3.0}, "diver": {"action": "inspect", "lasts": 2.2}}
     stage.play(crew, MATCH, speed=10)
-    assert stage.code == 1 and "inspect hull" in stage.out and "allowed" in stage.trace()
+    assert stage.code in NO_PLAN and "inspect hull" in stage.out and "allowed" in stage.trace()
 
 
 def a_run_is_interrupted(stage):

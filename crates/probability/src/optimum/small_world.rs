@@ -39,17 +39,18 @@ pub struct Table {
 impl Table {
     /// The table of a world; `None` where it is not small, or is not of the kind in which every
     /// happening can be chosen when it is due: there are numbers, timed initials or negations, or
-    /// an action's end takes away what another needs.
+    /// an action's end deletes what another action, or the goal, needs.
     pub fn new(task: &Task, likelihoods: &Likelihoods) -> Option<Self> {
         let task = task.clone();
-        let actions = all_actions_under(&task, likelihoods).ok()?;
-        if ends_break_others(&actions) || has_negations(&task, &actions) {
+        let likelihoods = without_luck(likelihoods);
+        let actions = all_actions_under(&task, &likelihoods).ok()?;
+        if ends_break_others(&actions, task.goal()) || has_negations(&task, &actions) {
             return None;
         }
         let plan = PartialOrderPlan::unordered(&task, actions);
         let steps = plan.instances().map(|(_, instance)| step(&task, instance));
         let steps = steps.collect::<Option<Vec<Step>>>()?;
-        let model = Model::new(task, plan, &without_luck(likelihoods), Semantics::World).ok()?;
+        let model = Model::new(task, plan, &likelihoods, Semantics::World).ok()?;
         let facts = model.facts().count();
         if facts > MOST_FACTS || sets(steps.len()) << facts > MOST_STATES {
             return None;
@@ -61,6 +62,9 @@ impl Table {
             ..Settings::default()
         };
         let process = Perturbed::new(model, settings).ok()?;
+        if table_search(&process).has_couplings() {
+            return None;
+        }
         Some(Self {
             optimum: process.optimum(),
             process,
@@ -75,7 +79,7 @@ impl Table {
 
     /// A search that knows the model, for the times at which happenings may be.
     pub fn search(&self) -> OrderSearch {
-        OrderSearch::new(Arc::clone(self.process.model()), SearchSettings::default())
+        table_search(&self.process)
     }
 
     /// How likely it is that the goal is reached from here, if only what is best is done.
@@ -96,6 +100,10 @@ impl Table {
             })
         })
     }
+}
+
+fn table_search(process: &Perturbed) -> OrderSearch {
+    OrderSearch::new(Arc::clone(process.model()), SearchSettings::default())
 }
 
 /// How likely the best of all agents is to reach the goal that has these actions, may try them as
@@ -126,6 +134,11 @@ pub fn best_value(
         ..Settings::default()
     };
     let process = Perturbed::new(model, settings)?;
+    if table_search(&process).has_couplings() {
+        return Err(NotSmall::Unsupported {
+            what: "actions need each other at one moment".to_owned(),
+        });
+    }
     Ok(process.optimum().value(&process, circumstances))
 }
 
@@ -144,10 +157,7 @@ fn without_luck(likelihoods: &Likelihoods) -> Likelihoods {
 
 /// Whether something needs a fact to be false: facts that are lost would be luck then.
 fn has_negations(task: &Task, actions: &[Action]) -> bool {
-    let needs = actions.iter().flat_map(|action| match &action.body {
-        Body::Instantaneous(snap) => vec![&snap.condition],
-        Body::Durative(body) => vec![&body.start.condition, &body.over_all, &body.end.condition],
-    });
+    let needs = actions.iter().flat_map(conditions);
     needs.chain([task.goal()]).any(is_negative)
 }
 
@@ -198,23 +208,29 @@ fn shortest(task: &Task, body: &DurativeBody) -> Option<Rational> {
     shortest.or(longest).filter(Rational::is_positive)
 }
 
-/// Whether an action's end takes away what another needs while it goes on. When ends come is not
-/// chosen, though in the table it is; there, who needs that light burns would always be done
-/// before the light goes out.
-fn ends_break_others(actions: &[Action]) -> bool {
-    let durative = || {
-        let bodies = actions.iter().enumerate();
-        bodies.filter_map(|(index, action)| Some((index, action.durative()?)))
-    };
-    durative().any(|(own, ending)| {
-        let mut others = durative().filter(|(other, _)| *other != own);
-        others.any(|(_, other)| {
-            let mut changes = ending.end.effects.iter().map(|effect| &effect.change);
-            changes.any(|change| {
-                breaks(change, &other.over_all) || breaks(change, &other.end.condition)
-            })
-        })
+/// Returns `true` if the end of an action deletes a fact of the goal, or of a condition of another action: at its start,
+/// at its end, or in between.
+///
+/// The clock decides on the order of ends. The table takes them in the best order: there, an action that needs light
+/// would always start, or end, before the light goes out.
+fn ends_break_others(actions: &[Action], goal: &Condition) -> bool {
+    let all = || actions.iter().enumerate();
+    let durative = all().filter_map(|(index, action)| Some((index, action.durative()?)));
+    durative.into_iter().any(|(own, ending)| {
+        let others = all().filter(|(other, _)| *other != own);
+        let needed = others.flat_map(|(_, other)| conditions(other));
+        let needed: Vec<&Condition> = needed.chain([goal]).collect();
+        let mut changes = ending.end.effects.iter().map(|effect| &effect.change);
+        changes.any(|change| needed.iter().any(|condition| breaks(change, condition)))
     })
+}
+
+/// Returns the conditions of an action.
+fn conditions(action: &Action) -> Vec<&Condition> {
+    match &action.body {
+        Body::Instantaneous(snap) => vec![&snap.condition],
+        Body::Durative(body) => vec![&body.start.condition, &body.over_all, &body.end.condition],
+    }
 }
 
 /// Whether a change can make a condition without negations false.
@@ -317,6 +333,14 @@ mod tests {
         assert!(durations(&hide, "").is_none());
         let goes_out = burn("(at end (not (light)))");
         assert!(durations(&format!("{look}{goes_out}"), "").is_none());
+        // Nor may an action have to start before that.
+        let begin = look.replace("over all", "at start");
+        assert!(durations(&format!("{begin}{}", burn("")), "").is_some());
+        assert!(durations(&format!("{begin}{goes_out}"), "").is_none());
+        // Nor may the end delete what the goal needs.
+        let undoes = burn("(at end (not (done ?p)))");
+        assert!(durations(&format!("{look}{}", burn("")), "(light)").is_some());
+        assert!(durations(&format!("{look}{undoes}"), "(light)").is_none());
         let numbers = burn("(at end (increase (far ?p) 1))");
         assert!(durations(&format!("{look}{numbers}"), "").is_none());
     }

@@ -18,6 +18,7 @@ use elbowroom_plan::InstanceId;
 
 use super::assignment;
 use super::chain::Chain;
+use super::coupling::Couplings;
 use super::nominal::{Nominal, Truth};
 use super::queue::Queue;
 use super::separations::Separations;
@@ -57,6 +58,15 @@ impl Bound {
         probability: 0.0,
         length: usize::MAX,
     };
+
+    /// Of a sequence after which another happening comes at the same moment. Over-all conditions are not counted,
+    /// as that happening may make them true.
+    pub(crate) fn of_beginning(network: &PrunedNetwork<'_>) -> Self {
+        Self {
+            probability: network.actions_probability() * (1.0 + 1e-12),
+            length: network.sequence().len() + 1,
+        }
+    }
 }
 
 /// Something that changes a fact.
@@ -82,7 +92,7 @@ pub(crate) struct Outlook<'a> {
 }
 
 impl Bounds {
-    pub(crate) fn of(model: &Model, separations: &Separations) -> Self {
+    pub(crate) fn of(model: &Model, separations: &Separations, couplings: &Couplings) -> Self {
         let mut setters = vec![Vec::new(); model.facts.len()];
         let mut note = |event: &Event, by: Option<InstanceId>, at_end: bool| {
             for effect in &event.effects {
@@ -108,16 +118,23 @@ impl Bounds {
             let (start, end) = (separations.starts[id.index()], separations.ends[id.index()]);
             note(model.event(start), Some(id), false);
             needs_at_start.push(model.event(start).condition.literals.clone());
-            needs_throughout.push(model.event(start).over_all.literals.clone());
+            let is_coupled = couplings.is_coupled(start) || couplings.is_coupled(end);
+            let over_all = if is_coupled {
+                // Between happenings of one moment nothing is required.
+                Vec::new()
+            } else {
+                model.event(start).over_all.literals.clone()
+            };
             let mut needs = Vec::new();
             if start != end {
                 note(model.event(end), Some(id), true);
                 needs.extend(&model.event(end).condition.literals);
-                needs.extend(&model.event(start).over_all.literals);
+                needs.extend(&over_all);
                 needs.sort_unstable();
                 needs.dedup();
             }
             needs_at_end.push(needs);
+            needs_throughout.push(over_all);
         }
         for (node, _) in &separations.timed {
             note(model.event(*node), None, false);

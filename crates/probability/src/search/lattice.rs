@@ -7,11 +7,12 @@
 
 use std::collections::BTreeMap;
 
+use elbowroom_num::work;
 use elbowroom_plan::{Node, NodeId};
 
 use super::nominal::Nominal;
 use super::room::Rooms;
-use super::{Candidates, OrderSearch};
+use super::{Candidates, OrderSearch, SEQUENCE_WORK};
 use crate::circumstances::Circumstances;
 use crate::network::{PrunedNetwork, TooCoupled};
 
@@ -164,6 +165,7 @@ impl Walk<'_> {
     /// Looks at all orders that begin like the sequence so far; the best of their probabilities.
     fn go_on(&mut self) -> Result<f64, TooLarge> {
         self.sequences += 1;
+        work::spend(SEQUENCE_WORK);
         if self.sequences > self.limits.sequences {
             return Err(TooLarge::Sequences(self.limits.sequences));
         }
@@ -171,8 +173,8 @@ impl Walk<'_> {
         let own = self.ends()?;
         let mut best = own.unwrap_or(0.0);
         self.orders += usize::from(own.is_some());
-        for node in self.next() {
-            if let Some(through) = self.through(node)? {
+        for (node, is_open) in self.search.joinable(&self.network, self.next()) {
+            if let Some(through) = self.through(node, is_open)? {
                 let known = self.edges.entry((set.clone(), node)).or_insert(0.0);
                 *known = known.max(through);
                 best = best.max(through);
@@ -199,6 +201,7 @@ impl Walk<'_> {
     fn ends(&mut self) -> Result<Option<f64>, TooLarge> {
         let model = &*self.search.model;
         if !self.network.running().is_empty()
+            || self.network.is_open()
             || !self
                 .search
                 .may_be_over(self.next_timed, self.network.sequence())
@@ -218,16 +221,23 @@ impl Walk<'_> {
     }
 
     /// The best of all orders that go on with this happening; `None` if there are none.
-    fn through(&mut self, node: NodeId) -> Result<Option<f64>, TooLarge> {
+    fn through(&mut self, node: NodeId, is_open: bool) -> Result<Option<f64>, TooLarge> {
         let model = &*self.search.model;
         let what = model.plan().nodes[node.index()];
         let timed_before = self.next_timed;
         let checkpoint = self.nominal.checkpoint();
         let mut best = 0.0;
-        if self.network.push(node)? > 0.0 {
-            let running = self.network.running();
-            let works = !self.must_work || self.nominal.apply(model, model.event(node), running);
-            if works && self.rooms.push(model, node, timed_before) {
+        let is_joined = self.network.is_open();
+        if self.network.push_as(node, is_open)? > 0.0 {
+            let (event, running) = (model.event(node), self.network.running());
+            let works = if is_open {
+                let works = self.nominal.apply_open(model, event);
+                let holds = self.nominal.is_settled(model, running);
+                works && !(holds && self.network.may_be_settled())
+            } else {
+                !self.must_work || self.nominal.apply(model, event, running)
+            };
+            if works && self.rooms.push(model, (node, is_joined), timed_before) {
                 self.mark(node, what, true);
                 best = self.go_on()?;
                 self.mark(node, what, false);

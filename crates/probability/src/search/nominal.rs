@@ -6,14 +6,15 @@ use elbowroom_model::problem::Comparison;
 use elbowroom_plan::InstanceId;
 
 use crate::circumstances::Circumstances;
-use crate::model::{Event, Model, Requirement};
+use crate::model::{Event, Model, Requirement, is_fact};
 
-/// The truth of a fact if nothing goes wrong.
+/// The truth of a fact if nothing goes wrong. Numbers are not followed here, so an effect whose condition reads them may
+/// take place or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Truth {
     False,
     True,
-    /// The belief leaves it open, and nothing has decided it since.
+    /// The belief leaves it open, or an effect whose condition reads numbers, and nothing has decided it since.
     Open,
 }
 
@@ -21,6 +22,15 @@ impl From<bool> for Truth {
     fn from(truth: bool) -> Self {
         if truth { Self::True } else { Self::False }
     }
+}
+
+/// The decision whether an effect takes place if nothing goes wrong.
+#[derive(Clone, Copy, Debug)]
+enum Taking {
+    Place,
+    Nothing,
+    /// Numbers decide.
+    Open,
 }
 
 /// The nominal state along an order.
@@ -50,7 +60,7 @@ impl Nominal {
             let start = model.event(model.start(running.instance));
             let memories = start.effects.iter().filter(|effect| effect.is_certain);
             for memory in memories {
-                nominal.set(memory.fact, true);
+                nominal.set(memory.fact, Truth::True);
             }
         }
         let works = nominal.stays_possible(model, &under_way);
@@ -73,41 +83,96 @@ impl Nominal {
         }
     }
 
-    fn set(&mut self, fact: usize, truth: bool) {
-        let old = std::mem::replace(&mut self.truths[fact], truth.into());
+    fn set(&mut self, fact: usize, truth: Truth) {
+        let old = std::mem::replace(&mut self.truths[fact], truth);
         self.undo.push((fact, old));
     }
 
     /// Does a happening, if its conditions, and those of the actions under way, leave it possible.
     pub(crate) fn apply(&mut self, model: &Model, event: &Event, running: &[InstanceId]) -> bool {
+        self.apply_open(model, event) && self.stays_possible(model, running)
+    }
+
+    /// The same, if another happening follows at the same moment: the over-all conditions of the running actions
+    /// need not hold in between.
+    pub(crate) fn apply_open(&mut self, model: &Model, event: &Event) -> bool {
         if !self.admit(model, &event.condition) {
             return false;
         }
-        let takes_place = |guard: &Option<Condition>| match guard {
-            None => true,
-            Some(guard) => self.possible(model, guard) && !self.surely_not(model, guard),
-        };
-        let effects: Vec<(usize, bool)> = event
+        // Guards are read before any effect.
+        let effects: Vec<(usize, bool, Taking)> = event
             .effects
             .iter()
-            .filter(|effect| takes_place(&effect.guard))
-            .map(|effect| (effect.fact, effect.makes_true))
+            .map(|effect| {
+                (
+                    effect.fact,
+                    effect.makes_true,
+                    self.taking(model, effect.guard.as_ref()),
+                )
+            })
             .collect();
         for makes_true in [false, true] {
-            for &(fact, _) in effects.iter().filter(|(_, truth)| *truth == makes_true) {
-                self.set(fact, makes_true);
+            for &(fact, _, taking) in effects.iter().filter(|(_, truth, _)| *truth == makes_true) {
+                match taking {
+                    Taking::Place => self.set(fact, Truth::from(makes_true)),
+                    Taking::Open if self.truths[fact] != Truth::from(makes_true) => {
+                        self.set(fact, Truth::Open);
+                    }
+                    Taking::Open | Taking::Nothing => {}
+                }
             }
         }
-        self.stays_possible(model, running)
+        true
+    }
+
+    /// Decides whether an effect with this guard takes place. Facts that the belief leaves open are taken to be such that
+    /// it does.
+    fn taking(&self, model: &Model, guard: Option<&Condition>) -> Taking {
+        let Some(guard) = guard else {
+            return Taking::Place;
+        };
+        match self.reading(model, guard) {
+            Ok(true) => Taking::Place,
+            Ok(false) => Taking::Nothing,
+            Err(Open) => {
+                let mut reads_numbers = false;
+                model
+                    .task()
+                    .visit_fluents_of(guard, &mut |_| reads_numbers = true);
+                // The memory of a start is open where numbers decide on it.
+                guard.visit_facts(&mut |fact| reads_numbers |= !is_fact(fact));
+                if reads_numbers {
+                    Taking::Open
+                } else {
+                    Taking::Place
+                }
+            }
+        }
+    }
+
+    /// Returns `true` if the over-all conditions of these actions hold now, with the guards of their effects.
+    pub(crate) fn is_settled(&self, model: &Model, running: &[InstanceId]) -> bool {
+        running.iter().all(|&id| {
+            let start = model.event(model.start(id));
+            let mut literals = start.over_all.literals.iter();
+            let mut coupled = start.over_all.coupled.iter();
+            let mut watches = start.watches.iter();
+            literals.all(|&(fact, truth)| self.truths[fact] == Truth::from(truth))
+                && coupled.all(|coupled| self.reading(model, &coupled.condition) == Ok(true))
+                && watches.all(|(memory, condition)| {
+                    self.truths[*memory] == Truth::False
+                        || self.reading(model, condition) == Ok(true)
+                })
+        })
     }
 
     /// Whether what is needed throughout these actions may hold now.
-    fn stays_possible(&mut self, model: &Model, running: &[InstanceId]) -> bool {
+    pub(crate) fn stays_possible(&mut self, model: &Model, running: &[InstanceId]) -> bool {
         running.iter().all(|&id| {
             let start = model.event(model.start(id));
             for (memory, condition) in &start.watches {
                 if self.surely_not(model, condition) {
-                    self.set(*memory, false);
+                    self.set(*memory, Truth::False);
                 }
             }
             self.admit(model, &start.over_all)
@@ -118,7 +183,7 @@ impl Nominal {
     pub(crate) fn admit(&mut self, model: &Model, requirement: &Requirement) -> bool {
         for &(fact, truth) in &requirement.literals {
             match self.truths[fact] {
-                Truth::Open => self.set(fact, truth),
+                Truth::Open => self.set(fact, truth.into()),
                 own if own == Truth::from(truth) => {}
                 _ => return false,
             }

@@ -82,9 +82,14 @@ impl<'s> Rooms<'s> {
     }
 
     /// Adds a happening, `next_timed` being the timed initials that have passed before it, unless
-    /// there is no time for it.
-    pub(super) fn push(&mut self, model: &Model, node: NodeId, next_timed: usize) -> bool {
-        let next = self.after_next(model, node, next_timed);
+    /// there is no time for it. With `is_joined` it comes at the same moment as the last one.
+    pub(super) fn push(
+        &mut self,
+        model: &Model,
+        (node, is_joined): (NodeId, bool),
+        next_timed: usize,
+    ) -> bool {
+        let next = self.after_next(model, (node, is_joined), next_timed);
         let has_time = next.is_some();
         self.after.extend(next);
         has_time
@@ -95,7 +100,12 @@ impl<'s> Rooms<'s> {
         self.after.pop();
     }
 
-    fn after_next(&self, model: &Model, node: NodeId, next_timed: usize) -> Option<Room> {
+    fn after_next(
+        &self,
+        model: &Model,
+        (node, is_joined): (NodeId, bool),
+        next_timed: usize,
+    ) -> Option<Room> {
         let separations = self.separations;
         let mut room = self.last().clone();
         let what = model.plan().nodes[node.index()];
@@ -106,6 +116,9 @@ impl<'s> Rooms<'s> {
             _ => room.add(Point::Recent(node)),
         };
         room.at_least(last, own, &Rational::ZERO)?;
+        if is_joined {
+            room.at_most(last, own, &Rational::ZERO)?;
+        }
         for place in 0..room.points.len() {
             match room.points[place] {
                 Point::Recent(other) if place != own && separations.are_apart(other, node) => {

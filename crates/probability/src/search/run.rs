@@ -2,13 +2,14 @@
 
 use std::ops::ControlFlow;
 
+use elbowroom_num::work;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::bound::{Bound, Outlook};
 use super::memo::Memo;
 use super::nominal::Nominal;
 use super::room::Rooms;
-use super::{Candidates, OrderSearch, Progress};
+use super::{Candidates, OrderSearch, Progress, SEQUENCE_WORK};
 use crate::circumstances::Circumstances;
 use crate::model::Model;
 use crate::network::{PrunedNetwork, TooCoupled};
@@ -29,9 +30,17 @@ pub(super) struct Run<'s, 'w> {
     /// The next of the timed initials that matter.
     next_timed: usize,
     memo: Memo,
-    best: Option<(f64, Vec<NodeId>)>,
+    best: Option<Best>,
     sequences: usize,
     watch: &'w mut dyn FnMut(&Progress) -> ControlFlow<()>,
+}
+
+/// The best order that was found.
+pub(super) struct Best {
+    pub(super) probability: f64,
+    pub(super) sequence: Vec<NodeId>,
+    /// Of each happening, whether it comes at the same moment as the one before it.
+    pub(super) joined: Vec<bool>,
 }
 
 /// Two probabilities closer than this, relatively, count as equal. It is more than what a bound is
@@ -73,8 +82,8 @@ impl<'s, 'w> Run<'s, 'w> {
         })
     }
 
-    /// The best sequence with its probability, and how many were looked at.
-    pub(super) fn finish(self) -> (Option<(f64, Vec<NodeId>)>, usize) {
+    /// The best sequence, and the number of sequences examined.
+    pub(super) fn finish(self) -> (Option<Best>, usize) {
         (self.best, self.sequences)
     }
 
@@ -97,10 +106,16 @@ impl<'s, 'w> Run<'s, 'w> {
             }
             // The goal may be reached before the end, and nothing else then.
             self.consider()?;
-            if self.push(node)?.is_none() {
+            // Happenings that need each other come at the same moment.
+            let is_joined = self.network.is_open();
+            let is_coupled = self.must_work && self.search.couplings.is_coupled(node);
+            if self.push(node, false)?.is_none()
+                && !(is_coupled && self.push(node, true)?.is_some())
+            {
                 break;
             }
-            if !self.rooms.push(self.model, node, self.timed_before(node)) {
+            let timed_before = self.timed_before(node);
+            if !self.rooms.push(self.model, (node, is_joined), timed_before) {
                 self.pop(node);
                 break;
             }
@@ -117,34 +132,38 @@ impl<'s, 'w> Run<'s, 'w> {
     /// Looks at the sequence so far, and at all that begin with it.
     pub(super) fn explore(&mut self) -> Result<ControlFlow<()>, TooCoupled> {
         self.sequences += 1;
+        work::spend(SEQUENCE_WORK);
         let progress = Progress {
             sequences: self.sequences,
-            best: self.best.as_ref().map(|(probability, _)| *probability),
+            best: self.best.as_ref().map(|best| best.probability),
         };
         if (self.watch)(&progress).is_break() {
             return Ok(ControlFlow::Break(()));
         }
         self.consider()?;
+        let is_joined = self.network.is_open();
         let mut promising = Vec::new();
-        for node in self.next() {
-            if let Some(bound) = self.push(node)? {
-                promising.push((bound, node));
-                self.pop(node);
+        for next in self.next() {
+            if let Some(bound) = self.push(next.0, next.1)? {
+                promising.push((bound, next));
+                self.pop(next.0);
             }
         }
-        promising.sort_by(|(a, first), (b, second): &(Bound, NodeId)| {
+        promising.sort_by(|(a, first), (b, second): &(Bound, (NodeId, bool))| {
             let likelier = b.probability.total_cmp(&a.probability);
             likelier.then(first.cmp(second))
         });
-        for (bound, node) in promising {
+        for (bound, (node, is_open)) in promising {
             if !self.can_beat(bound) {
                 continue;
             }
-            if self.push(node)?.is_none() {
+            if self.push(node, is_open)?.is_none() {
                 continue;
             }
-            let deeper = if self.rooms.push(self.model, node, self.timed_before(node)) {
-                let deeper = if self.is_dominated() {
+            let timed_before = self.timed_before(node);
+            let has_time = self.rooms.push(self.model, (node, is_joined), timed_before);
+            let deeper = if has_time {
+                let deeper = if !is_open && self.is_dominated() {
                     ControlFlow::Continue(())
                 } else {
                     self.explore()?
@@ -172,7 +191,8 @@ impl<'s, 'w> Run<'s, 'w> {
     fn can_beat(&self, bound: Bound) -> bool {
         match &self.best {
             None => bound.probability > 0.0,
-            Some((best, order)) => {
+            Some(best) => {
+                let (best, order) = (best.probability, &best.sequence);
                 bound.probability > best * (1.0 + TIE)
                     || (bound.probability >= best * (1.0 - TIE) && bound.length < order.len())
             }
@@ -182,6 +202,7 @@ impl<'s, 'w> Run<'s, 'w> {
     /// Keeps the sequence so far, if it is an order and better than the best.
     fn consider(&mut self) -> Result<(), TooCoupled> {
         if !self.network.running().is_empty()
+            || self.network.is_open()
             || !self
                 .search
                 .may_be_over(self.next_timed, self.network.sequence())
@@ -200,19 +221,29 @@ impl<'s, 'w> Run<'s, 'w> {
         let length = self.network.sequence().len();
         let is_better = match &self.best {
             None => probability > 0.0,
-            Some((best, order)) => {
+            Some(best) => {
+                let (best, order) = (best.probability, &best.sequence);
                 probability > best * (1.0 + TIE)
                     || (probability >= best * (1.0 - TIE) && length < order.len())
             }
         };
         if is_better {
-            self.best = Some((probability, self.network.sequence().to_vec()));
+            self.best = Some(Best {
+                probability,
+                sequence: self.network.sequence().to_vec(),
+                joined: self.network.joined(),
+            });
         }
         Ok(())
     }
 
-    /// The possible next happenings, regardless of time and probabilities.
-    fn next(&self) -> Vec<NodeId> {
+    /// The possible next happenings, regardless of time and probabilities; each with whether another one is to come at
+    /// the same moment.
+    fn next(&self) -> Vec<(NodeId, bool)> {
+        self.search.joinable(&self.network, self.next_nodes())
+    }
+
+    fn next_nodes(&self) -> Vec<NodeId> {
         let separations = &self.search.separations;
         let mut next = Vec::new();
         for (id, _) in self.model.plan().instances() {
@@ -242,8 +273,9 @@ impl<'s, 'w> Run<'s, 'w> {
     }
 
     /// Adds a happening to everything but the rooms; the bound of all that can follow, unless
-    /// the happening is impossible or the bound is not good enough.
-    fn push(&mut self, node: NodeId) -> Result<Option<Bound>, TooCoupled> {
+    /// the happening is impossible or the bound is not good enough. With `is_open`, another one is to come at the same
+    /// moment, unless nothing needs that.
+    fn push(&mut self, node: NodeId, is_open: bool) -> Result<Option<Bound>, TooCoupled> {
         let model = self.model;
         let event = model.event(node);
         self.memo.mark(self.nominal.checkpoint());
@@ -254,7 +286,7 @@ impl<'s, 'w> Run<'s, 'w> {
             Node::Timed(_) => self.next_timed += 1,
             Node::End(_) | Node::Zero => {}
         }
-        let pushed = self.network.push(node);
+        let pushed = self.network.push_as(node, is_open);
         let probability = match pushed {
             Ok(probability) => probability,
             Err(error) => {
@@ -262,8 +294,15 @@ impl<'s, 'w> Run<'s, 'w> {
                 return Err(error);
             }
         };
-        let works = !self.must_work || self.nominal.apply(model, event, self.network.running());
-        let bound = if works && probability > 0.0 {
+        let bound = if probability <= 0.0 {
+            Bound::IMPOSSIBLE
+        } else if is_open {
+            if self.nominal.apply_open(model, event) && !self.is_settled() {
+                Bound::of_beginning(&self.network)
+            } else {
+                Bound::IMPOSSIBLE
+            }
+        } else if !self.must_work || self.nominal.apply(model, event, self.network.running()) {
             self.bound()
         } else {
             Bound::IMPOSSIBLE
@@ -290,6 +329,12 @@ impl<'s, 'w> Run<'s, 'w> {
         }
         let checkpoint = self.memo.unmark();
         self.nominal.undo_to(checkpoint);
+    }
+
+    /// Returns `true` if the over-all conditions of the running actions hold, so that nothing need come at the same moment.
+    fn is_settled(&mut self) -> bool {
+        let running = self.network.running();
+        self.nominal.is_settled(self.model, running) && self.network.may_be_settled()
     }
 
     fn bound(&mut self) -> Bound {

@@ -68,8 +68,13 @@ impl<'s> Timing<'s> {
     }
 
     /// Adds a happening, `next_timed` being the timed initials that have passed before it; `None`
-    /// if there is no time for it.
-    pub(super) fn push(&mut self, model: &Model, node: NodeId, next_timed: usize) -> Option<()> {
+    /// if there is no time for it. With `is_joined` it comes at the same moment as the last one, or now.
+    pub(super) fn push(
+        &mut self,
+        model: &Model,
+        (node, is_joined): (NodeId, bool),
+        next_timed: usize,
+    ) -> Option<()> {
         let what = model.plan().nodes[node.index()];
         let own = match what {
             Node::End(id) => {
@@ -82,6 +87,9 @@ impl<'s> Timing<'s> {
             _ => self.network.add_node(),
         };
         self.demand(Constraint::at_least(self.last, own, Rational::ZERO))?;
+        if is_joined {
+            self.demand(Constraint::at_most(self.last, own, Rational::ZERO))?;
+        }
         let separations = self.separations;
         // Whatever is before the last of those that must be apart is before it in time, too.
         let mut placed = self.placed.iter().rev();

@@ -21,19 +21,22 @@ struct Needed {
     conditions: Vec<Condition>,
 }
 
-/// The layers of a sequence; `under_way` has the actions under way in each.
+/// The layers of a sequence; `under_way` has the actions under way in each. In layers between happenings of one moment,
+/// over-all conditions are not required.
 pub(super) fn layers(
     model: &Model,
-    sequence: &[NodeId],
+    (sequence, joined): (&[NodeId], &[bool]),
     under_way: Vec<Vec<InstanceId>>,
 ) -> Vec<Layer> {
     let mut needed = Needed::default();
     needed.include(&model.goal);
     let mut layers = Vec::with_capacity(under_way.len());
     let mut happenings = sequence.iter().rev();
-    for running in under_way.into_iter().rev() {
-        for id in &running {
-            needed.include(&model.event(model.start(*id)).over_all);
+    for (position, running) in under_way.into_iter().enumerate().rev() {
+        if joined.get(position) != Some(&true) {
+            for id in &running {
+                needed.include(&model.event(model.start(*id)).over_all);
+            }
         }
         layers.push(needed.layer(model, running));
         if let Some(&node) = happenings.next() {

@@ -192,7 +192,36 @@ impl<'a> Worlds<'a> {
     }
 
     pub(crate) fn push(&mut self, node: NodeId) {
-        self.pass(node);
+        self.push_as(node, (false, false));
+    }
+
+    /// A happening, and whether it comes at the same moment as the one before it and as the next one. Nothing is required
+    /// throughout actions in between.
+    pub(crate) fn push_as(&mut self, node: NodeId, (is_joined, is_open): (bool, bool)) {
+        if !is_joined {
+            self.pass(node);
+        }
+        self.push_open(node);
+        if !is_open {
+            self.look_throughout();
+        }
+    }
+
+    /// Returns `true` if all over-all conditions of running actions hold in all worlds.
+    pub(crate) fn is_settled(&self) -> bool {
+        let mut other = self.clone();
+        other.look_throughout();
+        other.possible == self.possible
+    }
+
+    /// Returns `true` if the over-all conditions of running actions hold in no world.
+    pub(crate) fn is_broken(&self) -> bool {
+        let mut other = self.clone();
+        other.look_throughout();
+        other.actions_probability() == 0.0
+    }
+
+    fn push_open(&mut self, node: NodeId) {
         match self.plan.nodes[node.index()] {
             Node::Zero => {}
             Node::Timed(index) => {
@@ -227,7 +256,6 @@ impl<'a> Worlds<'a> {
                 self.is_over(id);
             }
         }
-        self.look_throughout();
     }
 
     fn failing(&self, id: InstanceId) -> Failing {

@@ -2,17 +2,22 @@
 
 use elbowroom_model::Footprint;
 use elbowroom_plan::{Node, NodeId};
-use elbowroom_probability::{Candidates, Likelihoods, OrderSearch, Semantics};
+use elbowroom_probability::{Candidates, Happenings, Likelihoods, OrderSearch, Semantics};
 
 use super::Worlds;
 use super::random::Case;
 
-/// All orders, with their P(A ∩ G), as [`best`] counts them.
-pub(crate) fn all(
-    case: &Case,
-    semantics: Semantics,
-    search: &OrderSearch,
-) -> Vec<(Vec<NodeId>, f64)> {
+/// An order.
+pub(crate) struct Order {
+    pub(crate) sequence: Vec<NodeId>,
+    /// `true` if happenings of it come at one moment.
+    pub(crate) has_joined: bool,
+    /// P(A ∩ G).
+    pub(crate) probability: f64,
+}
+
+/// All orders, as [`best`] counts them.
+pub(crate) fn all(case: &Case, semantics: Semantics, search: &OrderSearch) -> Vec<Order> {
     let certain = Likelihoods::certain();
     let worlds = |likelihoods, semantics| {
         let (task, plan) = (&case.task, &case.plan);
@@ -23,47 +28,74 @@ pub(crate) fn all(
         worlds(&certain, Semantics::Paper),
     );
     let mut orders = Vec::new();
-    extend(case, search, both, &mut Vec::new(), &mut orders);
+    let mut sequence = (Vec::new(), Vec::new());
+    extend(case, search, both, (&mut sequence, false), &mut orders);
     orders
 }
 
 /// The best P(A ∩ G) of all orders, and how many happenings the shortest of those that are as
 /// likely has. Only those count for which there is time, which is asked of the network as a whole,
-/// and those that work nominally if the settings ask for it.
-pub(crate) fn best(
-    case: &Case,
-    semantics: Semantics,
-    search: &OrderSearch,
-) -> Option<(f64, usize)> {
-    let orders = all(case, semantics, search);
-    let best = orders.iter().map(|(_, p)| *p).reduce(f64::max)?;
-    let likeliest = orders.iter().filter(|(_, p)| *p >= best * (1.0 - 1e-10));
-    Some((best, likeliest.map(|(order, _)| order.len()).min()?))
+/// and those that work nominally if the settings ask for it. Of these, happenings may come at one moment if over-all
+/// conditions may not hold in between.
+///
+/// Without `may_join`, only orders without joined happenings count.
+pub(crate) fn best(orders: &[Order], may_join: bool) -> Option<(f64, usize)> {
+    let orders = orders.iter().filter(|order| may_join || !order.has_joined);
+    let probabilities = orders.clone().map(|order| order.probability);
+    let best = probabilities.reduce(f64::max)?;
+    let likeliest = orders.filter(|order| order.probability >= best * (1.0 - 1e-10));
+    Some((best, likeliest.map(|order| order.sequence.len()).min()?))
 }
 
 fn extend(
     case: &Case,
     search: &OrderSearch,
     (worlds, nominal): (Worlds<'_>, Worlds<'_>),
-    sequence: &mut Vec<NodeId>,
-    orders: &mut Vec<(Vec<NodeId>, f64)>,
+    (happenings, is_joined): (&mut (Vec<NodeId>, Vec<bool>), bool),
+    orders: &mut Vec<Order>,
 ) {
-    if search.windows(&case.circumstances, sequence).is_none() {
+    let sequence = &happenings.0;
+    let so_far = Happenings {
+        sequence,
+        joined: &happenings.1,
+    };
+    if search.windows_of(&case.circumstances, so_far).is_none() {
         return;
     }
     let must_work = search.settings().candidates == Candidates::Working;
     let is_timed = |node: &NodeId| matches!(case.plan.nodes[node.index()], Node::Timed(_));
-    if worlds.running().is_empty() && may_be_over(case, sequence) {
+    if !is_joined && worlds.running().is_empty() && may_be_over(case, sequence) {
         let p = worlds.success_probability();
         let counts = !must_work || nominal.success_probability() > 0.0;
         if counts && p > 0.0 {
-            orders.push((sequence.clone(), p));
+            orders.push(Order {
+                sequence: sequence.clone(),
+                has_joined: happenings.1.contains(&true),
+                probability: p,
+            });
         }
     }
     let is_dead = must_work && nominal.actions_probability() == 0.0;
     if is_dead || worlds.actions_probability() == 0.0 {
         return;
     }
+    let sequence = sequence.clone();
+    // At one moment ends come first, then timed initials, starts, and ends of actions that begin then.
+    let moment = happenings.1.iter().rposition(|is_joined| !is_joined);
+    let moment = sequence[moment.unwrap_or(0)..].to_vec();
+    let rank = |node: NodeId| match case.plan.nodes[node.index()] {
+        Node::End(id) => {
+            let start = case.plan.nodes.iter().position(|it| *it == Node::Start(id));
+            let begins = start.is_some_and(|start| moment.contains(&NodeId::from(start)));
+            if begins { 3 } else { 0 }
+        }
+        Node::Timed(_) => 1,
+        _ => 2,
+    };
+    let least = moment
+        .last()
+        .filter(|_| is_joined)
+        .map_or(0, |last| rank(*last));
     let next_timed = sequence.iter().filter(|node| is_timed(node)).count();
     for (at, what) in case.plan.nodes.iter().enumerate() {
         let node = NodeId::from(at);
@@ -79,13 +111,23 @@ fn extend(
                 .plan
                 .interference()
                 .any(|link| link.from == node && sequence.contains(&link.to));
-        if is_next && is_allowed {
+        if !is_next || !is_allowed || is_joined && rank(node) < least {
+            continue;
+        }
+        for is_open in [false, true] {
             let (mut worlds, mut nominal) = (worlds.clone(), nominal.clone());
-            worlds.push(node);
-            nominal.push(node);
-            sequence.push(node);
-            extend(case, search, (worlds, nominal), sequence, orders);
-            sequence.pop();
+            worlds.push_as(node, (is_joined, is_open));
+            nominal.push_as(node, (is_joined, is_open));
+            let is_needed = must_work && (worlds.is_broken() || !nominal.is_settled());
+            if is_open && !is_needed {
+                continue;
+            }
+            happenings.0.push(node);
+            happenings.1.push(is_joined);
+            let next = (&mut *happenings, is_open);
+            extend(case, search, (worlds, nominal), next, orders);
+            happenings.0.pop();
+            happenings.1.pop();
         }
     }
 }

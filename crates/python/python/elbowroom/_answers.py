@@ -102,7 +102,7 @@ class NoPlan:
 
     @property
     def is_proved(self) -> bool:
-        """Whether there is none. Otherwise nothing is known."""
+        """Whether a certificate (``document["certificate"]``) proves that there is none. Otherwise none was found."""
         return bool(self.document["answer"] == "no plan")
 
     @property
@@ -286,6 +286,9 @@ class Room(NamedTuple):
     """What keeps the lower end from moving further, in words."""
     upper_limit: str | None
     """What keeps the upper end."""
+    timeout: Fraction | None
+    """The time-out of the action whose duration it is: the plan works as long as the action also
+    ends before it. ``None`` if it is no duration, or if time-outs are off."""
 
 
 class Envelope(Table):
@@ -377,10 +380,11 @@ class Envelope(Table):
                 shown_inwards(room.upper, False),
                 room.lower_limit or "",
                 room.upper_limit or ("nothing" if room.upper == math.inf else ""),
+                "" if room.timeout is None else shown(room.timeout),
             )
             for room in self.rows()
         ]
-        heads = ("name", "quantity", "planned", "from", "to", "lower limit", "upper limit")
+        heads = ("name", "quantity", "planned", "from", "to", "lower limit", "upper limit", "time-out")
         why = f": {self.why_not}" if self.why_not else ""
         return html_table(heads, rows, f"{self.answer}, guarantee {self.guarantee}{why}")
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from . import _native
 from ._answers import Run
 from ._errors import RequestError, WorldError
-from ._numbers import Number, document, text
+from ._numbers import Number, document, text, timeout_text
 from ._world import Action, AsyncWorld, Observation, World, passage, wire
 
 
@@ -62,9 +62,15 @@ def run_options(
     chosen["planner"] = planner if isinstance(planner, str) else "embedded"
     if not isinstance(planner, str) and options.get("jobs") is not None:
         raise RequestError("`jobs` says how many threads the embedded planner uses")
+    if not isinstance(planner, str) and options.get("self_overlap"):
+        raise RequestError("`self_overlap` is about plans of the embedded planner")
     for name, value in options.items():
         if name in _TEXTS and value is not None and value != "measured":
             value = text(value)
+        if name == "timeout":
+            if value is None:
+                continue
+            value = timeout_text(value)
         if name == "vary" and isinstance(value, str):
             value = [value]
         if name == "likelihoods" and isinstance(value, str):

@@ -19,6 +19,7 @@ class Task:
         first: bool,
         memory: int | None,
         jobs: int | None,
+        self_overlap: bool,
         progress: _Progress,
     ) -> tuple[str, bool]: ...
     def stn(self, plan: _Named) -> tuple[str, str | None, str | None]: ...

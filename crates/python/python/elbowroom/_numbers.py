@@ -46,6 +46,15 @@ def text(number: Number) -> str:
     return str(exact(number))
 
 
+def timeout_text(timeout: Number | str) -> str:
+    """A time-out as Elbowroom reads it: a number of seconds, or a rule.
+
+    >>> timeout_text(60), timeout_text("10x,600")
+    ('60', '10x,600')
+    """
+    return timeout if isinstance(timeout, str) else text(timeout)
+
+
 def _pair(fields: dict[str, Any]) -> Any:
     if "exact" in fields and len(fields) == 2 and "decimal" in fields:
         return exact(fields["exact"])

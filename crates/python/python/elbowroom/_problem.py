@@ -13,7 +13,7 @@ from . import _native
 from ._answers import Envelope, NoPlan, Plan, Run, Step, Stn, Verdict
 from ._errors import Diagnostic, InterruptedWarning, RequestError, WorldError, diagnostics
 from ._execution import Stepped, drive, run_options
-from ._numbers import Number, document, text
+from ._numbers import Number, document, text, timeout_text
 from ._odds import Odds
 from ._tables import ProgressCallback, listener
 from ._world import Adapter, AsyncWorld, World
@@ -135,15 +135,19 @@ class Problem:
     def check(
         self, plan: AnyPlan, *, tolerance: Number | None = None, rules: str = "pddl"
     ) -> Verdict:
-        """Judges a plan by the semantics of PDDL 2.1, exactly.
+        """Judges a plan by the semantics of PDDL 2.1.
 
         Args:
             plan: a plan with fixed times.
-            tolerance: judges as VAL does with this ``-t``; without it, exactly.
-            rules: without a tolerance: ``"pddl"``, where the goal holds after all timed initials;
+            tolerance: by how much each printed number may differ from that of a valid plan; without
+                it, by one unit of its last digit, at most 0.001; with 0, not at all. Steps
+                are exact numbers.
+            rules: ``"pddl"``, where the goal holds after all timed initials;
                 ``"pddl-goal-after-actions"``, where it holds after the plan's last action; or
-                ``"unified-planning"``, where nothing needs to be apart, and what happens at one time
-                reads the state before.
+                ``"unified-planning"``, where nothing needs to be apart, what happens at one time reads the
+                state before, and no two actions write the same fact at one time; or
+                ``"unified-planning-with-epsilon"``, where only the last of these is added to
+                ``"pddl"``.
 
         Raises:
             ReadError: if the plan cannot be read.
@@ -168,6 +172,7 @@ class Problem:
         first: bool | None = None,
         memory: int | None = None,
         jobs: int | None = None,
+        self_overlap: bool = False,
         progress: ProgressCallback | bool | None = None,
     ) -> Plan | NoPlan:
         """Looks for a plan.
@@ -179,6 +184,8 @@ class Problem:
             memory: about how many bytes the search may use.
             jobs: how many threads the embedded planner may use; by default, and with 0, one for
                 each processor. The plan is the same, but comes sooner.
+            self_overlap: whether a ground action may overlap itself: start again before it has ended.
+                This is about plans of the embedded planner.
             progress: is told how far it has come; ``True`` shows a bar.
 
         Returns:
@@ -196,7 +203,7 @@ class Problem:
             first = time_limit is None
         limit = _seconds(time_limit)
         answer, is_interrupted = self._native.plan(
-            planner, limit, first, memory, jobs, listener(progress)
+            planner, limit, first, memory, jobs, self_overlap, listener(progress)
         )
         found = document(answer)
         _warn(is_interrupted, found["answer"] == "plan")
@@ -229,12 +236,13 @@ class Problem:
         vary: str | Sequence[str] = (),
         controllable: str | Sequence[str] = (),
         guarantee: str = "dynamic",
-        method: str = "irr",
+        method: str | None = None,
         precision: Number | None = None,
         growth: str = "doubling",
         sharpen: bool = False,
         enforce: bool = False,
         contains: str | dict[str, tuple[Number, Number]] | None = None,
+        timeout: Number | str | None = None,
         most_checks: int | None = None,
         time_limit: float | None = None,
         progress: ProgressCallback | bool | None = None,
@@ -247,13 +255,19 @@ class Problem:
                 default.
             controllable: actions whose durations the executor chooses.
             guarantee: ``"weak"``, ``"dynamic"`` or ``"strong"``.
-            method: ``"irr"``, or ``"best"``: the box whose least deviation is greatest.
+            method: ``"best"``: the box whose least deviation is greatest; or ``"irr"``. By default
+                ``"best"``, but ``"irr"`` where ``precision``, ``growth`` or ``sharpen`` is given,
+                and for problems with processes or events.
             precision: how close each end comes to its limit, in the quantity's own unit; without
                 it, a hundredth of the planned value.
             growth: ``"doubling"`` or ``"constant"`` steps.
             sharpen: whether each end is moved onto its limit when the search has ended.
             enforce: whether the dispatcher keeps to obligations that are bounds on differences.
             contains: asks instead whether this box lies inside: ``{"dur_0": (8, 12)}``.
+            timeout: the time-out of each action: a number of seconds, ``"none"``, or
+                ``"10x,600"``, as by default: 10 times the planned duration, at least 600. The
+                plan works as long as each quantity stays inside its interval and each action
+                ends before its time-out; a box beyond it is not inside.
             most_checks: the search ends after that many box checks.
             time_limit: in seconds; what was found until then is sound.
             progress: is told how far it has come; ``True`` shows a bar.
@@ -285,6 +299,7 @@ class Problem:
             "sharpen": sharpen,
             "enforce": enforce,
             "contains": _box(contains),
+            "timeout": None if timeout is None else timeout_text(timeout),
         }
         if most_checks is not None:
             options["most_checks"] = most_checks
@@ -308,6 +323,7 @@ class Problem:
         seed: int = 0,
         most_sequences: int = 50_000,
         lattice: bool = False,
+        self_overlap: bool = False,
         time_limit: float | None = None,
         progress: ProgressCallback | bool | None = None,
     ) -> Odds:
@@ -326,6 +342,7 @@ class Problem:
             seed: of the first sample; the others follow.
             most_sequences: so many beginnings of orders are looked at for the likeliest one.
             lattice: whether to list and draw all orders.
+            self_overlap: whether a ground action may overlap itself in plans that are made.
             time_limit: in seconds; what was found until then is the answer.
             progress: is told how far it has come; ``True`` shows a bar.
 
@@ -350,6 +367,7 @@ class Problem:
             "best": best,
             "most_sequences": most_sequences,
             "lattice": lattice,
+            "self_overlap": self_overlap,
             "executors": None if executors is None else list(executors),
             "samples": samples,
             "seed": seed,
@@ -372,7 +390,7 @@ class Problem:
         plan: AnyPlan | None = None,
         *,
         world: World | Text | None = None,
-        executor: str = "guarded",
+        executor: str = "live",
         planner: str | PlannerCallable = "embedded",
         seed: int = 0,
         trace: bool = True,
@@ -395,9 +413,9 @@ class Problem:
             progress: is told of what happens; ``True`` shows a bar.
             options: further members of a run's specification, as the header of a trace has them
                 (``docs/formats/trace.md``): ``time_limit`` and ``planning_time`` in the world's
-                seconds, ``max_replans``, ``vary``, ``guarantee``, ``precision``, ``running``,
-                ``likelihoods``, …; and ``jobs``, the number of threads of the embedded planner:
-                1 unless it is given, 0 for one for each processor. It changes no plan, and is no
+                seconds, ``timeout`` (as in :meth:`envelope`), ``max_replans``, ``vary``,
+                ``guarantee``, ``precision``, ``running``, ``likelihoods``, ``self_overlap``, …; and ``jobs``, the number of threads of the
+                embedded planner: 1 unless it is given, 0 for one for each processor. It changes no plan, and is no
                 part of the trace.
 
         Returns:
@@ -443,7 +461,7 @@ class Problem:
         self,
         plan: AnyPlan | None = None,
         *,
-        executor: str = "guarded",
+        executor: str = "live",
         planner: str | PlannerCallable = "embedded",
         trace: bool = True,
         **options: Any,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
+import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import IO, Any
 
 from unified_planning.engines import (
@@ -29,7 +31,8 @@ from unified_planning.model import ProblemKind
 from unified_planning.plans import PlanKind, STNPlan
 
 from ._answers import NoPlan
-from ._errors import UnsupportedError
+from ._errors import ReadError, UnsupportedError
+from ._up_apart import apart
 from ._up_stn import stn_plan, stn_text
 from ._up_translate import Translation
 
@@ -85,6 +88,10 @@ class ElbowroomPlanner(
 
     Plans of temporal problems come back as time-triggered plans or, with ``params={"plan": "stn"}``, as
     STN plans. As a replanner it keeps its last plan for as long as that works.
+
+    Parameters: ``jobs``, how many threads may search (0: one for each processor); ``memory``, about how many
+    bytes the search may use; ``time_limit``, in seconds, also where a call has no ``timeout``; ``seed``, which
+    changes nothing, because the search draws no random numbers; ``plan``, the kind of plan.
     """
 
     def __init__(
@@ -93,8 +100,13 @@ class ElbowroomPlanner(
         error_on_failed_checks: bool = True,
         *,
         plan: str = "time-triggered",
-        **options: Any,
+        jobs: int | None = None,
+        memory: int | None = None,
+        seed: int | None = None,
+        time_limit: float | None = None,
+        **unknown: Any,
     ) -> None:
+        _refuse_unknown(unknown, "elbowroom", ("plan", "jobs", "memory", "seed", "time_limit"))
         Engine.__init__(self)
         OneshotPlannerMixin.__init__(self)
         AnytimePlannerMixin.__init__(self)
@@ -102,7 +114,9 @@ class ElbowroomPlanner(
             raise UPUsageError(f"there are no plans of kind {plan!r}; there are time-triggered and stn")
         self._plan_kind = plan
         self._last: Any = None
-        self.options = options
+        _whole("seed", seed, None)
+        self._options: dict[str, Any] = {"jobs": _whole("jobs", jobs, 0), "memory": _whole("memory", memory, 1 << 20)}
+        self._time_limit = _positive("time_limit", time_limit)
         if problem is not None:
             ReplannerMixin.__init__(self, problem, error_on_failed_checks)
 
@@ -145,6 +159,7 @@ class ElbowroomPlanner(
         self, problem: Any, timeout: float | None = None, output_stream: IO[str] | None = None
     ) -> Iterator[PlanGenerationResult]:
         """The first plan; then, if there is time, the best until the time limit."""
+        timeout = self._limit(timeout)
         first = self._result(problem, timeout, first=True)
         is_solved = first.status in (
             PlanGenerationResultStatus.SOLVED_SATISFICING,
@@ -158,30 +173,61 @@ class ElbowroomPlanner(
         )
         yield self._result(problem, timeout, first=False)
 
+    def _limit(self, timeout: float | None) -> float | None:
+        """The shorter of the two time limits."""
+        return min((it for it in (timeout, self._time_limit) if it is not None), default=None)
+
     def _result(self, problem: Any, timeout: float | None, first: bool) -> PlanGenerationResult:
         status = PlanGenerationResultStatus
+        timeout = self._limit(timeout)
         try:
             translated = Translation(problem)
-            found = translated.problem.plan(time_limit=timeout, first=first)
-        except UnsupportedError as error:
+            found = translated.problem.plan(
+                time_limit=timeout,
+                first=first,
+                self_overlap=bool(problem.self_overlapping),
+                **self._options,
+            )
+        except (UnsupportedError, ReadError) as error:
             message = LogMessage(LogLevel.ERROR, str(error))
             return PlanGenerationResult(
                 status.UNSUPPORTED_PROBLEM, None, self.name, log_messages=[message]
             )
         if isinstance(found, NoPlan):
-            stop = found.document["stop"]
-            outcome = {"time limit": status.TIMEOUT, "memory limit": status.MEMOUT}.get(
-                stop, status.UNSOLVABLE_INCOMPLETELY
+            return self._without_plan(translated, found)
+        steps = apart(translated, found.steps)
+        if steps is None:
+            text = (
+                "no plan found: the one that was found has steps that write the same fact at one time, "
+                "which unified-planning does not allow, and they cannot be moved apart"
             )
-            if found.is_proved:
-                outcome = status.UNSOLVABLE_PROVEN
-            message = LogMessage(LogLevel.INFO, found.reason)
-            return PlanGenerationResult(outcome, None, self.name, log_messages=[message])
-        metrics = {"makespan": str(found.makespan)}
-        plan: Any = translated.plan_back(found.steps)
+            message = LogMessage(LogLevel.INFO, text)
+            return PlanGenerationResult(
+                status.UNSOLVABLE_INCOMPLETELY, None, self.name, log_messages=[message]
+            )
+        metrics = {"makespan": str(max((s.start + (s.duration or 0) for s in steps), default=0))}
+        plan: Any = translated.plan_back(steps)
         if self._plan_kind == "stn" and plan.kind == PlanKind.TIME_TRIGGERED_PLAN:
-            plan = stn_plan(translated, found)
+            plan = stn_plan(translated, translated.steps(plan))
         return PlanGenerationResult(status.SOLVED_SATISFICING, plan, self.name, metrics)
+
+    def _without_plan(self, translated: Translation, found: NoPlan) -> PlanGenerationResult:
+        """The result where no plan was found: proved only by a certificate that holds by unified-planning's rules."""
+        status = PlanGenerationResultStatus
+        outcome = {"time limit": status.TIMEOUT, "memory limit": status.MEMOUT}.get(
+            found.document["stop"], status.UNSOLVABLE_INCOMPLETELY
+        )
+        reason = found.reason
+        if found.is_proved and translated.is_refuted_by(found.document["certificate"]):
+            outcome = status.UNSOLVABLE_PROVEN
+        elif found.is_proved:
+            outcome = status.UNSOLVABLE_INCOMPLETELY
+            reason = (
+                "no plan found: none exists in which what interferes is at least 0.001 apart, but the problem "
+                "has no epsilon, so that one with shorter times between may exist"
+            )
+        message = LogMessage(LogLevel.INFO, reason)
+        return PlanGenerationResult(outcome, None, self.name, log_messages=[message])
 
     # The protocol of replanners: the problem is a copy that changes.
 
@@ -209,7 +255,7 @@ class ElbowroomPlanner(
             return False
         try:
             translated = Translation(self._problem)
-            return bool(translated.problem.check(translated.steps(plan)))
+            return bool(translated.check(translated.steps(plan)))
         except UnsupportedError:
             return False
 
@@ -252,13 +298,15 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
     """Elbowroom's judge, with the rules of unified-planning.
 
     Without an ε in the problem, what happens at one time reads the state before, and nothing needs
-    to be apart; with one, interfering happenings keep it. The goal holds after all timed effects.
+    to be apart; with one, interfering happenings keep it. In both cases no two actions write the same fact
+    at one time. Whether an action may overlap with itself (``problem.self_overlapping``) is not judged, as
+    unified-planning's own validator does not. The goal holds after all timed effects.
     """
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, **unknown: Any) -> None:
+        _refuse_unknown(unknown, "elbowroom-val", ())
         Engine.__init__(self)
         PlanValidatorMixin.__init__(self)
-        self.options = options
 
     @property
     def name(self) -> str:
@@ -292,8 +340,7 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
         translated = Translation(problem)
         if isinstance(plan, STNPlan):
             return self._validate_network(translated, plan)
-        rules = "pddl" if problem.epsilon else "unified-planning"
-        verdict = translated.problem.check(translated.steps(plan), rules=rules)
+        verdict = translated.check(translated.steps(plan))
         if verdict.violation is None:
             return ValidationResult(ValidationResultStatus.VALID, self.name, [])
         violation = verdict.violation
@@ -316,3 +363,42 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
             return ValidationResult(ValidationResultStatus.VALID, self.name, [])
         message = LogMessage(LogLevel.INFO, found.why_not or found.answer)
         return ValidationResult(ValidationResultStatus.INVALID, self.name, [message])
+
+
+def _refuse_unknown(unknown: dict[str, Any], engine: str, known: Sequence[str]) -> None:
+    """Raises an error for the first parameter that the engine does not have."""
+    for name in unknown:
+        close = difflib.get_close_matches(name, known, 1)
+        advice = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(known) or 'none'}"
+        raise UPUsageError(f"{engine} has no parameter {name!r}; {advice}")
+
+
+def _whole(name: str, value: Any, least: int | None) -> int | None:
+    """A parameter that is a whole number, perhaps as text."""
+    if value is None:
+        return None
+    number = None
+    try:
+        if not isinstance(value, bool) and int(value) == float(value):
+            number = int(value)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    if number is None:
+        raise UPUsageError(f"{name} must be a whole number, not {value!r}")
+    if least is not None and number < least:
+        unit = " bytes" if name == "memory" else ""
+        raise UPUsageError(f"{name} must be at least {least}{unit}, not {value!r}")
+    return number
+
+
+def _positive(name: str, value: Any) -> float | None:
+    """A parameter that is a positive number, perhaps as text."""
+    if value is None:
+        return None
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if isinstance(value, bool) or not 0 < number < math.inf:
+        raise UPUsageError(f"{name} must be a positive number of seconds, not {value!r}")
+    return number

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 from unified_planning.model import FNode, OperatorKind, Problem as UPProblem
 
@@ -19,15 +19,28 @@ _TAKEN = frozenset(
     "assign scale-up scale-down minimize maximize total-time object number either constraints "
     "always sometime within at-most-once preference is-violated undefined".split()
 )
-_INITIAL = {"type": "t", "object": "o", "fluent": "f", "action": "a"}
+_INITIAL = {"type": "t", "object": "o", "fluent": "f", "action": "a", "running": "r"}
+
+
+class _Shift(NamedTuple):
+    """What stands for the timed increases of a fluent."""
+
+    of: str
+
+    @property
+    def name(self) -> str:
+        """No fluent of a problem has a name like this, unless it is made to."""
+        return f"timed increases of {self.of}"
 
 
 class Expressions:
     """The names of a problem's things in PDDL, and its conditions, numbers and effects."""
 
-    def __init__(self, problem: UPProblem, taken: Iterable[str]) -> None:
+    def __init__(self, problem: UPProblem, taken: Iterable[str], shifted: Iterable[Any] = ()) -> None:
         self._names: dict[tuple[str, Any], str] = {}
         self._used = {*_TAKEN, *taken}
+        self._variables: dict[tuple[type, str, Any], str] = {}
+        self._shifted = set(shifted)
         self.simplify = problem.environment.simplifier.simplify
 
     def name(self, kind: str, thing: Any) -> str:
@@ -44,6 +57,42 @@ class Expressions:
             self._used.add(name)
             self._names[key] = name
         return self._names[key]
+
+    def variable(self, of: Any) -> str:
+        """The name of a parameter or a variable, with its question mark: the same each time, and no two alike."""
+        key = (type(of), of.name, of.type)
+        if key not in self._variables:
+            clean = re.sub(r"[^a-z0-9_-]", "_", of.name.lower())
+            if not clean[:1].isalpha():
+                clean = "v_" + clean
+            name, number = clean, 1
+            while name in self._variables.values():
+                number += 1
+                name = f"{clean}_{number}"
+            self._variables[key] = name
+        return "?" + self._variables[key]
+
+    def declared(self, variables: Iterable[Any]) -> str:
+        """Parameters or variables with their types, as PDDL declares them."""
+        return " ".join(f"{self.variable(it)} - {self.type_name(it.type)}" for it in variables)
+
+    def target(self, e: FNode) -> str:
+        """A fluent as the target of an effect."""
+        args = [self.walk(arg) for arg in e.args]
+        return f"({' '.join([self.name('fluent', e.fluent()), *args])})"
+
+    def shift(self, e: FNode) -> str:
+        """The sum of the timed increases of a fluent so far, which is a fluent of its own in PDDL."""
+        args = [self.walk(arg) for arg in e.args]
+        return f"({' '.join([self.shift_name(e.fluent()), *args])})"
+
+    def shift_name(self, fluent: Any) -> str:
+        """The name of the fluent for the timed increases of another one."""
+        return self.name("fluent", _Shift(fluent.name))
+
+    def is_shifted(self, e: FNode) -> bool:
+        """Whether the fluent has timed increases."""
+        return e.fluent() in self._shifted
 
     def type_name(self, of: Any) -> str:
         """The name of a user type."""
@@ -65,18 +114,17 @@ class Expressions:
         if e.is_object_exp():
             return self.name("object", e.object())
         if e.is_parameter_exp():
-            return "?" + variable(e.parameter().name)
+            return self.variable(e.parameter())
         if e.is_variable_exp():
-            return "?" + variable(e.variable().name)
+            return self.variable(e.variable())
         if e.is_fluent_exp():
-            return f"({' '.join([self.name('fluent', e.fluent()), *args])})"
-        if e.is_iff():
+            return f"(+ {self.target(e)} {self.shift(e)})" if self.is_shifted(e) else self.target(e)
+        is_truth = e.is_equals() and any(arg.type.is_bool_type() for arg in e.args)
+        if e.is_iff() or is_truth:
             return f"(and (imply {args[0]} {args[1]}) (imply {args[1]} {args[0]}))"
         if e.is_exists() or e.is_forall():
-            bound = " ".join(f"?{variable(v.name)} - {self.type_name(v.type)}" for v in e.variables())
+            bound = self.declared(e.variables())
             return f"({'exists' if e.is_exists() else 'forall'} ({bound}) {args[0]})"
-        if e.is_equals() and any(arg.type.is_bool_type() for arg in e.args):
-            raise UnsupportedError(f"an equality of truth values: {e}")
         operator = _OPERATORS.get(e.node_type)
         if operator is None:
             raise UnsupportedError(f"the expression {e} is not supported")
@@ -89,7 +137,7 @@ class Expressions:
 
     def effect(self, effect: Any) -> str:
         """An effect, with its condition and its forall."""
-        target = self.walk(effect.fluent)
+        target = self.target(effect.fluent)
         made: list[str]
         if effect.is_increase() or effect.is_decrease():
             word = "increase" if effect.is_increase() else "decrease"
@@ -104,13 +152,16 @@ class Expressions:
                 truth = self.walk(value)
                 made = [f"(when {truth} {target})", f"(when (not {truth}) (not {target}))"]
         else:
-            made = [f"(assign {target} {self.condition(effect.value)})"]
+            value = self.condition(effect.value)
+            if self.is_shifted(effect.fluent):
+                value = f"(- {value} {self.shift(effect.fluent)})"
+            made = [f"(assign {target} {value})"]
         condition = self.simplify(effect.condition)
         if not condition.is_true():
             guard = self.walk(condition)
             made = [_when(guard, it) for it in made]
         if effect.forall:
-            bound = " ".join(f"?{variable(v.name)} - {self.type_name(v.type)}" for v in effect.forall)
+            bound = self.declared(effect.forall)
             made = [f"(forall ({bound}) {it})" for it in made]
         return " ".join(made)
 
@@ -148,8 +199,3 @@ _OPERATORS = {
     OperatorKind.LT: "<",
     OperatorKind.EQUALS: "=",
 }
-
-
-def variable(name: str) -> str:
-    """The name of a variable, without its question mark."""
-    return re.sub(r"[^a-zA-Z0-9_-]", "_", name) if name[:1].isalpha() else f"v_{name}"

@@ -6,6 +6,7 @@ same. What has no counterpart is refused by name.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Any
@@ -22,9 +23,10 @@ from unified_planning.model import (
 )
 from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, STNPlan, TimeTriggeredPlan
 
+from ._answers import Verdict
 from ._errors import UnsupportedError
-from ._problem import Problem, read
-from ._up_expressions import Expressions, first_of, variable
+from ._problem import AnyPlan, Problem, read
+from ._up_expressions import Expressions, first_of
 
 COST = "action-costs"
 """The fluent that is added where actions have costs."""
@@ -46,8 +48,13 @@ class Translation:
         if problem.kind.has_bounded_types():
             problem = _without_bounds(problem)
         self.source = problem
-        self._say = Expressions(problem, [COST])
+        self._timed_effects = list(_timed_effects(problem))
+        self._shifted = _shifted(problem, self._timed_effects)
+        self._say = Expressions(problem, [COST], self._shifted)
         self._refuse_what_has_no_counterpart()
+        for action in problem.actions:
+            # Actions keep their names; additional facts get others.
+            self._say.name("action", action)
         self.domain_text = "\n".join(self._domain())
         self.problem_text = "\n".join(self._problem())
         self.actions: dict[str, Any] = {
@@ -60,6 +67,25 @@ class Translation:
         self.problem: Problem = read(
             self.domain_text, self.problem_text, epsilon="0.001" if not epsilon else epsilon
         )
+
+    @property
+    def rules(self) -> str:
+        """The rules of unified-planning by which plans are judged: see :meth:`elbowroom.Problem.check`."""
+        return "unified-planning-with-epsilon" if self.original.epsilon else "unified-planning"
+
+    @property
+    def is_temporal(self) -> bool:
+        """Whether plans of the problem have times."""
+        kind = self.original.kind
+        return bool(kind.has_continuous_time() or kind.has_discrete_time())
+
+    def is_refuted_by(self, certificate: dict[str, Any]) -> bool:
+        """Whether a certificate that no plan of the translation exists holds for the problem itself.
+
+        Without an ε, it does if it needs neither a distance between happenings nor that those of one time can
+        be put into an order. So do certificates that list what can become true, without pairs or states.
+        """
+        return bool(self.original.epsilon) or not (certificate.get("apart") or certificate.get("closed"))
 
     # Refusals.
 
@@ -103,6 +129,7 @@ class Translation:
         predicates = [self._signature(fluent) for fluent in is_fact]
         yield f"  (:predicates {' '.join(predicates)})"
         functions = [self._signature(fluent) for fluent in problem.fluents if fluent not in is_fact]
+        functions += [self._shift_signature(fluent) for fluent in self._shifted]
         if self._costs() is not None:
             functions.append(f"({COST})")
         yield f"  (:functions {' '.join(functions)})"
@@ -111,14 +138,14 @@ class Translation:
         yield ")"
 
     def _signature(self, fluent: Any) -> str:
-        parameters = [f"?{variable(it.name)} - {self._say.type_name(it.type)}" for it in fluent.signature]
-        return f"({' '.join([self._say.name('fluent', fluent), *parameters])})"
+        return f"({self._say.name('fluent', fluent)} {self._say.declared(fluent.signature)})"
+
+    def _shift_signature(self, fluent: Any) -> str:
+        return f"({self._say.shift_name(fluent)} {self._say.declared(fluent.signature)})"
 
     def _action(self, action: Any) -> Iterator[str]:
         name = self._say.name("action", action)
-        parameters = " ".join(
-            f"?{variable(it.name)} - {self._say.type_name(it.type)}" for it in action.parameters
-        )
+        parameters = self._say.declared(action.parameters)
         if getattr(action, "simulated_effect", None) or getattr(action, "simulated_effects", None):
             raise UnsupportedError(f"the simulated effect of {action.name} is not supported")
         cost = self._cost(action)
@@ -141,7 +168,8 @@ class Translation:
                 for when in _whens(interval, action)
                 for it in found
             )
-            yield f"    :condition (and {conditions})"
+            strict = " ".join(f"(at start {it})" for it in self._strict(action.duration))
+            yield f"    :condition (and {conditions} {strict})"
             effects = " ".join(
                 f"({_when_of(timing, action)} {part})"
                 for timing, found in action.effects.items()
@@ -155,11 +183,16 @@ class Translation:
 
     def _duration(self, duration: Any) -> str:
         lower, upper = self._say.condition(duration.lower), self._say.condition(duration.upper)
-        is_open = duration.is_left_open(), duration.is_right_open()
-        if lower == upper and not any(is_open):
+        if lower == upper:
             return f"(= ?duration {lower})"
-        at_least, at_most = (">" if is_open[0] else ">="), ("<" if is_open[1] else "<=")
-        return f"(and ({at_least} ?duration {lower}) ({at_most} ?duration {upper}))"
+        return f"(and (>= ?duration {lower}) (<= ?duration {upper}))"
+
+    def _strict(self, duration: Any) -> Iterator[str]:
+        """The ends of an open interval as conditions: PDDL has no strict bounds on durations."""
+        if duration.is_left_open():
+            yield f"(> ?duration {self._say.condition(duration.lower)})"
+        if duration.is_right_open():
+            yield f"(< ?duration {self._say.condition(duration.upper)})"
 
     def _costs(self) -> dict[Any, FNode] | None:
         """What each action costs, if that is the metric."""
@@ -189,7 +222,7 @@ class Translation:
         for fluent, value in problem.initial_values.items():
             if value is None:
                 continue
-            target = self._say.walk(fluent)
+            target = self._say.target(fluent)
             if fluent.type.is_bool_type():
                 if value.is_true():
                     yield f"    {target}"
@@ -197,10 +230,11 @@ class Translation:
                 yield f"    (= {target} {self._say.condition(value)})"
         if self._costs() is not None:
             yield f"    (= ({COST}) 0)"
-        for timing, effects in problem.timed_effects.items():
-            time = _absolute(timing)
-            for effect in effects:
-                yield f"    {self._timed(time, effect)}"
+        for fluent, value in problem.initial_values.items():
+            if value is not None and self._say.is_shifted(fluent):
+                yield f"    (= {self._say.shift(fluent)} 0)"
+        for timed in self._timed():
+            yield f"    {timed}"
         yield "  )"
         goals = [self._say.condition(goal) for goal in problem.goals]
         yield f"  (:goal (and {' '.join(goals)}))"
@@ -209,17 +243,60 @@ class Translation:
             yield f"  (:metric {metric})"
         yield ")"
 
-    def _timed(self, time: Fraction, effect: Any) -> str:
-        if not effect.is_assignment() or effect.forall or not effect.condition.is_true():
-            raise UnsupportedError(
-                f"the timed effect {effect} is not supported; only plain assignments are"
-            )
-        target, value = self._say.walk(effect.fluent), self._say.simplify(effect.value)
+    def _timed(self) -> Iterator[str]:
+        """The timed effects; those of one time that increase the same fluent are one."""
+        totals: dict[str, Fraction] = {}
+        sums: dict[tuple[Fraction, str], Fraction] = {}
+        for time, effect in self._timed_effects:
+            if effect.is_assignment() and not self._say.is_shifted(effect.fluent):
+                yield self._timed_assignment(time, effect)
+                continue
+            target = self._say.shift(effect.fluent)
+            amount = Fraction(self._timed_value(effect).constant_value())
+            if effect.is_assignment():
+                totals[target] = amount - self._lasting_value(effect)
+            else:
+                sign = 1 if effect.is_increase() else -1
+                totals[target] = totals.get(target, Fraction(0)) + sign * amount
+            sums[time, target] = totals[target]
+        for (time, target), total in sums.items():
+            yield f"(at {time} (= {target} {total}))"
+
+    def _timed_value(self, effect: Any) -> FNode:
+        if not effect.condition.is_true():
+            raise UnsupportedError(f"the timed effect {effect} has a condition, which is not supported")
+        value = self._say.simplify(effect.value)
         if not value.is_constant():
-            raise UnsupportedError(f"the timed effect {effect} does not assign a constant")
-        if not value.is_bool_constant():
-            return f"(at {time} (= {target} {self._say.walk(value)}))"
-        return f"(at {time} {target if value.is_true() else f'(not {target})'})"
+            raise UnsupportedError(
+                f"the timed effect {effect} is not supported: its value is not a constant"
+            )
+        return value
+
+    def _timed_assignment(self, time: Fraction, effect: Any) -> str:
+        value = self._timed_value(effect)
+        target = self._say.target(effect.fluent)
+        if value.is_bool_constant():
+            return f"(at {time} {target if value.is_true() else f'(not {target})'})"
+        return f"(at {time} (= {target} {self._say.walk(value)}))"
+
+    def _lasting_value(self, effect: Any) -> Fraction:
+        """The initial value of a fluent that only timed effects change."""
+        changed = {
+            it.fluent.fluent()
+            for action in self.source.actions
+            for it in (
+                action.effects
+                if isinstance(action, InstantaneousAction)
+                else itertools.chain.from_iterable(action.effects.values())
+            )
+        }
+        value = self.source.initial_values.get(effect.fluent)
+        if effect.fluent.fluent() in changed or value is None or not value.is_constant():
+            raise UnsupportedError(
+                f"the timed effect {effect} is not supported: the same fluent has timed increases and is "
+                "changed by actions"
+            )
+        return Fraction(value.constant_value())
 
     def _metric(self) -> str | None:
         metrics = self.source.quality_metrics
@@ -261,6 +338,10 @@ class Translation:
             f"a {type(plan).__name__} is not supported; give a sequential or time-triggered plan"
         )
 
+    def check(self, steps: AnyPlan) -> Verdict:
+        """Judges a plan with exactly these numbers, by the rules of unified-planning."""
+        return self.problem.check(steps, tolerance=0, rules=self.rules)
+
     def name_of(self, instance: ActionInstance) -> str:
         """An action of the original problem as one of ours."""
         words = [self._say.name("action", instance.action)]
@@ -278,10 +359,30 @@ class Translation:
         """Our plan as a sequential plan, if the problem has no time, or a time-triggered one."""
         made = [(s.start, self.instance(s.action), s.duration) for s in steps]
         environment = self.original.environment
-        if self.original.kind.has_continuous_time() or self.original.kind.has_discrete_time():
+        if self.is_temporal:
             return TimeTriggeredPlan(made, environment)
         ordered = sorted(made, key=lambda it: it[0])
         return SequentialPlan([it for _, it, _ in ordered], environment)
+
+
+def _timed_effects(problem: UPProblem) -> Iterator[tuple[Fraction, Any]]:
+    """The timed effects by time, those for all objects one by one."""
+    found = []
+    for timing, effects in problem.timed_effects.items():
+        time = _absolute(timing)
+        for effect in effects:
+            found += [(time, it) for it in effect.expand_effect(problem)]
+    yield from sorted(found, key=lambda it: it[0])
+
+
+def _shifted(problem: UPProblem, timed: list[tuple[Fraction, Any]]) -> list[Any]:
+    """The fluents with timed increases or decreases.
+
+    PDDL has only timed assignments. So these fluents are the sum of two: one that actions change, and one
+    that timed initials assign.
+    """
+    increased = {effect.fluent.fluent() for _, effect in timed if not effect.is_assignment()}
+    return [fluent for fluent in problem.fluents if fluent in increased]
 
 
 def _split(text: str) -> Iterator[str]:

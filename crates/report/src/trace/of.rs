@@ -3,7 +3,7 @@
 use elbowroom_execution::run::{ExecutedStep, Report, Verdict};
 use elbowroom_execution::{
     Command, Decision, Ending, Entry, Event, Measured, Mission, Observation, Order, Planned,
-    Reason, Request,
+    Reason, Request, WarningCause,
 };
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -21,6 +21,7 @@ use crate::exact::Exact;
 
 impl Line {
     /// The line of an entry; `task` names facts and fluents.
+    #[allow(clippy::too_many_lines, reason = "one arm for each entry")]
     pub fn of(task: &Task, entry: &Entry<'_>) -> Self {
         let line = |it: &Observation| ObservationLine::of(task, it);
         let observed = |observations: &[Observation]| observations.iter().map(line).collect();
@@ -35,10 +36,12 @@ impl Line {
                 now,
                 command,
                 planned,
+                timeout,
             } => Self::Command(CommandLine {
                 now: exact(now),
                 command: GivenLine::of(command),
                 planned: window(planned),
+                timeout: timeout.map(exact),
             }),
             Entry::Passed {
                 until,
@@ -95,12 +98,14 @@ impl Line {
                 ticket,
                 action,
                 until,
+                cause,
             } => Self::Warning(WarningLine {
                 now: exact(now),
                 ticket: ticket.0,
                 action: action.to_owned(),
                 until: exact(until),
-                words: room_is_used(action, &(until - now)),
+                is_timeout: cause == WarningCause::Timeout,
+                words: warning(action, &(until - now), cause),
             }),
             Entry::Kept { now, reason } => Self::Kept(KeptLine {
                 now: exact(now),
@@ -427,7 +432,14 @@ fn situation_line(task: &Task, situation: &Situation) -> SituationLine {
     }
 }
 
-fn room_is_used(action: &str, left: &Rational) -> String {
+fn warning(action: &str, left: &Rational, cause: WarningCause) -> String {
     let left = left.to_decimal(3);
-    format!("{action} has used its room: {left} s until a new plan is needed")
+    match cause {
+        WarningCause::Slack => {
+            format!("{action} has used its room: {left} s until a new plan is needed")
+        }
+        WarningCause::Timeout => {
+            format!("no progress of {action}: it times out in {left} s and is cancelled then")
+        }
+    }
 }

@@ -164,6 +164,12 @@ impl Stored {
         })
     }
 
+    /// Returns `true` if the run ended before it began, because its given plan was refused. The trace does not
+    /// have that plan.
+    pub fn has_refused_plan(&self) -> bool {
+        self.snapshot.is_none() && matches!(self.lines.first(), Some(Line::Over(_)))
+    }
+
     /// The plan that the run began with, if it was given one: `start`, `(action …)`, duration.
     ///
     /// # Errors
@@ -286,29 +292,40 @@ impl World for ReplayWorld {
 
 /// A planner that makes the plans that a trace says it made.
 pub struct ReplayPlanner {
-    plans: VecDeque<(usize, PlannedLine)>,
+    /// For each request in the trace, in order: its line, and the answer if it was taken in.
+    requests: VecDeque<(usize, Option<PlannedLine>)>,
+    /// The request that is answered in the background.
+    open: Option<(usize, Option<PlannedLine>)>,
 }
 
 impl ReplayPlanner {
     /// The planner of a trace.
     pub fn new(stored: &Stored) -> Self {
-        let plans = stored.numbered().filter_map(|(number, line)| match line {
-            Line::Planned(planned) => Some((number, planned.clone())),
-            _ => None,
-        });
+        let mut requests = VecDeque::new();
+        for (number, line) in stored.numbered() {
+            match line {
+                Line::Planning(_) => requests.push_back((number, None)),
+                Line::Planned(planned) => {
+                    if let Some(last) = requests.back_mut() {
+                        *last = (number, Some(planned.clone()));
+                    }
+                }
+                _ => {}
+            }
+        }
         Self {
-            plans: plans.collect(),
+            requests,
+            open: None,
         }
     }
-}
 
-impl Planner for ReplayPlanner {
-    fn begin(&mut self, _task: &Task, _situation: &Situation) -> bool {
-        true
-    }
-
-    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        let Some((line, planned)) = self.plans.pop_front() else {
+    /// The answer to a request of the trace.
+    fn answer(
+        request: Option<(usize, Option<PlannedLine>)>,
+        task: &Task,
+        situation: &Situation,
+    ) -> PlannerAnswer {
+        let Some((line, Some(planned))) = request else {
             return PlannerAnswer::from(PlanAnswer::NotFound {
                 why: END.to_owned(),
             });
@@ -335,6 +352,21 @@ impl Planner for ReplayPlanner {
             seconds: Some(planned.took.0),
             remark: planned.remark,
         }
+    }
+}
+
+impl Planner for ReplayPlanner {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        Self::answer(self.requests.pop_front(), task, situation)
+    }
+
+    fn begin(&mut self, _task: &Task, _situation: &Situation) -> bool {
+        self.open = self.requests.pop_front();
+        true
+    }
+
+    fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        Self::answer(self.open.take(), task, situation)
     }
 }
 

@@ -3,10 +3,11 @@
 mod starts;
 mod taken_up;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_execution::run::{Doing, Goals, Refusals, Stand};
-use elbowroom_execution::{Parts, Progression, Ticket};
+use elbowroom_execution::{Doubt, Parts, Progression, Ticket};
 use elbowroom_model::Task;
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
@@ -48,10 +49,10 @@ pub struct SnapshotLine {
     pub facts_before: IndexMap<String, bool>,
     /// The numbers, likewise.
     pub numbers_before: IndexMap<String, Option<Exact>>,
-    /// Facts about which reports contradict each other.
-    pub doubtful_facts: Vec<String>,
-    /// Numbers about which reports contradict each other.
-    pub doubtful_numbers: Vec<String>,
+    /// Facts that are in doubt; `facts` has their truth before.
+    pub doubtful_facts: Vec<DoubtLine>,
+    /// Numbers that are in doubt.
+    pub doubtful_numbers: Vec<DoubtLine>,
     /// The open goals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub goals: Vec<GoalLine>,
@@ -79,6 +80,32 @@ pub struct SnapshotLine {
     /// The plan that is taken up, if the run does not rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plan: Option<TakenUpLine>,
+}
+
+/// A fact or a number that is in doubt.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DoubtLine {
+    /// Its name.
+    pub name: String,
+    /// Since when.
+    pub since: Exact,
+    /// The start of the action that may or may not have come to its end.
+    pub ticket: u64,
+    /// That action.
+    pub action: String,
+}
+
+impl DoubtLine {
+    fn all(name: &str, doubts: &[Doubt]) -> Vec<Self> {
+        let line = |doubt: &Doubt| Self {
+            name: name.to_owned(),
+            since: Exact(doubt.since.clone()),
+            ticket: doubt.ticket.0,
+            action: doubt.action.clone(),
+        };
+        doubts.iter().map(line).collect()
+    }
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
@@ -135,9 +162,11 @@ impl SnapshotLine {
             numbers_before: numbers_before
                 .map(|(fluent, value)| (task.fluent_name(*fluent), value.clone().map(Exact)))
                 .collect(),
-            doubtful_facts: doubtful_facts.map(|fact| task.fact_name(*fact)).collect(),
+            doubtful_facts: doubtful_facts
+                .flat_map(|(fact, doubts)| DoubtLine::all(&task.fact_name(*fact), doubts))
+                .collect(),
             doubtful_numbers: doubtful_numbers
-                .map(|fluent| task.fluent_name(*fluent))
+                .flat_map(|(fluent, doubts)| DoubtLine::all(&task.fluent_name(*fluent), doubts))
                 .collect(),
             goals: taken_up::goal_lines(&stand.goals),
             problem_goals: !stand.goals.are_others,
@@ -191,8 +220,8 @@ impl SnapshotLine {
             values_on_arrival: numbers_before
                 .map(|(name, before)| Ok((fluent(task, name)?, value(before))))
                 .collect::<Result<_, String>>()?,
-            doubtful_facts: named(&self.doubtful_facts, |name| fact(task, name))?,
-            doubtful_values: named(&self.doubtful_numbers, |name| fluent(task, name))?,
+            doubtful_facts: doubts(&self.doubtful_facts, |name| fact(task, name))?,
+            doubtful_values: doubts(&self.doubtful_numbers, |name| fluent(task, name))?,
             timed: self.timed,
             running: self.under_way.iter().map(UnderWayLine::parts).collect(),
         };
@@ -250,11 +279,20 @@ fn fluent(task: &Task, name: &str) -> Result<FluentId, String> {
     known.ok_or_else(|| format!("the problem has no number `{name}`"))
 }
 
-fn named<T: Ord>(
-    names: &[String],
+fn doubts<T: Ord>(
+    lines: &[DoubtLine],
     read: impl Fn(&str) -> Result<T, String>,
-) -> Result<std::collections::BTreeSet<T>, String> {
-    names.iter().map(|name| read(name)).collect()
+) -> Result<BTreeMap<T, Vec<Doubt>>, String> {
+    let mut doubts: BTreeMap<T, Vec<Doubt>> = BTreeMap::new();
+    for line in lines {
+        let doubt = Doubt {
+            since: line.since.0.clone(),
+            ticket: Ticket(line.ticket),
+            action: line.action.clone(),
+        };
+        doubts.entry(read(&line.name)?).or_default().push(doubt);
+    }
+    Ok(doubts)
 }
 
 fn out_of_order(name: &str) -> String {

@@ -9,7 +9,7 @@ use elbowroom_num::Rational;
 
 use super::graph::EdgeId;
 use super::{Dispatchable, LinkId, Step};
-use crate::{NodeId, Weight, WindowEnd};
+use crate::{NodeId, Weight, WindowEnd, spend_step};
 
 /// Executes a [`Dispatchable`] network by the rules of RTE* (Hunsberger & Posenato, ICAART 2024):
 ///
@@ -237,6 +237,7 @@ impl<W: Weight> Dispatcher<W> {
         let form = Arc::clone(&self.form);
         let mut limited = vec![(node, edge)];
         while let Some((node, edge)) = limited.pop() {
+            spend_step();
             if self.happened[node.index()].is_some() {
                 continue;
             }

@@ -37,7 +37,7 @@ use super::extended::Extended;
 use super::graph::{Edge, EdgeId, Graph, Kind, Origin, Way, WayId};
 use super::{LinkId, UncertainNetwork};
 use crate::few::Few;
-use crate::{NodeId, Weight};
+use crate::{NodeId, Weight, spend_step};
 
 /// The limit on the steps of a conflict.
 const MOST_STEPS: usize = 10_000;
@@ -468,6 +468,7 @@ impl<'a, W: Weight> Search<'a, W> {
             let mut edges = Vec::new();
             let mut next = Some(way);
             while let Some(way) = next {
+                spend_step();
                 let edge = self.graph.ways[way].edge();
                 total = total.plus(&self.graph.edges[edge].bound);
                 is_whole &= self.graph.spelt_out(edge, MOST_STEPS, &mut edges);

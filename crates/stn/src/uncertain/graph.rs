@@ -6,7 +6,7 @@ use super::conflict::{Ground, Step};
 use super::extended::Extended;
 use super::order::Order;
 use super::{LinkId, UncertainNetwork};
-use crate::{ConstraintId, NodeId, Weight};
+use crate::{ConstraintId, NodeId, Weight, spend_step};
 
 /// An edge by its place in [`Graph::edges`].
 pub(super) type EdgeId = usize;
@@ -229,6 +229,7 @@ impl<W: Weight> Graph<W> {
             let mut along = Vec::new();
             let mut next = Some(way);
             while let Some(way) = next {
+                spend_step();
                 along.push(self.ways[way].edge());
                 next = self.ways[way].rest();
             }

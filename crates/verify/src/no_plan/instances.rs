@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use elbowroom_model::ground::{Action, Body, Change, Effect};
-use elbowroom_model::problem::{self, Condition, ObjectId, SchemaId, Term};
+use elbowroom_model::problem::{self, Condition, ObjectId, PredicateId, SchemaId, Term};
 use elbowroom_model::{RunningAction, Situation, Task};
 use elbowroom_num::Rational;
 
@@ -65,7 +65,11 @@ impl Instances {
         let (beginning, task) = Beginning::of(task, situation);
         let lasting = Lasting::of(&task, &beginning);
         let schemas = task.problem().schemas.iter();
-        let needs = schemas.map(|schema| needs(schema, &lasting)).collect();
+        let heads = task.problem().rules.iter().map(|rule| rule.predicate);
+        let derived: BTreeSet<PredicateId> = heads.collect();
+        let needs = schemas
+            .map(|schema| needs(schema, &lasting, &derived))
+            .collect();
         Ok(Self {
             beginning,
             lasting,
@@ -76,17 +80,27 @@ impl Instances {
         })
     }
 
-    /// Adds those that become possible by the list.
+    /// Creates an empty list that assumes an arbitrary value for each fluent without a value.
+    ///
+    /// # Errors
+    /// When the task has what this checker does not know.
+    pub fn with_assumed_values(task: &Task, situation: &Situation) -> Result<Self, NoPlanFlaw> {
+        let mut instances = Self::from(task, situation)?;
+        instances.lasting.assumes_values = true;
+        Ok(instances)
+    }
+
+    /// Adds the instances that the reached facts make possible. Returns the number of tries.
     ///
     /// # Errors
     /// [`NoPlanFlaw::TooMany`] after so many tries.
-    pub fn extend(&mut self, reached: &Reached, most_steps: u64) -> Result<(), NoPlanFlaw> {
+    pub fn extend(&mut self, reached: &Reached, most_steps: u64) -> Result<u64, NoPlanFlaw> {
         let mut steps = most_steps;
         for number in 0..self.needs.len() {
             let mut binding = Vec::new();
             self.bind(SchemaId::from(number), reached, &mut binding, &mut steps)?;
         }
-        Ok(())
+        Ok(most_steps - steps)
     }
 
     /// Tries the objects of the next parameter.
@@ -106,7 +120,13 @@ impl Instances {
             if self.known.insert((schema, binding.clone()))
                 && let Ok(action) = self.task.instantiate(schema, binding)
             {
-                self.actions.push(action);
+                // No plan contains an instance that reads a fluent without a value.
+                let mut valueless = BTreeSet::new();
+                self.lasting
+                    .read_by_action(&self.task, &action, &mut valueless);
+                if valueless.is_empty() || self.lasting.assumes_values {
+                    self.actions.push(action);
+                }
             }
             return Ok(());
         };
@@ -269,12 +289,13 @@ fn brought_about_by_end(moments: &Moments<'_>, running: &RunningAction) -> Vec<(
     adds.collect()
 }
 
-/// See [`Needs`].
-fn needs(schema: &problem::Schema, lasting: &Lasting) -> Needs {
+/// See [`Needs`]. Derived facts do not count, because their rules are ground only for instances that mention them.
+fn needs(schema: &problem::Schema, lasting: &Lasting, derived: &BTreeSet<PredicateId>) -> Needs {
     let mut needs = Needs::default();
+    let is_basic = |atom: &problem::Atom| !derived.contains(&atom.predicate);
     match &schema.body {
         problem::Body::Instantaneous { condition, .. } => {
-            collect(condition, &|_| true, &mut needs);
+            collect(condition, &is_basic, &mut needs);
         }
         problem::Body::Durative {
             at_start,
@@ -282,7 +303,7 @@ fn needs(schema: &problem::Schema, lasting: &Lasting) -> Needs {
             at_end,
             ..
         } => {
-            collect(at_start, &|_| true, &mut needs);
+            collect(at_start, &is_basic, &mut needs);
             // Over an action that may take no time, nothing is needed; so that is left to the instances.
             let is_fixed = |atom: &problem::Atom| lasting.is_fixed(atom.predicate);
             collect(at_end, &is_fixed, &mut needs);

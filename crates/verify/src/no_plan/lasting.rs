@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Change, Expression};
-use elbowroom_model::problem::{self, Body, FunctionId, PredicateId};
+use elbowroom_model::problem::{self, Body, FunctionId, PredicateId, UpdateOperator};
 use elbowroom_num::Rational;
 
 use super::Fact;
@@ -23,8 +23,12 @@ pub(super) struct Lasting {
     lost: BTreeSet<PredicateId>,
     /// The functions whose values change.
     changing: BTreeSet<FunctionId>,
+    /// The functions that some effect or timed initial assigns a value.
+    assigned: BTreeSet<FunctionId>,
     /// For facts that only timed initials make true, when they may hold. No other such facts do.
     spans: BTreeMap<Fact, Vec<Span>>,
+    /// Assumes a value, which may be any, for each fluent without one.
+    pub(super) assumes_values: bool,
 }
 
 impl Lasting {
@@ -35,7 +39,9 @@ impl Lasting {
             made: BTreeSet::new(),
             lost: BTreeSet::new(),
             changing: BTreeSet::new(),
+            assigned: BTreeSet::new(),
             spans: BTreeMap::new(),
+            assumes_values: false,
         };
         let problem = task.problem();
         for schema in &problem.schemas {
@@ -67,7 +73,14 @@ impl Lasting {
             match &effect.change {
                 problem::Change::Add(atom) => self.made.insert(atom.predicate),
                 problem::Change::Delete(atom) => self.lost.insert(atom.predicate),
-                problem::Change::Update { fluent, .. } => self.changing.insert(fluent.function),
+                problem::Change::Update {
+                    fluent, operator, ..
+                } => {
+                    if *operator == UpdateOperator::Assign {
+                        self.assigned.insert(fluent.function);
+                    }
+                    self.changing.insert(fluent.function)
+                }
             };
         }
     }
@@ -91,7 +104,9 @@ impl Lasting {
                 match change {
                     Change::Add(fact) => self.begin(task.atom(*fact), &happening.time),
                     Change::Update { fluent, .. } => {
-                        self.changing.insert(task.function_of(*fluent));
+                        let function = task.function_of(*fluent);
+                        self.changing.insert(function);
+                        self.assigned.insert(function);
                     }
                     Change::Delete(_) => {}
                 }
@@ -125,6 +140,11 @@ impl Lasting {
         !self.made.contains(&predicate)
     }
 
+    /// Returns `true` if some fluent of the function is assigned a value.
+    pub(super) fn is_assigned(&self, function: FunctionId) -> bool {
+        self.assigned.contains(&function)
+    }
+
     /// Whether the fact is true at all times.
     pub(super) fn is_always_true(&self, task: &Task, fact: &Fact) -> bool {
         let found = task.find_fact(fact.0, &fact.1);
@@ -134,9 +154,20 @@ impl Lasting {
 
     /// What is known of the value of an expression.
     pub(super) fn value(&self, task: &Task, expression: &Expression) -> Value {
+        match self.stated_value(task, expression) {
+            Value::Undefined if self.assumes_values => Value::Open,
+            value => value,
+        }
+    }
+
+    /// Returns the value of an expression by the problem alone, without assumed values.
+    pub(super) fn stated_value(&self, task: &Task, expression: &Expression) -> Value {
         let mut is_open = false;
         let value = expression.evaluate(&mut |leaf| match leaf {
-            Expression::Fluent(fluent) if !self.changing.contains(&task.function_of(*fluent)) => {
+            Expression::Fluent(fluent)
+                if !self.changing.contains(&task.function_of(*fluent))
+                    || self.is_valueless(task, *fluent) =>
+            {
                 task.initial().values.get(fluent).cloned()
             }
             _ => {

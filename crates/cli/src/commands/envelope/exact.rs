@@ -1,16 +1,13 @@
 //! `elbowroom envelope --method exact`: with which values does the plan work?
 
 use std::fmt::Write as _;
-use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
 
 use elbowroom::answers::region::{
     BoxAnswer, Measure, Others, PictureError, PieceAnswer, Plane, RegionFinding, RegionOutcome,
     RegionSettings, picture, region, so_far,
 };
-use elbowroom::answers::{EnvelopeRequest, Event, Halt, Watcher};
+use elbowroom::answers::{EnvelopeRequest, Watcher};
 
 use super::{failure, specifications};
 use crate::args::{self, EnvelopeArgs};
@@ -38,7 +35,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     vary.extend(specifications(&args::controllable(
         &arguments.controllable,
     ))?);
-    let plan = input::any_plan(&task, &arguments.plan, output)?;
+    let plan = input::any_plan(&task, &arguments.plan, &arguments.rounding(), output)?;
     let mut request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
         vary,
@@ -52,10 +49,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         with_volume: arguments.volume,
         seed: arguments.seed,
     };
-    let mut watch = Watch {
-        stopwatch: stopwatch.clone(),
-        plan: arguments.plan.clone(),
-    };
+    let mut watch = stopwatch.clone();
     let request = Arc::new(request);
     let (theirs, mut listener) = (Arc::clone(&request), watch.clone());
     let outcome = in_time(
@@ -70,6 +64,9 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         output.document(&outcome.answer)?;
     } else {
         output::print(&text(&outcome, Look::of_stdout()))?;
+        if matches!(outcome.answer.finding, RegionFinding::Invalid { .. }) {
+            input::tell_about_repairs();
+        }
     }
     drawn?;
     Ok(match &outcome.answer.finding {
@@ -100,7 +97,7 @@ fn draw(
     arguments: &EnvelopeArgs,
     plane: Option<&Plane>,
     outcome: &RegionOutcome,
-    watch: &mut Watch,
+    watch: &mut Stopwatch,
 ) -> Result<(), Failure> {
     let (Some(path), Some(plane)) = (&arguments.picture, plane) else {
         return Ok(());
@@ -115,30 +112,6 @@ fn draw(
             "use --slice, or leave less open (--vary)",
         )),
         Err(error) => Err(Failure::new(error, "")),
-    }
-}
-
-/// Obeys the clock and Ctrl-C, and tells of plans whose times are taken otherwise than they stand
-/// there.
-#[derive(Clone)]
-struct Watch {
-    stopwatch: Stopwatch,
-    plan: PathBuf,
-}
-
-impl Watcher for Watch {
-    fn elapsed(&mut self) -> Duration {
-        self.stopwatch.elapsed()
-    }
-
-    fn flow(&mut self) -> ControlFlow<Halt> {
-        self.stopwatch.flow()
-    }
-
-    fn notice(&mut self, event: &Event<'_>) {
-        if let Event::Repaired(violation) = event {
-            input::tell_repair(&self.plan, violation);
-        }
     }
 }
 

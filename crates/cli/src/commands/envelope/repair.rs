@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use elbowroom::answers::RequestError;
 use elbowroom::answers::repair::{
-    Change, RepairFinding, RepairOutcome, RepairRequest, repair, so_far,
+    Change, Orders, RepairFinding, RepairOutcome, RepairRequest, repair, so_far,
 };
+use elbowroom::model::TimeTriggeredPlan;
 use elbowroom::num::Rational;
-use elbowroom::pddl::write_plan;
+use elbowroom::{AnyPlan, plan_text};
 
 use super::failure;
 use crate::args::EnvelopeArgs;
@@ -25,6 +26,9 @@ use crate::stopwatch::{Stopwatch, duration};
 const DIGITS: u32 = 6;
 /// So many of the reasons are printed; `--json` has all.
 const REASONS_SHOWN: usize = 8;
+/// The limit of the answer where other orders were not searched to the end.
+const OTHER_ORDERS: &str =
+    "Other orders of interfering actions were not searched to the end; one may cost less.";
 
 /// Prints the cheapest repair.
 pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
@@ -45,7 +49,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
             .map_or_else(Default::default, Into::into),
         ..RepairRequest::new(
             &Arc::new(task.clone()),
-            input::any_plan(&task, &arguments.plan, output)?,
+            input::any_plan(&task, &arguments.plan, &arguments.rounding(), output)?,
         )
     };
     let (request, mut watch) = (Arc::new(request), stopwatch.clone());
@@ -59,7 +63,7 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {
-        output::print(&text(&outcome, Look::of_stdout()))?;
+        output::print(&text(&outcome, &request.plan, Look::of_stdout()))?;
     }
     Ok(match &outcome.answer.finding {
         RepairFinding::Repaired { .. } => Exit::Yes,
@@ -90,19 +94,26 @@ fn refused(error: RequestError) -> Failure {
     }
 }
 
-fn text(outcome: &RepairOutcome, look: Look) -> String {
+fn text(outcome: &RepairOutcome, given: &AnyPlan, look: Look) -> String {
     let file = &outcome.answer.plan;
     let mut text = String::new();
     let mut say = |words: &str, indent: usize| push_wrapped(&mut text, words, indent, look.width);
     match &outcome.answer.finding {
-        RepairFinding::Impossible { because } => {
+        RepairFinding::Impossible { because, orders } => {
             let no = styled(BAD, "no repair");
+            let order = match orders {
+                Orders::All => "",
+                Orders::Kept => " in the order of its interfering actions",
+            };
             say(
-                &format!("{no}: nothing that may change makes {file} work"),
+                &format!("{no}: nothing that may change makes {file} work{order}"),
                 0,
             );
             for reason in because.iter().take(REASONS_SHOWN) {
                 say(reason, 2);
+            }
+            if *orders == Orders::Kept {
+                say(OTHER_ORDERS, 0);
             }
         }
         RepairFinding::None { reason, bound } => {
@@ -118,10 +129,18 @@ fn text(outcome: &RepairOutcome, look: Look) -> String {
             because,
             keeps,
             not_guaranteed,
+            orders,
+            reordered,
             ..
         } => {
             let works = styled(GOOD, "repaired");
             match (&changes[..], &keeps[..]) {
+                ([], []) if has_other_times(outcome, given) => say(
+                    &format!(
+                        "{works}: {file} works with the times and durations below; domain and problem need not change"
+                    ),
+                    0,
+                ),
                 ([], []) => say(
                     &format!("{works}: {file} works, and nothing has to change"),
                     0,
@@ -138,7 +157,16 @@ fn text(outcome: &RepairOutcome, look: Look) -> String {
                 say(&changed(change), 2);
             }
             if !changes.is_empty() {
-                say(&nothing_cheaper(cost, bound), 0);
+                say(&nothing_cheaper(cost, bound, *orders), 0);
+                if *orders == Orders::Kept {
+                    say(OTHER_ORDERS, 0);
+                }
+            }
+            if *reordered {
+                say(
+                    "Interfering actions come in another order than in the plan.",
+                    0,
+                );
             }
             section(
                 &mut text,
@@ -160,13 +188,34 @@ fn text(outcome: &RepairOutcome, look: Look) -> String {
                     "\n{}",
                     styled(STRONG, "The plan, as the judge accepted it")
                 );
-                for line in write_plan(task, plan).lines() {
+                for line in plan_text(task, plan).lines() {
                     let _ = writeln!(text, "  {line}");
                 }
             }
         }
     }
     text
+}
+
+/// Returns `true` if the repaired plan has another time or duration than the given one.
+fn has_other_times(outcome: &RepairOutcome, given: &AnyPlan) -> bool {
+    let (Some((_, repaired)), AnyPlan::TimeTriggered(given)) = (&outcome.repaired, given) else {
+        return false;
+    };
+    let steps = |plan: &TimeTriggeredPlan| -> Vec<_> {
+        let steps = plan.steps.iter();
+        let steps = steps.map(|it| {
+            (
+                it.start.clone(),
+                it.action.name.clone(),
+                it.duration.clone(),
+            )
+        });
+        let mut steps: Vec<_> = steps.collect();
+        steps.sort();
+        steps
+    };
+    steps(repaired) != steps(given)
 }
 
 /// `deadline of (open shop): 120 instead of 100`.
@@ -179,12 +228,18 @@ fn changed(change: &Change) -> String {
     )
 }
 
-fn nothing_cheaper(cost: &Rational, bound: &Rational) -> String {
+fn nothing_cheaper(cost: &Rational, bound: &Rational, orders: Orders) -> String {
     let costs = bound.to_decimal(DIGITS);
+    let order = match orders {
+        Orders::All => "",
+        Orders::Kept => " in this order of interfering actions",
+    };
     if cost == bound {
-        format!("Nothing cheaper makes it work (cost {costs}).")
+        format!("Nothing cheaper makes it work{order} (cost {costs}).")
     } else {
-        format!("Whatever makes it work costs more than {costs}, by as little as one likes.")
+        format!(
+            "All that makes it work{order} costs more than {costs}, but as little more as wanted."
+        )
     }
 }
 

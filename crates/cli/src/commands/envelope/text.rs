@@ -2,6 +2,7 @@
 
 mod best;
 mod example;
+mod timeouts;
 
 use std::fmt::Write as _;
 
@@ -47,6 +48,7 @@ pub(super) fn text(
                 styled(BAD, "outside"),
             );
             push_reason(&mut text, request, outcome, look);
+            push_timeout(&mut text, outcome, look);
             text
         }
         EnvelopeFinding::None { .. } => {
@@ -76,7 +78,20 @@ fn fails(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> St
         }
         _ => push_reason(&mut text, request, outcome, look),
     }
+    push_timeout(&mut text, outcome, look);
     text
+}
+
+/// The time-out that an action comes to, where nothing else is wrong.
+fn push_timeout(text: &mut String, outcome: &EnvelopeOutcome, look: Look) {
+    let (EnvelopeFinding::Outside { counterexample, .. }
+    | EnvelopeFinding::Fails(Failing::AsPlanned { counterexample, .. })) = &outcome.answer.finding
+    else {
+        return;
+    };
+    if outcome.why_not.is_none() {
+        push_wrapped(text, &counterexample.message, 2, look.width);
+    }
 }
 
 /// Why the plan does not work, with an example.
@@ -144,7 +159,10 @@ fn envelope(
     }
     text.push_str(&table::render(&rows, look));
     text.push('\n');
-    push_paragraph(&mut text, &meaning(&rows), look.width);
+    push_paragraph(&mut text, &timeouts::meaning(parameters, &rows), look.width);
+    if let Some(timeouts) = timeouts::line(&request.timeout, parameters, chosen) {
+        push_paragraph(&mut text, &timeouts, look.width);
+    }
     if let Some(chosen) = executor_chooses(chosen) {
         push_paragraph(&mut text, &chosen, look.width);
     }
@@ -287,26 +305,6 @@ fn quantity(range: &Range) -> &str {
     }
 }
 
-fn meaning(rows: &[Row]) -> String {
-    let mut meaning = if rows.len() == 1 {
-        "The plan works for any value in the interval."
-    } else {
-        "The plan works as long as each of these stays inside its interval, whatever the others do \
-         in theirs."
-    }
-    .to_owned();
-    let critical = rows.iter().filter(|row| row.is_critical()).count();
-    if critical > 0 {
-        let _ = write!(
-            meaning,
-            " Critical (!), with less room than {} %: {critical} of {}.",
-            table::CRITICAL,
-            rows.len()
-        );
-    }
-    meaning
-}
-
 /// Which durations do not vary because the executor chooses them.
 fn executor_chooses(chosen: &[Chosen]) -> Option<String> {
     /// Of a long list only the first are named.
@@ -321,7 +319,7 @@ fn executor_chooses(chosen: &[Chosen]) -> Option<String> {
     }
     let named = named.join(", ");
     (!chosen.is_empty())
-        .then(|| format!("Chosen by the executor, so not varied unless --vary names it: {named}."))
+        .then(|| format!("Chosen by the executor, so not varied (--controllable): {named}."))
 }
 
 /// The makespan of the plan, with everything started as early as possible.
@@ -356,7 +354,19 @@ fn ended(
         Stop::Converged if best.is_some() => {
             best.map_or_else(String::new, |best| goodness(best, parameters))
         }
-        Stop::Converged if request.search.sharpen => "Each end is at its limit".to_owned(),
+        Stop::Converged if request.search.sharpen => {
+            let mut limits = parameters
+                .iter()
+                .flat_map(|room| [&room.lower_limit, &room.upper_limit]);
+            let is_any = limits.any(|limit| limit.as_deref() == Some(elbowroom::ANY_FINITE));
+            let any = if is_any { " or has none" } else { "" };
+            let untold = if parameters.iter().any(is_untold) {
+                ". Where no reason is given, no limit was found"
+            } else {
+                ""
+            };
+            format!("Each end is at its limit{any}{untold}")
+        }
         Stop::Converged => {
             let steps = match &request.search.relative {
                 Some(share) => {

@@ -5,7 +5,6 @@
 //! is the answer.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -16,7 +15,6 @@ use elbowroom::answers::{Event, Halt, RequestError, Watcher};
 use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
 
 use crate::args::EnvelopeArgs;
-use crate::input;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::stopwatch::{Stopwatch, duration};
@@ -31,7 +29,6 @@ const STACK: usize = 64 << 20;
 /// Ends the work never, at a time limit, or at Ctrl-C.
 pub(super) struct Watch {
     stopwatch: Stopwatch,
-    plan: PathBuf,
 }
 
 /// What the library has told.
@@ -48,7 +45,6 @@ impl Watch {
         let limit = arguments.time_limit.as_ref().map(duration);
         Self {
             stopwatch: Stopwatch::start(&Interrupt::listen()).until(limit),
-            plan: arguments.plan.clone(),
         }
     }
 
@@ -60,7 +56,6 @@ impl Watch {
         let told = Arc::new(Mutex::new(Told::default()));
         let mut listener = Listener {
             stopwatch: self.stopwatch.clone(),
-            plan: self.plan.clone(),
             told: Arc::clone(&told),
         };
         let (sender, receiver) = mpsc::channel();
@@ -107,7 +102,6 @@ impl Watch {
 /// What watches on the library's thread.
 struct Listener {
     stopwatch: Stopwatch,
-    plan: PathBuf,
     told: Arc<Mutex<Told>>,
 }
 
@@ -121,17 +115,13 @@ impl Watcher for Listener {
     }
 
     fn notice(&mut self, event: &Event<'_>) {
-        match event {
-            Event::Repaired(violation) => input::tell_repair(&self.plan, violation),
-            Event::Envelope(progress) => {
-                let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-                if told.found.is_none() || told.widenings != progress.widenings {
-                    told.found = Some((Arc::clone(progress.plan), progress.envelope.clone()));
-                    told.widenings = progress.widenings;
-                    told.checks = progress.checks;
-                }
+        if let Event::Envelope(progress) = event {
+            let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+            if told.found.is_none() || told.widenings != progress.widenings {
+                told.found = Some((Arc::clone(progress.plan), progress.envelope.clone()));
+                told.widenings = progress.widenings;
+                told.checks = progress.checks;
             }
-            _ => {}
         }
     }
 }

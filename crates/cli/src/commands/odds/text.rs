@@ -94,7 +94,11 @@ fn steps(text: &mut String, order: &OrderAnswer, with_layers: bool, look: Look) 
         let earliest = happening.earliest.as_ref();
         let mut row = vec![
             (at + 1).to_string(),
-            happening.what.clone(),
+            if happening.together {
+                format!("{}, at the same moment", happening.what)
+            } else {
+                happening.what.clone()
+            },
             earliest.map_or_else(|| "-".to_owned(), |time| time.to_decimal(3)),
             number(happening.probability_so_far),
         ];

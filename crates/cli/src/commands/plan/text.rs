@@ -61,18 +61,11 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     Some(styled(FAINT, &text))
 }
 
-/// Whether there is a certificate that no plan exists, and of which kind, or why there is none.
-pub(super) fn certified(finding: &PlanFinding, look: Look) -> Option<String> {
-    let PlanFinding::NoPlan {
-        certificate,
-        uncertified,
-        ..
-    } = finding
-    else {
-        return None;
-    };
-    let line = match (certificate, uncertified) {
-        (Some(certificate), _) => {
+/// The kind of the certificate that no plan exists or, if there is none, what to try.
+pub(super) fn certified(answer: &PlanAnswer, look: Look) -> Option<String> {
+    let line = match &answer.finding {
+        PlanFinding::Plan { .. } => return None,
+        PlanFinding::NoPlan { certificate, .. } => {
             let by = match certificate.kind() {
                 Kind::Apart => "pairs that are never true together",
                 Kind::Closed => "a closed set of states",
@@ -80,8 +73,15 @@ pub(super) fn certified(finding: &PlanFinding, look: Look) -> Option<String> {
             };
             format!("certified by {by}; --json prints the certificate")
         }
-        (None, Some(why)) => format!("not certified: {why}"),
-        (None, None) => return None,
+        PlanFinding::None { uncertified, .. } => {
+            uncertified.as_ref()?;
+            let other = if answer.planner == EMBEDDED {
+                "another planner may find one: --planner, docs/planners.md"
+            } else {
+                "another planner may find one: --planner embedded, docs/planners.md"
+            };
+            other.to_owned()
+        }
     };
     Some(styled(FAINT, &wrapped(&line, look.width, 0)))
 }

@@ -25,6 +25,14 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
         let hint = "the trace may be of another version of this program";
         Failure::new(format!("{name}, {error}"), hint)
     })?;
+    if spec.has_plan && stored.has_refused_plan() {
+        return Err(Failure::new(
+            format!(
+                "{name} cannot be replayed: the plan of this run was refused, and a trace has no refused plan"
+            ),
+            "nothing was executed; `elbowroom run` with the same plan says why again",
+        ));
+    }
     let task = Arc::new(super::task(&spec, output)?);
     let snapshot = stored.snapshot();
     let snapshot = snapshot.map_err(|error| unreadable(error.to_string()))?;
@@ -46,7 +54,7 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
         .planned_by(ReplayPlanner::new(&stored))
         .prepared_by(ReplayPreparer(analyst));
     let mut watch = AsStored(replay.interruption());
-    execute(
+    let outcome = execute(
         request.recorded_by(&mut replay),
         &mut ReplayWorld::new(&stored, &task),
         &mut watch,
@@ -60,6 +68,7 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
             "trace": name,
             "agrees": difference.is_none(),
             "entries": agreed,
+            "invalid": &outcome.answer.invalid,
             "complete": !stored.is_cut_off && stored.is_complete(),
             "difference": difference.as_ref().map(|it| json!({
                 "line": it.line,
@@ -86,6 +95,9 @@ pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
                 difference.replayed.text()
             ),
         })?;
+    }
+    if !outcome.answer.invalid.is_empty() {
+        return super::exit(&outcome, Some(name));
     }
     Ok(match difference {
         None => Exit::Yes,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use elbowroom::execute::{
-    FirstPlan, FirstPlanError, NamedText, RunSpec, SpecError, Spoiler, SpoilerError,
+    FirstPlan, FirstPlanError, MOST_STATES, NamedText, RunSpec, SpecError, Spoiler, SpoilerError,
 };
 use elbowroom::execution::run::{PlanningTime, RunningRule};
 use elbowroom::num::Rational;
@@ -32,18 +32,21 @@ pub(in crate::commands) fn of(
         world_process: arguments.world_process.clone(),
         has_plan: arguments.plan().is_some(),
         seed: arguments.seed,
-        planner_states: arguments.planner_states,
+        planning_budget: Some(arguments.planning_budget.clone()),
+        planner_states: arguments.planner_states.unwrap_or(MOST_STATES),
         improve_states: arguments.improve_states,
+        self_overlap: arguments.self_overlap,
         threads: threads_of(arguments, &arguments.planner)?,
         guarantee: arguments.guarantee.into(),
         precision: arguments.precision.clone(),
-        objective: arguments.objective.map(Into::into),
+        objective: arguments.objective()?,
         running: match arguments.running {
             RunningChoice::Cancel => RunningRule::Cancel,
             RunningChoice::Await => RunningRule::Await,
             RunningChoice::Keep => RunningRule::Keep,
         },
         realtime: arguments.realtime.clone(),
+        timeout: arguments.timeout.clone(),
         max_replans: arguments.max_replans,
         time_limit: arguments.time_limit.clone(),
         epsilon: arguments.epsilon.clone(),
@@ -130,6 +133,7 @@ pub(in crate::commands) fn contradiction(error: SpecError) -> Failure {
         SpecError::Unheeded(_) => "`elbowroom check` judges plans of such a domain",
         SpecError::NeedsWorld(_) => "give it a world file with --world, or leave out the number",
         SpecError::NeedsEmbedded(_) => "leave out --planner, or the number",
+        SpecError::SelfOverlap(_) => "leave out --self-overlap, or --planner",
         SpecError::FirstPlan(why) => match why {
             FirstPlanError::Given => "leave out the plan, or --first-plan",
             FirstPlanError::AnotherPlanner => "leave out --planner, or --first-plan",
@@ -139,7 +143,7 @@ pub(in crate::commands) fn contradiction(error: SpecError) -> Failure {
             return Failure::new(
                 format!("--planner-time says nothing to `--planner {name}`"),
                 "leave it out, or name another planner; the embedded one is limited by \
-                 --planner-states and --improve-states",
+                 --planning-budget",
             );
         }
         SpecError::Spoiler(error) => return nothing_to_spoil(error),

@@ -38,10 +38,19 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
             "{}: unsolvable from here, at {time}, after {replans}\n",
             styled(BAD, "failed")
         ),
-        Verdict::NoPlan { why } => {
+        Verdict::NoPlan { why, missing } => {
             let why = wrapped(&tame(why), width, 2);
-            let failed = styled(BAD, "failed");
-            format!("{failed}: no plan to go on with at {time}:\n{why}\n")
+            match missing.advice() {
+                Some(advice) => format!(
+                    "{}: no plan found from here, at {time}, after {replans}:\n{why}\n{}\n",
+                    styled(HINT, "limit"),
+                    wrapped(advice, width, 2)
+                ),
+                None => format!(
+                    "{}: no plan to go on with at {time}:\n{why}\n",
+                    styled(BAD, "failed")
+                ),
+            }
         }
         Verdict::ReplanLimit => format!(
             "{}: given up at {time}, after {replans}; --max-replans allows no more\n",
@@ -94,6 +103,12 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
             let _ = writeln!(text, "\n{heading}\n{}", reasons.join("\n"));
         }
     }
+    push_executed(&mut text, report);
+    text
+}
+
+/// Appends the executed actions.
+fn push_executed(text: &mut String, report: &Report) {
     if !report.executed.is_empty() {
         let _ = writeln!(text, "\n{}", styled(STRONG, "What was done"));
     }
@@ -112,5 +127,4 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
         }
         text.push('\n');
     }
-    text
 }

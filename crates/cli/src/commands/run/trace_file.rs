@@ -7,39 +7,56 @@ use std::path::Path;
 use crate::exit::Failure;
 use crate::words::plain;
 
-/// A trace file, or nothing at all. Each line is handed to the operating system before the next
+/// Limit on the size of a trace that is kept in memory, in bytes.
+const MOST_KEPT: usize = 32 << 20;
+
+/// A trace file. Each line is handed to the operating system before the next
 /// thing happens, so that a run that is killed leaves its trace.
+///
+/// Without a file, the trace is kept in memory until the run is known to be valid.
 pub(super) struct TraceFile {
     file: Option<(File, String)>,
+    kept: String,
     error: Option<std::io::Error>,
 }
 
 impl TraceFile {
     pub(super) fn open(path: Option<&Path>) -> Result<Self, Failure> {
-        let Some(path) = path else {
-            return Ok(Self {
-                file: None,
-                error: None,
-            });
+        let open = |path: &Path| -> Result<(File, String), Failure> {
+            let name = path.display().to_string();
+            let file = File::create(path).map_err(|error| {
+                Failure::new(
+                    format!("cannot write the trace {name}: {}", plain(&error)),
+                    "choose a file in a folder that exists and that you may write to",
+                )
+            })?;
+            Ok((file, name))
         };
-        let name = path.display().to_string();
-        let file = File::create(path).map_err(|error| {
-            Failure::new(
-                format!("cannot write the trace {name}: {}", plain(&error)),
-                "choose a file in a folder that exists and that you may write to",
-            )
-        })?;
         Ok(Self {
-            file: Some((file, name)),
+            file: path.map(open).transpose()?,
+            kept: String::new(),
             error: None,
         })
     }
 
     /// Writes a line with its line feed, unless writing has failed before.
     pub(super) fn write(&mut self, line: &str) {
-        if let (Some((file, _)), None) = (&mut self.file, &self.error) {
-            self.error = file.write_all(line.as_bytes()).err();
+        match (&mut self.file, &self.error) {
+            (Some((file, _)), None) => self.error = file.write_all(line.as_bytes()).err(),
+            (None, _) if self.kept.len() < MOST_KEPT => self.kept.push_str(line),
+            _ => {}
         }
+    }
+
+    /// Returns the name of a file with the trace of an invalid run, and writes it if there is none yet.
+    pub(super) fn of_invalid_run(&self) -> Option<String> {
+        if let Some((_, name)) = &self.file {
+            return Some(name.clone());
+        }
+        let name = format!("elbowroom-invalid-run-{}.jsonl", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, &self.kept).ok()?;
+        Some(path.display().to_string())
     }
 
     /// Why not all lines were written, if so.

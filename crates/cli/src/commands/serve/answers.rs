@@ -29,6 +29,7 @@ impl Front {
                 plans: 0,
                 facts: Vec::new(),
                 numbers: Vec::new(),
+                in_doubt: Vec::new(),
             },
         }
     }

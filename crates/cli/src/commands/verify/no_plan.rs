@@ -12,6 +12,7 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::limits::push_wrapped;
 use crate::look::{BAD, GOOD, Look, styled};
+use crate::number::nearest;
 use crate::output::{self, Output};
 use crate::words::counted;
 
@@ -35,8 +36,19 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
         };
         Failure::new(error, advice)
     })?;
+    if arguments.plan.is_some() {
+        return Err(Failure::new(
+            "PLAN is for answers about a box, and this one says that no plan exists",
+            "leave it out",
+        ));
+    }
     let files = files(arguments, &certificate)?;
-    let task: Task = input::task(&files, &Task::default_epsilon(), output)?;
+    let epsilon = certificate
+        .epsilon
+        .as_ref()
+        .map(|epsilon| epsilon.0.clone());
+    let epsilon = epsilon.unwrap_or_else(Task::default_epsilon);
+    let task: Task = input::task(&files, &epsilon, output)?;
     let verdict = verify_no_plan(&task, &certificate);
     let problem = files.problem.display().to_string();
     if arguments.json {
@@ -48,7 +60,12 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
             "problem": problem,
         });
         match &verdict {
-            Ok(()) => document["proves"] = json!(certificate.proves),
+            Ok(()) => {
+                document["proves"] = json!(certificate.proves);
+                if let Some(epsilon) = &certificate.epsilon {
+                    document["epsilon"] = json!(epsilon);
+                }
+            }
             Err(flaw) => document["reason"] = json!(flaw.to_string()),
         }
         output.json(&document)?;
@@ -59,7 +76,15 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
         };
         let mut text = format!("{}: {}\n", styled(style, word), source.name());
         let sentence = match &verdict {
-            Ok(()) => format!("{problem} has no plan: {}", why(&certificate)),
+            Ok(()) => {
+                let apart = if epsilon == Task::default_epsilon() {
+                    String::new()
+                } else {
+                    let apart = nearest(&epsilon);
+                    format!(" in which interfering happenings are at least {apart} apart")
+                };
+                format!("{problem} has no plan{apart}: {}", why(&certificate))
+            }
             Err(flaw) => format!("{flaw}."),
         };
         push_wrapped(&mut text, &sentence, 2, Look::of_stdout().width);

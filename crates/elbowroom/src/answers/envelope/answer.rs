@@ -1,6 +1,7 @@
 //! The answer as a document: `docs/formats/envelope-json.md`.
 
 use elbowroom_envelope::{Growth, Guarantee, Method};
+use elbowroom_execution::run::TimeoutRule;
 use elbowroom_num::{End, Rational};
 use elbowroom_plan::Side;
 use indexmap::IndexMap;
@@ -8,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Balance, Best, Conditions, EnvelopeRequest, Foresight, Inequalities, Timeline};
 use crate::answers::{Exact, Version, ViolationAnswer, exact};
+use crate::execute::as_text;
 
 /// A robustness envelope, or the reason why there is none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,6 +65,14 @@ pub struct EnvelopeSettings {
     pub epsilon: Rational,
     /// Whether ends were moved onto their limits.
     pub sharpen: bool,
+    /// The rule that sets the time-out of each action: `10x,600` is 10 times the planned duration,
+    /// at least 600; `none` in answers that say nothing of it.
+    #[serde(with = "as_text", default = "off")]
+    pub timeout: TimeoutRule,
+}
+
+fn off() -> TimeoutRule {
+    TimeoutRule::Off
 }
 
 /// The result of a search.
@@ -178,6 +188,14 @@ pub struct Range {
     /// The upper end.
     #[serde(with = "exact::upper")]
     pub upper: End,
+    /// The time-out of the action, if the quantity is a duration: it is cancelled if it has not ended
+    /// by then; `None` if time-outs are off.
+    #[serde(
+        with = "exact::option",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub timeout: Option<Rational>,
 }
 
 /// A quantity that is left open, how far it may deviate, and what keeps it from deviating further.
@@ -202,6 +220,9 @@ pub struct Chosen {
     pub action: String,
     /// How long it takes as planned.
     pub duration: Exact,
+    /// Its time-out; `None` if time-outs are off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timeout: Option<Exact>,
 }
 
 /// The kind of quantity that a parameter stands for.
@@ -335,13 +356,14 @@ impl EnvelopeAnswer {
             problem: problem.name.clone(),
             plan: request.name.clone(),
             settings: EnvelopeSettings {
-                method: search.method,
+                method: request.method(),
                 guarantee: request.guarantee,
                 growth: search.growth,
                 precision: search.precision.clone(),
                 relative_precision: search.relative.clone(),
                 epsilon: request.task.epsilon().clone(),
                 sharpen: search.sharpen,
+                timeout: request.timeout.clone(),
             },
             finding,
         }

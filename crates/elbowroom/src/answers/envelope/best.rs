@@ -1,19 +1,14 @@
 //! The largest box, and how good it is.
 
-use std::ops::ControlFlow;
-
-use elbowroom_envelope::{BestRun, BestSettings, NEVER, Objection, Objective, Oracle, Reasons};
+use elbowroom_envelope::{BestRun, BestSettings, NEVER, Objective, Oracle, Reasons};
 use elbowroom_num::{End, Rational, enclosed};
-use elbowroom_plan::DecoupledEnvelope;
 use elbowroom_verify::{Certificate, Chance};
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
 use super::certificate::certificate;
 use super::worth::{Worth, worths};
-use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher, exact};
-use crate::chances::{ChanceError, chances};
-use crate::flow::FlowError;
+use crate::answers::exact;
 
 /// The objective of a box, and how much better another box could be.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,43 +93,13 @@ impl Probability {
     }
 }
 
-/// The best box, or why the plan does not even work as planned; what the box is the best of; and
-/// why the watcher wanted no more, if it did.
-type Found = (Result<DecoupledEnvelope, Objection>, Best, Option<Halt>);
-
-/// Looks for the best box.
+/// Returns the objective of the best box, with its proof.
 pub(super) fn best(
     subject: &Subject<'_>,
     oracle: &mut Oracle,
-    start: Option<&DecoupledEnvelope>,
-    watcher: &mut dyn Watcher,
-) -> Result<Found, RequestError> {
-    let mut settings = subject.request.search.best.clone();
-    if settings.objective == Objective::Probability {
-        let world = subject.request.world.as_ref();
-        settings.chances = chances(subject.plan, world.ok_or(ChanceError::NoWorld)?)?;
-    }
-    let settings = &settings;
-    let mut halt = None;
-    let mut steps = 0;
-    let run = elbowroom_envelope::best(oracle, settings, start, &mut |step| {
-        steps += 1;
-        watcher.notice(&Event::Envelope(EnvelopeProgress {
-            plan: subject.plan,
-            envelope: step.envelope,
-            widenings: steps,
-            checks: step.checks,
-            steps,
-        }));
-        match watcher.flow() {
-            ControlFlow::Continue(()) => ControlFlow::Continue(()),
-            ControlFlow::Break(wanted) => {
-                halt = Some(wanted);
-                ControlFlow::Break(())
-            }
-        }
-    });
-    let run = run.map_err(FlowError::Refused)?;
+    settings: &BestSettings,
+    run: BestRun,
+) -> Best {
     let has_certificate =
         !run.is_cancelled && (run.is_proved || matches!(run.proof.reasons, Reasons::Tree(_)));
     let certificate = match &run.envelope {
@@ -143,7 +108,7 @@ pub(super) fn best(
         }
         _ => None,
     };
-    let best = Best {
+    Best {
         worth: if run.is_proved {
             worths(subject, &run.proof)
         } else {
@@ -163,6 +128,5 @@ pub(super) fn best(
         value: run.value,
         bound: run.bound,
         is_proved: run.is_proved,
-    };
-    Ok((run.envelope, best, halt))
+    }
 }

@@ -28,7 +28,7 @@ pub(super) fn what_limits(
     let mut distances = how.settings().precisions(subject.plan);
     for (distance, parameter) in distances.iter_mut().zip(&subject.plan.parameters) {
         let nominal = parameter.nominal.abs();
-        if how.sharpen || how.method == Method::Best {
+        if how.sharpen || subject.request.method() == Method::Best {
             // A sharpened end has no room at all, so the smallest step tells what it touches.
             *distance = &*distance * &Rational::new(1, SHARP);
         } else if how.relative.is_none() && !nominal.is_zero() {

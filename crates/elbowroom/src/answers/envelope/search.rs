@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use elbowroom_envelope::{Method, Oracle, StopReason, Widening, irr, sharpen};
+use elbowroom_envelope::{Oracle, StopReason, Widening, sharpen};
 use elbowroom_plan::DecoupledEnvelope;
 
 use super::answer::{EnvelopeFinding, Makespans, Stop, Widened};
@@ -11,6 +11,7 @@ use super::balance::balance;
 use super::best::best;
 use super::conditions::Conditions;
 use super::foresight::foresight;
+use super::grow::{Step, grow};
 use super::limits::what_limits;
 use super::timeline::Timeline;
 use super::{EnvelopeOutcome, Inequalities, Subject};
@@ -25,7 +26,6 @@ pub(super) fn search(
 ) -> Result<EnvelopeOutcome, RequestError> {
     let how = &subject.request.search;
     let begun = watcher.elapsed();
-    let settings = how.settings();
     let mut widenings = Vec::new();
     let mut history = History {
         subject,
@@ -34,34 +34,27 @@ pub(super) fn search(
         envelope: DecoupledEnvelope::point(&subject.plan.nominal()),
         widenings: &mut widenings,
         steps: 0,
+        best_steps: 0,
         checks: 0,
         halt: None,
     };
-    let search = irr(&mut oracle, &settings, &mut |widening| {
-        history.step(widening)
-    })
-    .map_err(FlowError::Refused)?;
-    let mut stop = match (search.stop, history.halt) {
-        (_, Some(halt)) => halt.into(),
+    let world = subject.request.world.as_ref();
+    let grown = grow(
+        &mut oracle,
+        (how, subject.request.method()),
+        world,
+        &mut |step| history.step(step),
+    )?;
+    let mut stop = match (grown.stop, history.halt) {
+        (_, Some(halt)) => Stop::from(halt),
         (StopReason::CheckLimit, None) => Stop::CheckLimit,
         (StopReason::Undecided, None) => Stop::Undecided,
         (StopReason::Converged | StopReason::Cancelled, None) => Stop::Converged,
     };
-    let (search_envelope, best) = match how.method {
-        // Where nothing may deviate there is no box to be the largest.
-        Method::Best
-            if search.envelope.is_ok()
-                && stop == Stop::Converged
-                && !subject.plan.parameters.is_empty() =>
-        {
-            let start = search.envelope.as_ref().ok();
-            let (found, best, halt) = best(subject, &mut oracle, start, watcher)?;
-            stop = halt.map_or(stop, Stop::from);
-            (found, Some(best))
-        }
-        _ => (search.envelope, None),
-    };
-    let mut envelope = match search_envelope {
+    let best = grown
+        .best
+        .map(|(settings, run)| best(subject, &mut oracle, &settings, run));
+    let mut envelope = match grown.envelope {
         Ok(envelope) => envelope,
         Err(objection) => {
             let point = DecoupledEnvelope::point(&subject.plan.nominal());
@@ -123,8 +116,10 @@ struct History<'a> {
     /// The box so far.
     envelope: DecoupledEnvelope,
     widenings: &'a mut Vec<Widened>,
-    /// The number of steps that have been tried.
+    /// The number of steps that IRR has tried.
     steps: usize,
+    /// The number of steps of the search for the best box.
+    best_steps: usize,
     /// The number of boxes checked when the box grew last.
     checks: usize,
     /// Why the watcher wanted no more.
@@ -132,7 +127,30 @@ struct History<'a> {
 }
 
 impl History<'_> {
-    fn step(&mut self, widening: Option<&Widening<'_>>) -> ControlFlow<()> {
+    fn step(&mut self, step: &Step<'_>) -> ControlFlow<()> {
+        match step {
+            Step::Irr(widening) => self.widened(*widening),
+            Step::Best(step) => {
+                self.best_steps += 1;
+                self.watcher.notice(&Event::Envelope(EnvelopeProgress {
+                    plan: self.subject.plan,
+                    envelope: step.envelope,
+                    widenings: self.best_steps,
+                    checks: step.checks,
+                    steps: self.best_steps,
+                }));
+            }
+        }
+        match self.watcher.flow() {
+            ControlFlow::Continue(()) => ControlFlow::Continue(()),
+            ControlFlow::Break(halt) => {
+                self.halt = Some(halt);
+                ControlFlow::Break(())
+            }
+        }
+    }
+
+    fn widened(&mut self, widening: Option<&Widening<'_>>) {
         self.steps += 1;
         if let Some(widening) = widening {
             let seconds = self.watcher.elapsed().saturating_sub(self.begun);
@@ -149,12 +167,5 @@ impl History<'_> {
             checks: self.checks,
             steps: self.steps,
         }));
-        match self.watcher.flow() {
-            ControlFlow::Continue(()) => ControlFlow::Continue(()),
-            ControlFlow::Break(halt) => {
-                self.halt = Some(halt);
-                ControlFlow::Break(())
-            }
-        }
     }
 }

@@ -12,6 +12,7 @@ use super::answer::{
     Chosen, Counterexample, Happening, Makespans, MovedEnd, Quantity, QuantityKind, Range, Room,
     Stop, Widened,
 };
+use super::timeouts::timeouts;
 use crate::answers::{Exact, Halt};
 use crate::explain::{Explainer, Explanation, Shortfall};
 use crate::makespan::earliest_end;
@@ -112,11 +113,14 @@ impl Subject<'_> {
     /// The parameters, each with its interval in a box.
     pub(super) fn ranges(&self, envelope: &DecoupledEnvelope) -> Vec<Range> {
         let quantities = self.quantities().into_iter().zip(envelope.intervals());
+        let timeouts = timeouts(self.plan, &self.request.timeout);
         quantities
-            .map(|(quantity, interval)| Range {
+            .zip(timeouts)
+            .map(|((quantity, interval), timeout)| Range {
                 quantity,
                 lower: interval.lower.clone(),
                 upper: interval.upper.clone(),
+                timeout,
             })
             .collect()
     }
@@ -130,6 +134,7 @@ impl Subject<'_> {
                 instance: instance.label.clone(),
                 action: instance.action.name.clone(),
                 duration: Exact(duration.clone()),
+                timeout: self.request.timeout.of(duration).map(Exact),
             }
         })
         .collect()

@@ -10,9 +10,9 @@ use elbowroom_report::statistics::Proportion;
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
-use super::Subject;
+use super::{Subject, planner};
 use crate::answers::Watcher;
-use crate::execute::{Analyst, Embedded, Execution, RememberingPlanner, RememberingPreparer};
+use crate::execute::{Analyst, Execution, RememberingPlanner, RememberingPreparer};
 use crate::flow;
 
 /// The number of plans that are remembered.
@@ -71,7 +71,7 @@ fn one(
 ) -> ExecutedAnswer {
     let request = subject.request;
     let mut planner: Box<dyn Planner> = if replans {
-        Box::new(RememberingPlanner::new(Embedded::default(), MEMORY))
+        Box::new(RememberingPlanner::new(planner(&request.settings), MEMORY))
     } else {
         Box::new(NoPlanner)
     };

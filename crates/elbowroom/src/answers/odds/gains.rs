@@ -91,7 +91,7 @@ fn of_planners_plan(
     subject: &Subject<'_>,
     watcher: &mut dyn Watcher,
 ) -> Result<Option<BestOrderAnswer>, RequestError> {
-    let PlanAnswer::Plan(other) = planned(subject.request.task) else {
+    let PlanAnswer::Plan(other) = planned(subject.request) else {
         return Ok(None);
     };
     let actions = |plan: &elbowroom_model::TimeTriggeredPlan| {
@@ -103,7 +103,7 @@ fn of_planners_plan(
     if actions(&other) == actions(subject.plan) {
         return Ok(None);
     }
-    let mut other = Subject::new(subject.request, &other)?;
+    let mut other = Subject::new(subject.request, &other, subject.request.likelihoods)?;
     BestOrderAnswer::of(&mut other, watcher)
 }
 

@@ -51,6 +51,9 @@ pub struct HappeningAnswer {
     pub action: Option<String>,
     /// In words.
     pub what: String,
+    /// `true` if it comes at the same moment as the happening before it, because they need each other.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub together: bool,
     /// The earliest time; `None` where there is no time for the order.
     #[serde(with = "exact::option")]
     pub earliest: Option<Rational>,
@@ -159,8 +162,8 @@ impl OrderAnswer {
         best: Option<SearchStop>,
     ) -> Result<Self, RequestError> {
         let model = &**subject.search.model();
-        let account = Account::of(model, &subject.initial, &order.sequence)
-            .map_err(|error| coupled(&error))?;
+        let account =
+            Account::of(model, &subject.initial, order).map_err(|error| coupled(&error))?;
         let starts = order.sequence.iter().enumerate().filter(|(_, node)| {
             matches!(
                 model.plan().nodes[node.index()],
@@ -182,6 +185,7 @@ impl OrderAnswer {
                 kind: kind.to_owned(),
                 action,
                 what: model.node_words(node),
+                together: order.joined[at],
                 earliest: slot.map(|slot| slot.earliest.clone()),
                 latest: slot.and_then(|slot| slot.latest.clone()),
                 probability_so_far: left.clamp(0.0, 1.0),

@@ -66,7 +66,19 @@ pub fn plan_with(
         &mut |event| course.hear(event, first_plan_only),
     );
     let halt = course.halt;
-    conclude(planner, request, report, halt)
+    let claim = match &report.outcome {
+        Outcome::Unsolvable { .. } => {
+            let says = format!("{}: {}", planner.name, report.outcome);
+            // The planner's own limit on time is not one on the certificate.
+            Some(course.claimed(
+                request.task,
+                says.clone(),
+                &format!("no plan found: {says}"),
+            ))
+        }
+        _ => None,
+    };
+    conclude(planner, request, report, (halt, claim))
 }
 
 impl Course<'_> {
@@ -105,7 +117,7 @@ fn conclude(
     planner: &Planner,
     request: &PlanRequest<'_>,
     report: Report,
-    halt: Option<Halt>,
+    (halt, claim): (Option<Halt>, Option<(PlanFinding, PlanStop)>),
 ) -> Result<PlanOutcome, PlannerFailure> {
     let name = &planner.name;
     let reason = format!("{name}: {}", report.outcome);
@@ -120,11 +132,15 @@ fn conclude(
             );
             (Some(found.plan), finding)
         }
-        Outcome::Unsolvable { .. } => (None, PlanFinding::no_plan(reason)),
-        Outcome::NoneInTime
+        Outcome::Unsolvable { .. }
+        | Outcome::NoneInTime
         | Outcome::Stopped
         | Outcome::GaveUp { .. }
-        | Outcome::OutOfMemory { .. } => (None, PlanFinding::None { reason }),
+        | Outcome::OutOfMemory { .. } => {
+            let finding = claim.as_ref().map(|(finding, _)| finding.clone());
+            let none = || PlanFinding::none(request.task, reason);
+            (None, finding.unwrap_or_else(none))
+        }
         outcome => {
             return Err(PlannerFailure {
                 planner: name.clone(),
@@ -133,6 +149,10 @@ fn conclude(
         }
     };
     let statistics = report.statistics;
+    let stop = match claim {
+        Some((_, PlanStop::Proved)) => PlanStop::Proved,
+        _ => stop(&statistics, halt),
+    };
     let problem = request.task.problem();
     let answer = PlanAnswer {
         format: PlanFormat::Plan,
@@ -142,7 +162,7 @@ fn conclude(
         planner: name.clone(),
         finding,
         choice: None,
-        stop: stop(&statistics, halt),
+        stop,
         plans: statistics.plans,
         seconds: statistics.elapsed.as_secs_f64(),
         first_plan_seconds: statistics.first_plan.map(|first| first.as_secs_f64()),

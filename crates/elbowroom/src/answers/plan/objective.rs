@@ -65,6 +65,8 @@ pub struct BestPlanRequest<'a> {
     /// How many problems like this one are planned for; without a limit, until the watcher wants no
     /// more or there are no others.
     pub most_searches: Option<usize>,
+    /// `true` if a ground action may overlap itself.
+    pub self_overlap: bool,
     /// About how much memory a search may use, in bytes.
     pub most_memory: Option<u64>,
 }
@@ -148,7 +150,10 @@ pub fn best_plan(
 ) -> Result<PlanOutcome, RequestError> {
     let task = request.task.with_own_table();
     let situation = Situation::initial(&task);
-    let mut settings = Settings::default();
+    let mut settings = Settings {
+        self_overlap: request.self_overlap,
+        ..Settings::default()
+    };
     if let Some(bytes) = request.most_memory {
         settings.max_memory = usize::try_from(bytes).unwrap_or(usize::MAX);
     }
@@ -156,6 +161,8 @@ pub fn best_plan(
     let limits = Limits {
         most_states: u64::MAX,
         improve_states: 20_000,
+        work: u64::MAX,
+        patience: 1,
         other_states: u64::MAX / 2,
         searches: request.most_searches.unwrap_or(usize::MAX),
     };
@@ -179,6 +186,7 @@ pub fn best_plan(
         (None, None) => PlanStop::Exhausted,
     };
     let counts = source.counts();
+    let mut ended = None;
     let (plan, finding, choice) = match best {
         Some(best) => {
             let value = best.value.worth();
@@ -201,19 +209,25 @@ pub fn best_plan(
                 return Err(RequestError::Unsupported(unsupported.to_string()));
             }
             Some(Answer::Unsolvable { proof, .. }) => {
-                let reason = proof.to_string();
-                (None, PlanFinding::no_plan(reason), None)
+                let (finding, stop) = course.refuted(&task, proof, counts);
+                ended = Some(stop);
+                (None, finding, None)
             }
-            _ => {
+            answer => {
+                let without_self_overlap = matches!(
+                    answer,
+                    Some(Answer::NoneFound {
+                        without_self_overlap: true,
+                        ..
+                    })
+                );
+                let counts = (counts, without_self_overlap);
                 let reason = none_found(stop, counts, max_memory);
-                (None, PlanFinding::None { reason }, None)
+                (None, PlanFinding::none(&task, reason), None)
             }
         },
     };
-    let stop = match &finding {
-        PlanFinding::NoPlan { .. } => PlanStop::Proved,
-        _ => stop,
-    };
+    let stop = ended.unwrap_or(stop);
     let answer = course.answer(request.task, (finding, choice), (stop, counts));
     let plan = plan.and_then(|plan| crate::execute::renumbered(request.task, &plan));
     Ok(PlanOutcome { answer, plan })

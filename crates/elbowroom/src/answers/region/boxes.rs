@@ -43,9 +43,9 @@ pub(super) fn boxes(
     request: &EnvelopeRequest,
     watcher: &mut dyn Watcher,
 ) -> Result<Vec<BoxAnswer>, RequestError> {
-    let irr = Search::default();
+    let irr = Search::irr();
     let best = |objective| Search {
-        method: Method::Best,
+        method: Some(Method::Best),
         best: BestSettings {
             objective,
             ..request.search.best.clone()

@@ -6,7 +6,7 @@ use elbowroom_execution::executors::Orders;
 use elbowroom_execution::run::{Amid, Beginning, Ports, Run, RunSettings, Verdict};
 use elbowroom_execution::{
     Cause, Decided, Decision, Executor, Mission, Moment, Need, News, NoRecord, PlanAnswer, Planner,
-    PlannerAnswer, Preparer, Progression, Reason, Scene,
+    PlannerAnswer, PortWorkers, Preparer, Progression, Reason, Scene,
 };
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -102,19 +102,22 @@ impl Stage {
             replans: scene.replans,
         };
         let preparer: &mut dyn Preparer = &mut who.hasty;
+        let planner = Planned {
+            first,
+            planner: self.planner.as_mut(),
+        };
+        let mut workers = PortWorkers::new(planner, preparer);
         let ports = Ports {
-            planner: Box::new(Planned {
-                first,
-                planner: self.planner.as_mut(),
-            }),
-            preparer: Box::new(preparer),
             executor,
             recorder: Box::new(NoRecord),
         };
         let run = Run::amid(amid, beginning, self.settings.clone(), ports);
         let seed = self.seed.wrapping_add(sample << 32);
         let world = &who.rollouts.world;
-        let report = run.go(&mut *world.world_amid(&self.belief, seed, &self.seen));
+        let report = run.go(
+            &mut *world.world_amid(&self.belief, seed, &self.seen),
+            &mut workers,
+        );
         report.verdict == Verdict::GoalReached
     }
 }

@@ -13,7 +13,7 @@ where
 }
 
 /// As a text.
-pub(super) mod as_text {
+pub(crate) mod as_text {
     use std::borrow::Cow;
     use std::fmt::Display;
     use std::str::FromStr;
@@ -21,14 +21,14 @@ pub(super) mod as_text {
     use serde::de::Error;
     use serde::{Deserialize, Deserializer, Serializer};
 
-    pub(in crate::execute::spec) fn serialize<T: Display, S: Serializer>(
+    pub(crate) fn serialize<T: Display, S: Serializer>(
         value: &T,
         serializer: S,
     ) -> Result<S::Ok, S::Error> {
         serializer.collect_str(value)
     }
 
-    pub(in crate::execute::spec) fn deserialize<'de, T, D>(deserializer: D) -> Result<T, D::Error>
+    pub(crate) fn deserialize<'de, T, D>(deserializer: D) -> Result<T, D::Error>
     where
         T: FromStr<Err: Display>,
         D: Deserializer<'de>,

@@ -19,7 +19,7 @@ use elbowroom_text::Diagnostics;
 use super::{EMBEDDED, NOBODY, RunSpec};
 use crate::execute::{
     ActionSets, Analyst, Chooser, Choosing, Embedded, Execution, External, FirstPlan, Known,
-    Likeliest, Rehearse, Replanning, Rollouts, SharedRehearse, Spoiling,
+    Likeliest, Rehearse, Replanning, Rollouts, SharedRehearse, Spoiling, planning_work,
 };
 use crate::timed::{Policy, Settings};
 use crate::{BoxTextError, ChanceError, flow, parse_box};
@@ -51,6 +51,9 @@ pub enum SpecError {
     /// The executor compares plans of the embedded planner, and there is another.
     #[error("`{0}` chooses among plans of the embedded planner")]
     NeedsEmbedded(ExecutorSpec),
+    /// Self-overlap was allowed, and the plans come from another planner, or from none.
+    #[error("self-overlap can be allowed in plans of the embedded planner only, not of `{0}`")]
+    SelfOverlap(String),
     /// The likeliest first plan was asked for, and there is nothing to choose among, or by.
     #[error("the likeliest first plan cannot be chosen: {0}")]
     FirstPlan(FirstPlanError),
@@ -134,7 +137,12 @@ impl RunSpec {
         };
         let network = prepared.plan.uncertain_network(&envelope);
         let network = network.map_err(|_| SpoilerError::Empty)?;
-        let spoiling = Spoiling::new(&prepared.plan.plan, &network, &prepared.nominal);
+        let spoiling = Spoiling::new(
+            &prepared.plan.plan,
+            &network,
+            &prepared.nominal,
+            &self.timeout,
+        );
         let sim = SimWorld::new(Arc::clone(task), model, self.seed);
         Ok(Box::new(Paced::new(sim, spoiling)))
     }
@@ -191,6 +199,10 @@ impl RunSpec {
             settings: self.embedded().settings,
             most_states: self.planner_states,
             improve_states: self.improve_states,
+            work: self
+                .planning_budget
+                .as_ref()
+                .map_or(u64::MAX, planning_work),
             known,
             goes_on,
         };
@@ -287,7 +299,12 @@ impl RunSpec {
     /// # Errors
     /// When it is not, or has not.
     pub fn check_planner(&self) -> Result<(), SpecError> {
-        self.whom().map(|_| ())
+        match self.whom()? {
+            Whom::Nobody | Whom::Another(_) if self.self_overlap => {
+                Err(SpecError::SelfOverlap(self.planner.clone()))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Whether the members go together, as far as that can be said before files are read: that the
@@ -296,6 +313,7 @@ impl RunSpec {
     /// # Errors
     /// When they do not.
     pub fn check(&self) -> Result<(), SpecError> {
+        self.check_planner()?;
         let whom = self.whom()?;
         if !self.first_plan.is_shortest() {
             let is_known = self.world.is_some() || self.likelihoods.is_some();
@@ -330,11 +348,16 @@ impl RunSpec {
     pub fn embedded(&self) -> Embedded<'static> {
         Embedded {
             settings: embedded::Settings {
+                self_overlap: self.self_overlap,
                 threads: self.threads,
                 ..embedded::Settings::default()
             },
             most_states: self.planner_states,
             improve_states: self.improve_states,
+            work: self
+                .planning_budget
+                .as_ref()
+                .map_or(u64::MAX, planning_work),
             ..Embedded::default()
         }
     }
@@ -373,7 +396,7 @@ impl RunSpec {
     /// When its files cannot be read, or the members do not go together.
     pub fn execution(&self, task: &Arc<Task>) -> Result<Execution<'static>, SpecError> {
         self.check()?;
-        if let Some(feature) = task.left_to_the_judge() {
+        if let Some(feature) = task.only_judged() {
             return Err(SpecError::Unheeded(feature));
         }
         let model = self.model(task.problem()).map_err(SpecError::World)?;

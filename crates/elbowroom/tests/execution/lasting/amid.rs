@@ -7,7 +7,6 @@ use std::sync::{Arc, Mutex};
 use elbowroom::execute::{Analyst, Execution};
 use elbowroom::execution::run::{Doing, RunSettings, Stand};
 use elbowroom::execution::{Ending, Entry, Event, Recorder, Request, Ticket};
-use elbowroom::flow;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
@@ -17,6 +16,7 @@ use elbowroom::report::trace::{
 
 use super::scripted::{Dice, Slow, abandon, fact, pursue};
 use crate::beside::{Beside, Readier, telling};
+use crate::scene::irr;
 
 const HEADER: &str = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
 
@@ -219,7 +219,7 @@ impl Case {
         self.execution(&task)
             .standing(stand)
             .planned_by(ReplayPlanner::new(&stored))
-            .prepared_by(ReplayPreparer(Analyst::new(flow::Settings::default())))
+            .prepared_by(ReplayPreparer(Analyst::new(irr())))
             .recorded_by(&mut replay)
             .ending_when(move || interruption.load(Ordering::SeqCst))
             .run_in(&mut ReplayWorld::new(&stored, &task));

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_model::Step;
 use elbowroom_model::ground::{Action, Body};
+use elbowroom_model::{Footprint, State, Step};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 use elbowroom_probability::search::Progress;
@@ -13,11 +13,13 @@ use elbowroom_probability::{Choice, Circumstances, Likelihoods, NextHappening, R
 
 use super::super::chooser::Chooser;
 use super::initial::Initial;
+use super::repetitions::Repetitions;
 use crate::dispatch::replan;
 use crate::event::Ending;
 use crate::executor::{Decided, Decision, Mission, Moment, News, Order, Planned, StepId};
 use crate::progression::Progression;
 use crate::reason::{About, Behind, Cause, Reason};
+use crate::separation::Separation;
 
 /// A search looks at so many happenings at most, sequences times the plan's length; then the best
 /// order so far is taken. Plans of some twenty happenings are searched to the end.
@@ -33,6 +35,16 @@ const MOST_FAILURES: i32 = 1000;
 /// So often in a row a failure is put down to a condition that does not hold.
 const MOST_EXPLAINED: i32 = 3;
 
+/// An action that succeeds more often than this at one time, by the same order, does not lead on.
+const MOST_AT_ONCE: u32 = 20;
+
+/// An order is executed to its end, and no longer chosen again at each start, when an action has succeeded this often in
+/// the same state.
+const MOST_RECONSIDERED: u32 = 3;
+
+/// An action that succeeds more often than this in the same state does not lead on, and the plan is abandoned.
+const MOST_REPEATED: u32 = 20;
+
 /// So often an action is stopped before its end for good reasons.
 const MOST_LET_GO: u32 = 3;
 
@@ -47,12 +59,26 @@ pub(super) struct Rest {
     under_way: BTreeMap<StepId, (InstanceId, Option<Rational>)>,
     /// The timed initials, on the plan's clock.
     timed: Vec<(NodeId, Rational)>,
+    /// Instances that were running when the plan was adopted. Their steps are only the remainder of an action,
+    /// with the remaining duration and without start conditions, so they are never started.
+    continued: BTreeSet<InstanceId>,
     /// Starts and ends that have been observed lately, on the plan's clock.
     recent: Vec<(NodeId, Rational)>,
+    /// The happenings that starts and planned ends are separated from, with changes by the world.
+    separation: Separation,
     /// How often each instance has failed in a row.
     failures: BTreeMap<InstanceId, i32>,
+    /// The time of each instance's latest success, and the number of its successes at that time.
+    successes: BTreeMap<InstanceId, (Rational, u32)>,
     /// The latest event, before which there was still an order.
     latest: Option<Behind>,
+    repetitions: Repetitions,
+    /// The happening that was chosen last.
+    chosen: Option<NodeId>,
+    /// `true` if an action has ended before the order expected its end.
+    is_ahead: bool,
+    /// `true` if the table of a small world has led to the same state repeatedly.
+    is_table_circling: bool,
     /// Steps that were told to stop and have not.
     let_go: BTreeSet<StepId>,
     /// How often each instance was told to stop.
@@ -80,11 +106,20 @@ impl Rest {
             }
             _ => None,
         });
+        let under_way: BTreeMap<_, _> = under_way
+            .map(|(step, instance)| (step, (instance, Some(Rational::ZERO))))
+            .collect();
+        let mut separation = Separation::new(&mission.task, &mission.origin);
+        for (step, (instance, _)) in &under_way {
+            // The steps of running actions are what is left of them.
+            let rest = &steps[instance.index()];
+            let end = rest.duration.clone().unwrap_or_default();
+            separation.expect(step.0, (&mission.task, &rest.action), end);
+        }
         Self {
             timed: timed.collect(),
-            under_way: under_way
-                .map(|(step, instance)| (step, (instance, Some(Rational::ZERO))))
-                .collect(),
+            continued: under_way.values().map(|(instance, _)| *instance).collect(),
+            under_way,
             next_step: u32::try_from(steps.len()).unwrap_or(u32::MAX),
             steps: steps.into(),
             chooser,
@@ -92,9 +127,20 @@ impl Rest {
             times_let_go: BTreeMap::new(),
             mission: Arc::new(mission.clone()),
             recent: Vec::new(),
+            separation,
             failures: BTreeMap::new(),
+            successes: BTreeMap::new(),
             latest: None,
+            repetitions: Repetitions::default(),
+            chosen: None,
+            is_ahead: false,
+            is_table_circling: false,
         }
+    }
+
+    /// Returns `true` if the plan was abandoned because the table of a small world led to the same state repeatedly.
+    pub(super) fn is_table_circling(&self) -> bool {
+        self.is_table_circling
     }
 
     /// The window of a step under way; when the others happen is decided then.
@@ -108,13 +154,14 @@ impl Rest {
         })
     }
 
-    /// Takes note of what is new; why the plan has to be given up, if it has to.
+    /// Notes the news. Returns the reason for a new plan, if one is needed.
     pub(super) fn learn(
         &mut self,
         news: &News,
-        belief: &Progression,
+        moment: &Moment<'_>,
         likelihoods: &Likelihoods,
     ) -> Option<Reason> {
+        let belief = moment.belief;
         self.latest = self.named(news, belief).or(self.latest.take());
         match news {
             News::Started { step, time, .. } => {
@@ -122,23 +169,28 @@ impl Rest {
                 let (instance, start) = self.under_way.get_mut(step)?;
                 let instance = *instance;
                 *start = Some(local.clone());
-                self.recent.push((self.node(instance, false), local));
-                if self.steps[instance.index()].duration.is_none() {
-                    self.under_way.remove(step);
-                    self.failures.remove(&instance);
+                self.recent
+                    .push((self.node(instance, false), local.clone()));
+                if self.steps[instance.index()].duration.is_some() {
+                    return None;
                 }
-                None
+                self.under_way.remove(step);
+                self.repetitions.end(*step, true);
+                self.succeeded(instance, local)
             }
             News::Ended {
                 step, ending, time, ..
             } => {
                 let (instance, start) = self.under_way.remove(step)?;
                 let local = time - &self.mission.origin;
-                self.recent.push((self.node(instance, true), local));
+                self.repetitions.end(*step, *ending == Ending::Succeeded);
+                self.separation
+                    .end(step.0, *ending == Ending::Succeeded, &local);
+                self.recent.push((self.node(instance, true), local.clone()));
                 let was_let_go = self.let_go.remove(step);
                 if *ending == Ending::Succeeded {
-                    self.failures.remove(&instance);
-                    return None;
+                    self.is_ahead |= self.chosen != Some(self.node(instance, true));
+                    return self.succeeded(instance, local);
                 }
                 if was_let_go {
                     return None;
@@ -154,13 +206,43 @@ impl Rest {
                 }
                 failed(step, failures, ending, likelihoods)
             }
-            // The belief knows it already, and layers are held against the belief.
-            News::Fact(_) | News::Value(_) => None,
+            // Layers are compared with the belief, which has the change already.
+            News::Fact(_) | News::Value(_) => {
+                self.note_change(news, moment);
+                None
+            }
             News::Contradiction { action } => Some(Reason::new(Cause::Contradiction).of(action)),
             News::Silence { action, since } => {
                 Some(Reason::new(Cause::Silence).of(action).since(since.clone()))
             }
         }
+    }
+
+    /// Notes the success of an action that may be repeated. Returns the reason for a new plan if it succeeds again and
+    /// again at one time: an action without duration would be repeated for ever.
+    fn succeeded(&mut self, instance: InstanceId, time: Rational) -> Option<Reason> {
+        self.failures.remove(&instance);
+        let (latest, times) = self.successes.entry(instance).or_default();
+        *times = if *latest == time { *times + 1 } else { 1 };
+        *latest = time;
+        let (times, since) = (*times, latest.clone());
+        let name = &self.steps[instance.index()].action.name;
+        let about = format!("{name} has succeeded {times} times at one time and does not lead on");
+        let reason = Reason::new(Cause::NoOrder).about(About::Said(about));
+        (times > MOST_AT_ONCE).then(|| reason.since(self.world(&since)))
+    }
+
+    /// Notes a change by the world.
+    fn note_change(&mut self, news: &News, moment: &Moment<'_>) {
+        let mut change = Footprint::default();
+        match news {
+            News::Fact(fact) if moment.belief.fact(*fact) => change.adds.insert(*fact),
+            News::Fact(fact) => change.deletes.insert(*fact),
+            News::Value(fluent) => change.assigns.insert(*fluent),
+            _ => return,
+        };
+        self.separation
+            .note(change, &(moment.now - &self.mission.origin));
     }
 
     /// The action that something new is about.
@@ -233,7 +315,12 @@ impl Rest {
             return wait(None, About::StartOfOrdered);
         }
         let now = moment.now - &self.mission.origin;
-        let mut circumstances = Circumstances::observed(now.clone(), &moment.belief.state());
+        if now.is_negative() {
+            // The plan begins ε after whatever happened before it.
+            return wait(Some(self.mission.origin.clone()), About::NextStart);
+        }
+        let state = moment.belief.state();
+        let mut circumstances = Circumstances::observed(now.clone(), &state);
         initial.apply(moment.belief.task(), &mut circumstances.belief);
         let mut running: Vec<Running> = self
             .under_way
@@ -254,7 +341,36 @@ impl Rest {
                 ControlFlow::Continue(())
             }
         };
-        match self.chooser.choose(&circumstances, &mut most) {
+        let mut choice = self.chooser.choose(&circumstances, &mut most);
+        // Behind an action that ended before the order expected it, only layers before its start may fit. It is not
+        // repeated for that.
+        if let Ok(Choice::Next(next)) = &choice
+            && self.is_ahead
+            && let Some(instance) = self.starting(next).first()
+            && let Some((latest, _)) = self.successes.get(instance)
+            && self.chooser.drop_order(next, *latest == now)
+        {
+            choice = self.chooser.choose(&circumstances, &mut most);
+            self.is_ahead = false;
+        }
+        if let Ok(Choice::Next(next)) = &choice {
+            self.is_ahead &= !next.is_new_order;
+            self.chosen = Some(next.node);
+        }
+        let running: Vec<InstanceId> = self.under_way.values().map(|(id, _)| *id).collect();
+        if let Ok(Choice::Next(next)) = &choice
+            && let Some(instance) = self.starting(next).first().copied()
+        {
+            let count = self.repetitions.count(&state, &running, instance);
+            self.is_table_circling = count > MOST_RECONSIDERED && self.chooser.is_table();
+            if count > MOST_REPEATED || self.is_table_circling {
+                return replan(self.is_circling(instance, count, moment.now));
+            }
+            if count > MOST_RECONSIDERED && self.chooser.keep_order() {
+                choice = self.chooser.choose(&circumstances, &mut most);
+            }
+        }
+        match choice {
             Err(coupled) => {
                 replan(Reason::new(Cause::NoOrder).about(About::Said(coupled.to_string())))
             }
@@ -262,7 +378,7 @@ impl Rest {
                 decision: Decision::GoalReached,
                 reason: Reason::new(Cause::GoalReached),
             },
-            Ok(Choice::Next(next)) => self.carry_on(&next, &now),
+            Ok(Choice::Next(next)) => self.carry_on(&next, &now, (&state, &running)),
             Ok(Choice::Replan) if self.awaits_ends(&now) => {
                 // What is under way is ended before a plan is given up: a robot that is let go
                 // between two places is at neither. And it may change what can be done.
@@ -276,6 +392,26 @@ impl Rest {
                 replan(reason)
             }
         }
+    }
+
+    /// Reason to abandon a plan because an action succeeds repeatedly after a start in the same state.
+    fn is_circling(&self, instance: InstanceId, count: u32, now: &Rational) -> Reason {
+        let name = &self.steps[instance.index()].action.name;
+        let about =
+            format!("{name} has succeeded {count} times in the same state and does not lead on");
+        let reason = Reason::new(Cause::NoOrder).about(About::Said(about));
+        reason.since(now.clone())
+    }
+
+    /// The actions that start if this is next: several if they need each other. Empty for an end or a timed initial.
+    fn starting(&self, next: &NextHappening) -> Vec<InstanceId> {
+        let nodes = &self.chooser.search().model().plan().nodes;
+        let starting = std::iter::once(&next.node).chain(&next.together);
+        let starting = starting.map_while(|node| match nodes[node.index()] {
+            Node::Start(instance) | Node::Instant(instance) => Some(instance),
+            Node::Zero | Node::End(_) | Node::Timed(_) => None,
+        });
+        starting.collect()
     }
 
     /// Stops an action whose end is not worth waiting for; not again and again, which would take no
@@ -323,11 +459,16 @@ impl Rest {
         time + &self.mission.origin
     }
 
-    fn carry_on(&mut self, next: &NextHappening, now: &Rational) -> Decided {
-        let origin = &self.mission.origin;
-        let world = |time: &Rational| time + origin;
-        let node = self.chooser.search().model().plan().nodes[next.node.index()];
-        let (Node::Start(instance) | Node::Instant(instance)) = node else {
+    fn carry_on(
+        &mut self,
+        next: &NextHappening,
+        now: &Rational,
+        before: (&State, &[InstanceId]),
+    ) -> Decided {
+        let origin = self.mission.origin.clone();
+        let world = |time: &Rational| time + &origin;
+        let starting = self.starting(next);
+        let Some(first) = starting.first() else {
             // An end, or timed initials: it comes when it comes. When it is too late for the order,
             // another one is looked for.
             let late = next
@@ -335,31 +476,68 @@ impl Rest {
                 .latest
                 .as_ref()
                 .map(|latest| latest + self.mission.task.epsilon());
-            let until = late.filter(|late| late > now);
+            // What needs it at the same moment is started then.
+            let moment = (!next.together.is_empty()).then(|| next.slot.earliest.clone());
+            let until = late.into_iter().chain(moment).filter(|time| time > now);
+            let until = until.min();
             return wait(until.map(|until| world(&until)), About::NextHappening);
         };
         if next.slot.earliest > *now {
             return wait(Some(world(&next.slot.earliest)), About::NextStart);
         }
+        let continued = starting.iter().find(|it| self.continued.contains(it));
+        if let Some(continued) = continued {
+            let name = &self.steps[continued.index()].action.name;
+            let reason = Reason::new(Cause::Failed).of(name);
+            return replan(reason.since(world(now)));
+        }
+        let separated = starting.iter().filter_map(|instance| {
+            let Step {
+                action, duration, ..
+            } = &self.steps[instance.index()];
+            let of = (&*self.mission.task, &**action);
+            self.separation.separated(of, duration.as_ref(), now)
+        });
+        if let Some(separated) = separated.max() {
+            return wait(Some(world(&separated)), About::NextStart);
+        }
+        let planned = Planned {
+            earliest: Some(world(&next.slot.earliest)),
+            latest: next.slot.latest.as_ref().map(world),
+        };
+        let about = self.chooser.about(next);
+        let name = &self.steps[first.index()].action.name;
+        let reason = Reason::new(Cause::Due).of(name).about(about);
+        let orders = starting.into_iter();
+        let orders = orders.map(|instance| self.start(instance, planned.clone(), now, before));
+        Decided {
+            decision: Decision::Start(orders.collect()),
+            reason,
+        }
+    }
+
+    /// The order to start an action now.
+    fn start(
+        &mut self,
+        instance: InstanceId,
+        planned: Planned,
+        now: &Rational,
+        (state, running): (&State, &[InstanceId]),
+    ) -> Order {
+        let Step {
+            action, duration, ..
+        } = &self.steps[instance.index()];
         let step = StepId(self.next_step);
         self.next_step = self.next_step.saturating_add(1);
-        let planned = &self.steps[instance.index()];
-        let order = Order {
-            step,
-            action: Arc::clone(&planned.action),
-            duration: planned.duration.clone(),
-            planned: Planned {
-                earliest: Some(world(&next.slot.earliest)),
-                latest: next.slot.latest.as_ref().map(world),
-            },
-        };
-        let name = &planned.action.name;
-        let about = self.chooser.about(next);
-        let reason = Reason::new(Cause::Due).of(name).about(about);
+        let of = (&*self.mission.task, &**action);
+        self.separation.start(step.0, of, duration.as_ref(), now);
         self.under_way.insert(step, (instance, None));
-        Decided {
-            decision: Decision::Start(vec![order]),
-            reason,
+        self.repetitions.start(step, state, running, instance);
+        Order {
+            step,
+            action: Arc::clone(action),
+            duration: duration.clone(),
+            planned,
         }
     }
 }

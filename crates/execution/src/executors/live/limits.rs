@@ -84,18 +84,28 @@ impl Rest {
         let Decision::Wait { until } = &decided.decision else {
             return decided;
         };
+        let next_due = self.next_due();
+        let due = next_due.map(|(time, _)| self.dispatch.world(time) + self.mission.task.epsilon());
+        let until = self
+            .after_limit()
+            .into_iter()
+            .chain(due)
+            .chain(until.clone())
+            .min();
+        Decided {
+            decision: Decision::Wait { until },
+            ..decided
+        }
+    }
+
+    /// ε after the first limit of what is under way.
+    pub(super) fn after_limit(&self) -> Option<Rational> {
         let limits = self.limits.iter();
         let times = limits.filter_map(|(instance, limit)| {
             let time = self.limit_of(*instance, limit.as_ref()?)?;
             Some(self.dispatch.world(&time) + self.mission.task.epsilon())
         });
-        let next_due = self.next_due();
-        let due = next_due.map(|(time, _)| self.dispatch.world(time) + self.mission.task.epsilon());
-        let until = times.chain(due).chain(until.clone()).min();
-        Decided {
-            decision: Decision::Wait { until },
-            ..decided
-        }
+        times.min()
     }
 }
 

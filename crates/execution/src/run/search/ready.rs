@@ -17,10 +17,10 @@ use super::super::{Run, Stop};
 use super::fit::Begun;
 use super::{Goes, Search, WORD};
 use crate::event::{Measured, Ticket};
-use crate::executor::Need;
-use crate::executor::{News, Order};
-use crate::preparation::Wanted;
+use crate::executor::{Mission, Need, News, Order};
+use crate::preparation::PrepareError;
 use crate::record::Entry;
+use crate::request::RequestId;
 use crate::run::intake::Remark;
 
 /// So many times a plan is made to fit again, and made ready again, because something unexpected was
@@ -30,6 +30,9 @@ const MOST_TRIES: usize = 2;
 
 /// A plan that is being made ready.
 pub(super) struct Readying {
+    request: RequestId,
+    /// The prepared plan, until it is taken in.
+    answer: Option<Result<Mission, PrepareError>>,
     plan: TimeTriggeredPlan,
     /// From where.
     situation: Situation,
@@ -45,26 +48,50 @@ pub(super) struct Readying {
     is_fitted: bool,
 }
 
+impl Readying {
+    /// Returns whether the prepared plan has arrived, and is not noted yet.
+    pub(super) fn has_arrived(&self) -> bool {
+        self.answer.is_some() && self.since.is_none()
+    }
+
+    /// Returns the request if it has no answer yet.
+    pub(super) fn open_request(&self) -> Option<RequestId> {
+        (self.answer.is_none() && self.since.is_none()).then_some(self.request)
+    }
+}
+
+impl Search {
+    /// Takes the answer to the request for a prepared plan. If the run waits in the world (`now` is `None`), the end
+    /// of the wait notes it.
+    pub(in crate::run) fn take_prepared(
+        &mut self,
+        id: RequestId,
+        prepared: Result<Mission, PrepareError>,
+        now: Option<Rational>,
+    ) {
+        if let Some(readying) = &mut self.readying
+            && readying.open_request() == Some(id)
+        {
+            readying.answer = Some(prepared);
+            readying.since = now;
+        }
+    }
+}
+
 impl Run<'_> {
     /// Begins to make a plan ready from there.
     pub(super) fn make_ready(&mut self, mut search: Search, fit: Begun, is_fitted: bool) {
         let (plan, situation, running) = fit;
-        let is_begun = self.ports.preparer.begin(&Wanted {
-            task: &search.task,
-            plan: &plan,
-            situation: &situation,
-            running: &running,
-            now: &self.now,
-            need: self.ports.executor.need(),
-        });
+        let request = self.request_preparation(&search.task, &plan, &situation, &running);
         search.tries += 1;
         search.readying = Some(Readying {
+            request,
+            answer: None,
             plan,
             situation,
             running,
             started: self.account.started(),
-            // Who cannot do that beside the run is waited for.
-            since: (!is_begun).then(|| self.now.clone()),
+            since: None,
             disagrees: false,
             is_fitted,
         });
@@ -75,7 +102,7 @@ impl Run<'_> {
     pub(in crate::run) fn note_plan_ready(&mut self) -> Remark {
         let search = self.search.as_mut();
         match search.and_then(|search| search.readying.as_mut()) {
-            Some(readying) if readying.since.is_none() => {
+            Some(readying) if readying.since.is_none() && readying.answer.is_some() => {
                 readying.since = Some(self.now.clone());
                 None
             }
@@ -174,17 +201,12 @@ impl Run<'_> {
         let Some(mut search) = self.search.take() else {
             return Ok(());
         };
-        let Some(readying) = search.readying.take() else {
+        let Some(mut readying) = search.readying.take() else {
             return Ok(());
         };
-        let mission = self.ports.preparer.collect(&Wanted {
-            task: &search.task,
-            plan: &readying.plan,
-            situation: &readying.situation,
-            running: &readying.running,
-            now: &self.now,
-            need: self.ports.executor.need(),
-        });
+        let Some(mission) = readying.answer.take() else {
+            return Ok(());
+        };
         self.heed()?;
         let begun: Vec<Ticket> = begun_since(&readying, self.account.started()).collect();
         let mut mission = match mission {
@@ -228,6 +250,7 @@ impl Run<'_> {
         self.tell_what_happened();
         self.plan_task = Some(Arc::clone(&search.task));
         mission.begun = steps.unwrap_or_default();
+        mission.now.clone_from(&self.now);
         let course = Course {
             plan: &readying.plan,
             situation: &readying.situation,
@@ -271,6 +294,8 @@ impl Run<'_> {
             && self.settings.running == super::super::RunningRule::Keep
             && self.ports.executor.need() != Need::PartialOrder;
         let search = Search {
+            request: self.next_request(),
+            answer: None,
             reason: turn.reason.clone(),
             guess: super::Guess::AQuarterLonger,
             task: Arc::clone(&self.task),
@@ -279,6 +304,7 @@ impl Run<'_> {
             running: rest.2.clone(),
             expected: Vec::new(),
             begun: self.now.clone(),
+            timed: self.belief.timed_past(),
             since: self.now.clone(),
             is_guess: false,
             course: Goes::Plan { until: None },

@@ -1,10 +1,13 @@
 //! How a plan that is there takes over.
 
+use std::sync::Arc;
+
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 
 use super::super::beginning::Course;
 use super::super::expectation::Expected;
+use super::super::pending::Otherwise;
 use super::super::{Run, Stop};
 use super::fit::Begun;
 use super::{Goes, Search, WORD};
@@ -33,12 +36,25 @@ impl Run<'_> {
                 self.make_ready(search, fit, true);
                 return Ok(());
             }
-            let (plan, situation, running) = fit;
-            let course = Course::of(&plan, &situation, &running);
-            if let Ok(mission) = self.prepare(&search.task, course) {
-                return self.begin_with(course, &search.goals, &mission);
-            }
+            let (fitted, situation, running) = fit;
+            let course = Course::of(&fitted, &situation, &running);
+            let (task, goals) = (Arc::clone(&search.task), search.goals.clone());
+            let otherwise = Otherwise::AsMade(Box::new(search), plan.clone());
+            self.await_preparation(&task, &goals, course, otherwise);
+            return Ok(());
         }
+        self.take_over_as_made(search, plan)
+    }
+
+    /// The same with the plan as it was made.
+    pub(in crate::run) fn take_over_as_made(
+        &mut self,
+        search: Search,
+        plan: &TimeTriggeredPlan,
+    ) -> Result<(), Stop> {
+        let time = search.situation.time.clone();
+        let (situation, running) = self.situation_at(time, search.guess);
+        let is_as_expected = situation == search.situation && running == search.running;
         let is_known = |ticket| search.running.contains(&ticket);
         let knows_all = self.account.open_tickets().all(is_known);
         if !is_as_expected && (!knows_all || !search.expected.is_empty()) {
@@ -56,7 +72,8 @@ impl Run<'_> {
         }
         self.tell_what_happened();
         let course = Course::of(plan, &search.situation, &search.running);
-        self.take_up_for(&search.task, &search.goals, course)
+        self.take_up_for(&search.task, &search.goals, course);
+        Ok(())
     }
 
     /// Has the executor of the next plan told what has happened. Steps of another plan mean nothing to
@@ -105,9 +122,10 @@ impl Run<'_> {
             }
             let (plan, situation, running) = fit;
             let course = Course::of(&plan, &situation, &running);
-            if let Ok(mission) = self.prepare(&search.task, course) {
-                return self.begin_with(course, &search.goals, &mission);
-            }
+            let (task, goals) = (Arc::clone(&search.task), search.goals.clone());
+            let otherwise = Otherwise::SearchAgain(Box::new(search));
+            self.await_preparation(&task, &goals, course, otherwise);
+            return Ok(());
         }
         self.search_again(&search.reason)
     }

@@ -1,6 +1,6 @@
 //! Experiment files as they stand.
 
-use elbowroom::envelope::Objective;
+use elbowroom::envelope::{Method, Objective};
 use elbowroom::execute::{EMBEDDED, FirstPlan};
 use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
 use elbowroom_num::Rational;
@@ -9,7 +9,7 @@ use indexmap::IndexMap;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Planning, Published};
+use super::{Planning, Published, Together};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -19,6 +19,7 @@ pub(super) struct File {
     pub(super) title: String,
     pub(super) domain: Spanned<String>,
     pub(super) problem: Spanned<String>,
+    pub(super) plan: Option<Spanned<String>>,
     pub(super) trials: Spanned<u64>,
     #[serde(default)]
     pub(super) seed: u64,
@@ -31,12 +32,15 @@ pub(super) struct File {
     pub(super) planning_time: Option<Spanned<toml::Value>>,
     pub(super) max_replans: Option<usize>,
     pub(super) precision: Option<Spanned<f64>>,
+    /// The algorithm for envelopes.
+    pub(super) method: Option<Spanned<Method>>,
     pub(super) objective: Option<Objective>,
     pub(super) first_plan: Option<Spanned<FirstPlan>>,
     pub(super) planner: Option<Spanned<String>>,
     pub(super) planner_time: Option<Spanned<f64>>,
     pub(super) planner_states: Option<u64>,
     pub(super) improve_states: Option<u64>,
+    pub(super) planning_budget: Option<Spanned<f64>>,
     #[serde(default)]
     pub(super) blanks: IndexMap<String, Spanned<Vec<toml::Value>>>,
     #[serde(default)]
@@ -88,15 +92,42 @@ impl File {
         Ok(())
     }
 
-    /// By what first plans are chosen: by their probability, unless it is said otherwise; another
-    /// planner gives only its own plan.
+    /// The blanks that are filled in together.
+    pub(super) fn together(&self) -> Result<Vec<Together>, (Span, String)> {
+        let mut together = Vec::new();
+        for group in &self.together {
+            let width = group.names.len();
+            let mut rows = group.rows.get_ref().iter();
+            if let Some(row) = rows.find(|row| row.get_ref().len() != width) {
+                return Err((
+                    row.span(),
+                    format!("write {width} values, one for each name"),
+                ));
+            }
+            let rows = group.rows.get_ref().iter();
+            together.push(Together {
+                names: group.names.clone(),
+                rows: rows
+                    .map(|row| row.get_ref().iter().map(text_of).collect())
+                    .collect(),
+            });
+        }
+        Ok(together)
+    }
+
+    /// The rule that chooses first plans, by default their probability. If the experiment names a plan, or
+    /// another planner with a plan of its own, there is no choice.
     pub(super) fn first_plan(&self) -> Result<FirstPlan, (Span, String)> {
         let is_embedded = self
             .planner
             .as_ref()
             .is_none_or(|name| name.get_ref() == EMBEDDED);
+        if let (Some(_), Some(first_plan)) = (&self.plan, &self.first_plan) {
+            let message = "the experiment names its plan: leave out `plan`, or `first_plan`";
+            return Err((first_plan.span(), message.to_owned()));
+        }
         let Some(given) = &self.first_plan else {
-            return Ok(if is_embedded {
+            return Ok(if is_embedded && self.plan.is_none() {
                 FirstPlan::Likeliest
             } else {
                 FirstPlan::Shortest
@@ -155,7 +186,7 @@ impl File {
                 Some(time) => Err((
                     time.span(),
                     "`planner_time` is for another planner: name it with `planner`, or limit the \
-                     embedded one with `planner_states` and `improve_states`"
+                     embedded one with `planning_budget`"
                         .to_owned(),
                 )),
             },

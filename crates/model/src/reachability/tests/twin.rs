@@ -137,7 +137,8 @@ impl Possible {
         match &action.body {
             Body::Instantaneous(_) => true,
             Body::Durative(body) => {
-                self.holds(task, &body.over_all, true)
+                // With a duration of 0, the over-all condition is vacuous.
+                (self.may_take_no_time(task, body) || self.holds(task, &body.over_all, true))
                     && self.holds(task, &body.end.condition, true)
                     && self.leaves_room(task, &body.duration.iter().collect::<Vec<_>>())
             }
@@ -240,6 +241,16 @@ impl Possible {
                 values.get(fluent).cloned()
             }
             _ => None,
+        })
+    }
+
+    /// Returns `true` if the duration constraints with a known bound allow 0.
+    fn may_take_no_time(&self, task: &Task, body: &crate::ground::DurativeBody) -> bool {
+        body.duration.iter().all(|constraint| {
+            self.is_defined(task, &constraint.bound)
+                && self
+                    .value(task, &constraint.bound)
+                    .is_none_or(|bound| constraint.comparison.holds(&Rational::ZERO, &bound))
         })
     }
 

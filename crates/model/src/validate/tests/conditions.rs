@@ -1,6 +1,7 @@
 //! When conditions are read.
 
-use super::world::World;
+use super::world::{World, number};
+use crate::validate::Settings;
 
 #[test]
 fn a_plan_whose_actions_do_what_the_goal_asks_is_valid() {
@@ -22,7 +23,8 @@ fn a_start_condition_reads_the_state_before_any_effect_at_that_time() {
     let world = World::new("").durative("a", &[("start", "(p)"), ("start effect", "(p)")]);
     assert_eq!(
         world.judge("1: a [2]"),
-        "at 1.000: (a) needs (p) at start: (p) is false"
+        "at 1.000: (a) needs (p) at start: (p) is false; the start of (a) at 1.000 changes this \
+         only after the condition is read"
     );
 }
 
@@ -31,7 +33,8 @@ fn an_end_condition_reads_the_state_before_the_effects_of_the_end() {
     let world = World::new("").durative("a", &[("end", "(p)"), ("end effect", "(p)")]);
     assert_eq!(
         world.judge("1: a [2]"),
-        "at 3.000: (a) needs (p) at end: (p) is false"
+        "at 3.000: (a) needs (p) at end: (p) is false; the end of (a) at 3.000 changes this only \
+         after the condition is read"
     );
 }
 
@@ -188,4 +191,50 @@ fn a_number_left_open_cannot_be_judged() {
         world.judge("1: go"),
         "undecided: at 1.000: ?parameter0 is left open and read by (> (x) ?parameter0): give it a value"
     );
+}
+
+/// The verdicts are those of VAL's program at `-t 0.001`, for x = 9.99995, 10, 10.00005.
+#[test]
+fn slack_forgives_conditions_of_one_moment_and_no_over_all_condition() {
+    let table = [
+        ("(< x 10)", "+++", "+--"),
+        ("(<= x 10)", "+++", "++-"),
+        ("(> x 10)", "+++", "--+"),
+        ("(>= x 10)", "+++", "-++"),
+        ("(not (< x 10))", "---", "-++"),
+        ("(not (<= x 10))", "---", "--+"),
+        ("(not (> x 10))", "---", "++-"),
+        ("(not (>= x 10))", "---", "+--"),
+        ("(or (< x 10) (p))", "+++", "+--"),
+    ];
+    let judged = |when: &str, condition: &str| -> String {
+        let values = ["9.99995", "10", "10.00005"];
+        let verdicts = values.map(|value| {
+            let world = World::new(&format!("(= x {value})"))
+                .durative("a", &[(when, condition)])
+                .settings(Settings::like_val(number("0.001")));
+            match world.judge("0: a [20]").as_str() {
+                "valid" => '+',
+                reason => {
+                    assert!(reason.contains("needs"), "{reason}");
+                    // A reason is given: `x is …`.
+                    assert!(
+                        reason.contains("= 10") || reason.contains("= 9"),
+                        "{reason}"
+                    );
+                    '-'
+                }
+            }
+        });
+        verdicts.iter().collect()
+    };
+    for (condition, at_start, over_all) in table {
+        assert_eq!(judged("start", condition), at_start, "at start {condition}");
+        assert_eq!(judged("end", condition), at_start, "at end {condition}");
+        assert_eq!(
+            judged("over all", condition),
+            over_all,
+            "over all {condition}"
+        );
+    }
 }

@@ -1,6 +1,7 @@
 //! How a violation reads.
 
 use super::world::{World, number};
+use crate::problem::{Body, Condition, ObjectId, Term};
 use crate::validate::{Mistake, Reason, When};
 
 #[test]
@@ -23,6 +24,67 @@ fn a_false_fact_names_what_last_made_it_false() {
         world.judge("1: leave [5]\n7: use"),
         "at 7.000: (use) needs (at): (at) is false since the start of (leave) at 1.000"
     );
+}
+
+#[test]
+fn fact_that_becomes_true_at_the_same_time_is_said_to_come_too_late() {
+    let world = World::new("")
+        .durative("make", &[("end effect", "(p)")])
+        .instant("use", "(p)", "");
+    assert_eq!(
+        world.judge("1: make [5]\n6: use"),
+        "at 6.000: (use) needs (p): (p) is false; the end of (make) at 6.000 changes this only \
+         after the condition is read"
+    );
+    let world = World::new("(p)")
+        .durative("lose", &[("end effect", "(not (p))")])
+        .durative("win", &[("end effect", "(increase x 2)")])
+        .instant("use", "(not (p))", "");
+    assert_eq!(
+        world.judge("1: lose [5]\n6: win [1]\n6: use"),
+        "at 6.000: (use) needs (not (p)): (p) is true; the end of (lose) at 6.000 changes this \
+         only after the condition is read"
+    );
+}
+
+#[test]
+fn number_that_suffices_at_the_same_time_is_said_to_come_too_late() {
+    let world = World::new("(= x 3)")
+        .instant("more", "", "(increase x 2)")
+        .durative("use", &[("start", "(>= x 5)")]);
+    assert_eq!(
+        world.judge("1: more\n1: use [5]"),
+        "at 1.000: (use) needs (>= (x) 5) at start: (x) = 3, short by 2; (more) at 1.000 changes \
+         this only after the condition is read"
+    );
+}
+
+#[test]
+fn false_equality_names_its_objects() {
+    let mut world = World::new("").instant("go", "(p)", "");
+    world.problem.objects = ["a", "b"]
+        .map(|name| crate::problem::Object {
+            name: name.to_owned(),
+            types: Vec::new(),
+        })
+        .to_vec();
+    let object = |index: u32| Term::Object(ObjectId(index));
+    let equal = |left, right| Condition::Equal(object(left), object(right));
+    for (condition, words) in [
+        (Condition::Not(Box::new(equal(0, 0))), "(not (= a a))"),
+        (equal(0, 1), "(= a b)"),
+        (
+            Condition::Or(vec![equal(0, 1), Condition::Not(Box::new(equal(1, 1)))]),
+            "(or (= a b) (not (= b b)))",
+        ),
+    ] {
+        let Body::Instantaneous { condition: own, .. } = &mut world.problem.schemas[0].body else {
+            panic!()
+        };
+        *own = Condition::And(vec![equal(0, 0), condition]);
+        let found = world.judge("1: go");
+        assert_eq!(found, format!("at 1.000: (go) needs {words}"));
+    }
 }
 
 #[test]

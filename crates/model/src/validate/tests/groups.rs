@@ -26,7 +26,8 @@ fn interfering_happenings_keep_epsilon_apart() {
 fn what_happens_at_the_same_time_does_not_see_each_other() {
     assert_eq!(
         handover().judge("1: give\n1: take"),
-        "at 1.000: (take) needs (p): (p) is false"
+        "at 1.000: (take) needs (p): (p) is false; (give) at 1.000 changes this only after the \
+         condition is read"
     );
 }
 
@@ -209,7 +210,8 @@ fn what_is_read_and_written_at_one_time_is_allowed_only_if_the_settings_say_so()
     let handover = handover().settings(Settings::like_unified_planning());
     assert_eq!(
         handover.judge("1: give\n1: take"),
-        "at 1.000: (take) needs (p): (p) is false"
+        "at 1.000: (take) needs (p): (p) is false; (give) at 1.000 changes this only after the \
+         condition is read"
     );
 }
 
@@ -218,7 +220,8 @@ fn the_tolerance_merges_what_is_within_a_tenth_of_it_after_the_first() {
     let world = handover().settings(Settings::like_val(number("0.01")));
     assert_eq!(
         world.judge("1: give\n1.001: take"),
-        "at 1.000: (take) needs (p): (p) is false"
+        "at 1.000: (take) needs (p): (p) is false; (give) at 1.000 changes this only after the \
+         condition is read"
     );
     assert_eq!(world.judge("1: give\n1.0011: take"), "valid");
 }

@@ -7,15 +7,48 @@ use super::super::expressions::Moment;
 use super::super::formula::Formula;
 use super::super::network::SETTLED;
 use super::super::state::{Open, State};
-use super::super::symbolic;
+use super::super::symbolic::{self, Piece};
 use super::{Stepper, duration_form};
 
+/// Most alternatives of a goal that are tried one by one.
+const MOST_GOALS: usize = 32;
+
+/// Position of a moment relative to the open interval of an over-all condition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    /// Just after the start of the action.
+    Beginning,
+    /// Before anything changes at the moment.
+    Arrival,
+    /// After the changes of a moment between start and end.
+    After,
+}
+
 impl Stepper<'_> {
-    /// Demands the goal of the times.
+    /// Demands the goal of the times: the first of its alternatives that some times meet.
     pub(crate) fn reach_goal(&mut self, state: &mut State) -> Option<()> {
         let goal = &self.compiled.goal;
-        self.demand(state, goal, None, &Moment::default())?;
-        self.has_times(state).then_some(())
+        let has_tests = |part: &Formula| {
+            let mut has_tests = false;
+            part.visit_tests(&mut |_| has_tests = true);
+            has_tests
+        };
+        let alternatives = goal.alternatives(&has_tests, MOST_GOALS);
+        let alternatives = alternatives.unwrap_or_else(|| vec![goal.clone()]);
+        alternatives.iter().find_map(|goal| {
+            let mut attempt = state.clone();
+            self.demand(&mut attempt, goal, None, &Moment::default())?;
+            let is_possible = if alternatives.len() > 1 {
+                symbolic::is_possible(&attempt, self.compiled, None)
+            } else {
+                true
+            };
+            if !is_possible || !self.has_times(&attempt) {
+                return None;
+            }
+            *state = attempt;
+            Some(())
+        })
     }
 
     /// Requires a condition, now or, where numbers depend on times, of the times.
@@ -37,8 +70,8 @@ impl Stepper<'_> {
     pub(super) fn watch_all(
         &mut self,
         state: &mut State,
-        open: &Open,
-        moment: &Moment,
+        open: &mut Open,
+        (side, moment): (Side, &Moment),
     ) -> Option<()> {
         if state.symbolic.is_none() {
             return Some(());
@@ -50,7 +83,19 @@ impl Stepper<'_> {
                 .then(|| duration_form(open.duration.as_ref(), open.node, open.end)),
         };
         let lost = &mut self.has_rounded;
-        symbolic::demand_formula(self.compiled, state, over_all, &moment, lost)
+        let Open {
+            beginnings, chosen, ..
+        } = open;
+        let piece = match side {
+            Side::Beginning => Piece::Begins(beginnings),
+            Side::Arrival => Piece::Ends(beginnings),
+            Side::After => {
+                beginnings.clear();
+                Piece::Within
+            }
+        };
+        let at = (piece, &moment, chosen);
+        symbolic::demand_over_all(self.compiled, state, over_all, at, lost)
     }
 
     /// Demands the over-all conditions that read one of the fluents, of all that is under way.
@@ -58,7 +103,7 @@ impl Stepper<'_> {
         &mut self,
         state: &mut State,
         fluents: &[u32],
-        moment: &Moment,
+        (side, moment): (Side, &Moment),
     ) -> Option<()> {
         for place in 0..state.open.len() {
             let over_all = &self.compiled.action(state.open[place].action).over_all;
@@ -68,8 +113,9 @@ impl Stepper<'_> {
                 difference.visit_fluents(&mut |fluent| reads |= fluents.contains(&fluent));
             });
             if reads {
-                let open = state.open[place].clone();
-                self.watch_all(state, &open, moment)?;
+                let mut open = state.open[place].clone();
+                self.watch_all(state, &mut open, (side, moment))?;
+                state.open[place] = open;
             }
         }
         Some(())

@@ -3,12 +3,13 @@
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
-use super::super::compile::{Change, Snap, Update};
+use super::super::compile::{Change, Snap, Update, is_conflict};
 use super::super::expressions::Moment;
 use super::super::formula::{Numeric, set};
 use super::super::state::State;
 use super::super::symbolic;
 use super::Stepper;
+use super::conditions::Side;
 
 impl Stepper<'_> {
     /// Carries out the effects: all read the state on arrival.
@@ -35,6 +36,9 @@ impl Stepper<'_> {
                     Change::Cost(cost) => costs.push(cost),
                 }
             }
+        }
+        if is_conflict(&updates) {
+            return None;
         }
         for cost in costs {
             // Of something that was under way before, the duration may be open. Then its cost is
@@ -70,7 +74,7 @@ impl Stepper<'_> {
             return Some(());
         }
         let fluents: Vec<u32> = updates.iter().map(|update| update.fluent).collect();
-        self.watch(state, &fluents, moment)?;
+        self.watch(state, &fluents, (Side::Arrival, moment))?;
         let read: Option<Vec<_>> = updates
             .iter()
             .map(|update| symbolic::read(state, update, moment))
@@ -78,7 +82,7 @@ impl Stepper<'_> {
         for (fluent, operator, amount) in read? {
             symbolic::update(state, fluent, operator, &amount, moment)?;
         }
-        self.watch(state, &fluents, moment)
+        self.watch(state, &fluents, (Side::After, moment))
     }
 }
 

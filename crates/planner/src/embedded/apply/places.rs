@@ -50,9 +50,28 @@ impl Stepper<'_> {
         place
     }
 
+    /// Lets the happening be at the moment that is not complete yet, if there is one.
+    pub(super) fn join(&mut self, state: &mut State, node: NodeId) -> Option<()> {
+        self.newest = node;
+        let Some(joint) = state.joint.filter(|joint| joint.node != node) else {
+            return Some(());
+        };
+        if node == SETTLED {
+            return None;
+        }
+        state.network.add_edge(joint.node, node, 0).ok()?;
+        state.network.add_edge(node, joint.node, 0).ok()
+    }
+
     /// Notes what was chosen last, where choices come in the order of time: what is under way ends
     /// no earlier.
-    pub(super) fn note_last(&self, state: &mut State, node: NodeId, place: &Place) -> Option<()> {
+    pub(super) fn note_last(
+        &mut self,
+        state: &mut State,
+        node: NodeId,
+        place: &Place,
+    ) -> Option<()> {
+        self.join(state, node)?;
         if !self.is_chronological {
             return Some(());
         }

@@ -1,12 +1,14 @@
 //! Compiles a grounded task.
 
+mod alternatives;
 mod durations;
 mod finish;
 mod snaps;
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use elbowroom_model::ground::{self, Body, Condition, DurativeBody};
+use elbowroom_model::ground::{self, Body, Condition, DurativeBody, FluentId};
 use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Footprint, Situation, Task};
 use elbowroom_num::Rational;
@@ -15,13 +17,17 @@ pub(super) use durations::reads_duration;
 
 use super::compressibility::excludes_itself;
 use super::directions::Shifts;
+use super::fixed_durations::{needs_fixed_duration, variants_with_fixed_duration};
+use super::guarded::{has_products, moving_fluents, variants_by_guards};
 use super::interference::{Links, Separations};
 use super::metric::Draft;
-use super::reads::{read_action, visit_changes};
+use super::reads::{read_action, visit_changes, visit_disputed};
 use super::shortened::full_actions;
 use super::symbols::Symbols;
 use super::times::has_fixed_numbers;
+use super::unfolded::unfolded;
 use super::unsupported::{Unsupported, check};
+use super::without_duration::{takes_no_time, without_duration};
 use super::{Action, Compiled, Compressibility, Duration, Flow, NONE, Snap};
 use crate::embedded::formula::Formula;
 use crate::embedded::time::{Scale, Ticks};
@@ -63,7 +69,18 @@ pub(crate) fn compile(
     }
     let mut builder = Builder::new(task);
     let has_fixed_numbers = has_fixed_numbers(grounding, situation);
+    let folded = grounding;
+    let unfolded = if has_fixed_numbers || !situation.running.is_empty() {
+        None
+    } else {
+        unfolded(grounding)
+    };
+    let grounding = unfolded.as_ref().unwrap_or(folded);
     builder.links = Links::new(has_fixed_numbers);
+    if !has_fixed_numbers {
+        builder.moving = moving_fluents(grounding);
+        builder.has_products = has_products(grounding, &builder.moving);
+    }
     if wanted.metric {
         builder.metric = Draft::of(builder.task, grounding, situation, has_fixed_numbers);
     }
@@ -86,7 +103,16 @@ pub(crate) fn compile(
     }
     for (number, action) in grounding.actions.iter().enumerate() {
         let full = full.get_mut(number).and_then(Option::take);
-        builder.action(action, full.as_ref());
+        let full = full.or_else(|| unfolded.as_ref().map(|_| folded.actions[number].clone()));
+        if builder.moving.is_empty() {
+            builder.action(action, full.as_ref());
+            builder.action_without_duration(action, full.as_ref());
+            for variant in variants_with_fixed_duration(action, false) {
+                builder.action(&variant, Some(full.as_ref().unwrap_or(action)));
+            }
+        } else {
+            builder.variants(action, full.as_ref().unwrap_or(action));
+        }
         if number % ACTIONS_PER_QUESTION == ACTIONS_PER_QUESTION - 1 && !goes_on() {
             return Err(Failure::Stopped);
         }
@@ -106,6 +132,10 @@ struct Builder<'a> {
     actions: Vec<Action>,
     over_all: Vec<Condition>,
     metric: Option<Draft>,
+    /// The fluents whose values may depend on when things happen.
+    moving: BTreeSet<FluentId>,
+    /// `true` if some effect multiplies moving numbers.
+    has_products: bool,
 }
 
 /// The grid for all times and constant durations.
@@ -140,6 +170,8 @@ impl<'a> Builder<'a> {
             actions: Vec::new(),
             over_all: Vec::new(),
             metric: None,
+            moving: BTreeSet::new(),
+            has_products: false,
         }
     }
 
@@ -174,6 +206,12 @@ impl<'a> Builder<'a> {
             if symbols.fluents.len() == before {
                 break;
             }
+        }
+        // Updates of one moment that do not commute are mistakes that the validator would find.
+        for action in running.clone().chain(&grounding.actions) {
+            visit_disputed(action, &mut |fluent| {
+                symbols.fluent(fluent);
+            });
         }
         // An increase of a fluent without a value is a mistake that the judge would find.
         for action in running.chain(&grounding.actions) {
@@ -210,6 +248,9 @@ impl<'a> Builder<'a> {
     }
 
     fn action(&mut self, action: &ground::Action, full: Option<&ground::Action>) {
+        if takes_no_time(action) {
+            return;
+        }
         let full = full.unwrap_or(action);
         let (starts, ends) = (
             Footprint::of_start(self.task, full),
@@ -221,30 +262,7 @@ impl<'a> Builder<'a> {
         };
         let mut separations = Separations::of(&starts, &shifts, self.epsilon, &self.links);
         match &action.body {
-            Body::Instantaneous(body) => {
-                let snap = self.snap(body, &mut Vec::new());
-                let start = self.push_snap(snap, separations);
-                self.actions.push(Action {
-                    schema: action.schema,
-                    arguments: action.arguments.clone(),
-                    start,
-                    end: NONE,
-                    over_all: Formula::default(),
-                    guards: Vec::new(),
-                    duration: Duration {
-                        least: Rational::ZERO,
-                        most: Some(Rational::ZERO),
-                        bounds: Vec::new(),
-                    },
-                    flows: Vec::new(),
-                    breaking_timed: Vec::new(),
-                    compressibility: Compressibility::Envelope,
-                    is_compression_safe: false,
-                    excludes_itself: true,
-                    uses_duration: false,
-                });
-                self.over_all.push(Condition::TRUE);
-            }
+            Body::Instantaneous(body) => self.instant(action, body, separations),
             Body::Durative(body) => {
                 separations.need_from_now_on(self.task, &body.over_all, &self.links);
                 let mut guards = Vec::new();
@@ -255,10 +273,74 @@ impl<'a> Builder<'a> {
                     .map_or_else(Shifts::default, |body| Shifts::of(&body.end.effects));
                 let end = self.end_with(body, &ends, &shifts, &mut guards);
                 let compiled = self.durative(action, body, start, end, guards);
-                self.actions.push(compiled);
                 self.over_all.push(body.over_all.clone());
+                self.push_action(compiled);
             }
         }
+    }
+
+    /// Adds the action in all its variants. `full`: see [`action_without_duration`](Self::action_without_duration).
+    fn variants(&mut self, action: &ground::Action, full: &ground::Action) {
+        for variant in variants_by_guards(action, &self.moving) {
+            let fixed = variants_with_fixed_duration(&variant, self.has_products);
+            let matters = |fluent| self.symbols.known_fluent(fluent).is_some();
+            if fixed.is_empty() || !needs_fixed_duration(&variant, &matters) {
+                self.action(&variant, Some(full));
+            }
+            self.action_without_duration(&variant, Some(full));
+            for variant in fixed {
+                self.action(&variant, Some(full));
+            }
+        }
+    }
+
+    /// Adds the form without duration of an action whose duration may be 0, if it has one.
+    fn action_without_duration(&mut self, action: &ground::Action, full: Option<&ground::Action>) {
+        let Some(body) = without_duration(self.task, action, full) else {
+            return;
+        };
+        let full = full.unwrap_or(action);
+        let mut footprint = Footprint::of_start(self.task, full);
+        footprint.include(Footprint::of_end(self.task, full));
+        let shifts = full.durative().map(|body| {
+            let effects = body.start.effects.iter().chain(&body.end.effects);
+            Shifts::of(&effects.cloned().collect::<Vec<_>>())
+        });
+        let shifts = shifts.unwrap_or_default();
+        let separations = Separations::of(&footprint, &shifts, self.epsilon, &self.links);
+        self.instant(action, &body, separations);
+    }
+
+    /// Adds an action that takes no time.
+    fn instant(
+        &mut self,
+        action: &ground::Action,
+        body: &ground::SnapAction,
+        separations: Separations,
+    ) {
+        let snap = self.snap(body, &mut Vec::new());
+        let start = self.push_snap(snap, separations);
+        self.over_all.push(Condition::TRUE);
+        self.push_action(Action {
+            schema: action.schema,
+            arguments: action.arguments.clone(),
+            start,
+            end: NONE,
+            over_all: Formula::default(),
+            guards: Vec::new(),
+            duration: Duration {
+                least: Rational::ZERO,
+                most: Some(Rational::ZERO),
+                bounds: Vec::new(),
+            },
+            flows: Vec::new(),
+            breaking_timed: Vec::new(),
+            compressibility: Compressibility::Envelope,
+            is_compression_safe: false,
+            excludes_itself: true,
+            exclusion: NONE,
+            uses_duration: false,
+        });
     }
 
     /// The end of an action that is under way; its guards are decided.
@@ -329,6 +411,7 @@ impl<'a> Builder<'a> {
             compressibility: Compressibility::Envelope,
             is_compression_safe: false,
             excludes_itself: start != NONE && excludes_itself(&self.snaps[start as usize]),
+            exclusion: NONE,
             uses_duration,
         }
     }

@@ -7,58 +7,82 @@
 //! starts, circles of ends, and numbers or disjunctions that several happenings repair together
 //! have no such order. They are rare; where they are possible, nothing is proved.
 
-use super::{Action, Change, Conditional, NONE, Snap};
-use crate::embedded::formula::Literal;
+use super::own_start::Changes;
+use super::{Action, Change, Conditional, NONE, Rule, Snap, Timed};
+use crate::embedded::formula::{Formula, Literal, Test};
+
+/// The compiled parts that decide whether a search over sequences may miss plans.
+#[derive(Clone, Copy)]
+pub(super) struct Parts<'a> {
+    pub(super) actions: &'a [Action],
+    pub(super) snaps: &'a [Snap],
+    pub(super) timed: &'a [Timed],
+    pub(super) tests: &'a [Test],
+    pub(super) strata: &'a [Vec<Rule>],
+    pub(super) fact_count: usize,
+}
 
 /// Whether two instances of the action that end together are one and the same but for their
 /// number, and so leave the facts as one of them does. Where the duration depends on the state, they
 /// can have started one after the other.
-fn is_idempotent(action: &Action) -> bool {
-    action.start != NONE && action.duration.most.as_ref() == Some(&action.duration.least)
+fn is_idempotent(action: &Action, snaps: &[Snap]) -> bool {
+    let end = snaps.get(action.end as usize);
+    action.start != NONE
+        && action.duration.most.as_ref() == Some(&action.duration.least)
+        && end.is_none_or(|end| end.conditional.is_empty())
+}
+
+fn updates_numbers(snap: &Snap) -> bool {
+    let is_update = |effect: &Conditional| matches!(effect.change, Change::Update(_));
+    !snap.updates.is_empty() || snap.conditional.iter().any(is_update)
 }
 
 /// Whether an action changes numbers.
 fn counts(action: &Action, snaps: &[Snap]) -> bool {
-    let updates = |snap: &Snap| {
-        let is_update = |effect: &Conditional| matches!(effect.change, Change::Update(_));
-        !snap.updates.is_empty() || snap.conditional.iter().any(is_update)
-    };
     !action.flows.is_empty()
         || [action.start, action.end]
             .iter()
-            .any(|&snap| snaps.get(snap as usize).is_some_and(updates))
+            .any(|&snap| snaps.get(snap as usize).is_some_and(updates_numbers))
+}
+
+/// Returns `true` if an over-all condition reads numbers that several happenings of one moment may
+/// change, perhaps those of several instances of one action.
+fn has_shared_test(parts: Parts<'_>) -> bool {
+    let has_test = |action: &Action| {
+        let mut has_test = false;
+        action.over_all.visit_tests(&mut |_| has_test = true);
+        has_test
+    };
+    if !parts.actions.iter().any(has_test) {
+        return false;
+    }
+    let timed = parts.timed.iter().filter(|timed| !timed.assigns.is_empty());
+    let mut writers = timed.count();
+    for action in parts.actions.iter().filter(|a| counts(a, parts.snaps)) {
+        writers += if action.excludes_itself { 1 } else { 2 };
+    }
+    writers > 1
 }
 
 /// Why a search over sequences may miss plans on account of numbers, if so.
-pub(super) fn obstacle_among_numbers(
-    actions: &[Action],
-    snaps: &[Snap],
-    fact_count: usize,
-) -> Option<&'static str> {
-    let has_tests = actions
-        .iter()
-        .any(|action| !action.over_all.tests.is_empty());
-    let has_shared_test =
-        has_tests && snaps.iter().filter(|snap| !snap.updates.is_empty()).count() > 1;
-    if has_shared_test {
+pub(super) fn obstacle_among_numbers(parts: Parts<'_>) -> Option<&'static str> {
+    if has_shared_test(parts) {
         return Some(
             "several happenings of one time may keep a numeric over-all condition together",
         );
     }
-    let ends = Circles::of(actions, fact_count, |action, uses| {
-        end_uses(action, snaps, uses);
-        uses.may_wait_for_itself = is_idempotent(action) && !counts(action, snaps);
+    let ends = Circles::of(parts, |action, uses| {
+        end_uses(action, parts, uses);
+        uses.may_wait_for_itself =
+            is_idempotent(action, parts.snaps) && !counts(action, parts.snaps);
     });
     ends.exist().then_some(TOGETHER)
 }
 
 /// Why it may miss plans even if numbers do not count, if so.
-pub(super) fn obstacle_among_facts(
-    actions: &[Action],
-    snaps: &[Snap],
-    fact_count: usize,
-) -> Option<&'static str> {
-    if actions
+pub(super) fn obstacle_among_facts(parts: Parts<'_>) -> Option<&'static str> {
+    if parts
+        .actions
         .iter()
         .any(|action| !action.over_all.choices.is_empty())
     {
@@ -66,36 +90,67 @@ pub(super) fn obstacle_among_facts(
             "several happenings of one time may keep a disjunctive over-all condition together",
         );
     }
-    let starts = Circles::of(actions, fact_count, |action, uses| {
-        if action.start == NONE {
+    let starts = Circles::of(parts, |action, uses| {
+        let Some(start) = parts.snaps.get(action.start as usize) else {
             return;
-        }
-        let start = &snaps[action.start as usize];
+        };
         let own = literals_after(start);
         for literal in &action.over_all.literals {
             if !own.contains(literal) && !start.condition.literals.contains(literal) {
                 uses.needs.push(*literal);
             }
         }
-        uses.gives = own;
+        start_gives(action, parts, uses);
     });
     if starts.exist() {
         return Some("actions may need each other's start effects from the same moment on");
     }
-    let ends = Circles::of(actions, fact_count, |action, uses| {
-        end_uses(action, snaps, uses);
-        uses.may_wait_for_itself = is_idempotent(action);
+    let ends = Circles::of(parts, |action, uses| {
+        end_uses(action, parts, uses);
+        uses.may_wait_for_itself = is_idempotent(action, parts.snaps);
     });
     ends.exist().then_some(TOGETHER)
+}
+
+/// Returns `true` if actions may need start effects of each other, so that no order of their starts
+/// keeps all over-all conditions.
+pub(super) fn do_starts_depend_on_each_other(parts: Parts<'_>) -> bool {
+    let starts = Circles::of(parts, |action, uses| {
+        let Some(start) = parts.snaps.get(action.start as usize) else {
+            return;
+        };
+        let Parts {
+            snaps,
+            tests,
+            strata,
+            ..
+        } = parts;
+        let changes = Changes::by_start(action, snaps, tests, strata);
+        let needs: Formula = changes.not_made(&action.over_all, tests);
+        needs.visit_literals(&mut |literal| {
+            if !start.condition.literals.contains(&literal) {
+                uses.needs.push(literal);
+            }
+        });
+        start_gives(action, parts, uses);
+    });
+    starts.exist()
 }
 
 const TOGETHER: &str =
     "actions may destroy each other's over-all conditions by ending at the same moment";
 
+/// Notes the literals that a start may bring about. Starts that need one of them come later.
+fn start_gives(action: &Action, parts: Parts<'_>, uses: &mut Uses) {
+    let changes = Changes::by_start(action, parts.snaps, parts.tests, parts.strata);
+    uses.gives = changes.literals.into_iter().collect();
+}
+
 /// An end must come before what destroys its over-all condition.
-fn end_uses(action: &Action, snaps: &[Snap], uses: &mut Uses) {
-    if action.end != NONE {
-        uses.needs = literals_after(&snaps[action.end as usize]);
+fn end_uses(action: &Action, parts: Parts<'_>, uses: &mut Uses) {
+    if let Some(end) = parts.snaps.get(action.end as usize) {
+        let changes = Changes::by(end, parts.tests, parts.strata);
+        uses.needs = changes.literals.into_iter().collect();
         let lasting = &action.over_all.literals;
         uses.gives = lasting.iter().map(|literal| opposite(*literal)).collect();
     }
@@ -128,15 +183,15 @@ struct Circles {
 }
 
 impl Circles {
-    fn of(actions: &[Action], fact_count: usize, look: impl Fn(&Action, &mut Uses)) -> Self {
-        let uses = actions.iter().map(|action| {
+    fn of(parts: Parts<'_>, look: impl Fn(&Action, &mut Uses)) -> Self {
+        let uses = parts.actions.iter().map(|action| {
             let mut uses = Uses::default();
             look(action, &mut uses);
             uses
         });
         Self {
             uses: uses.collect(),
-            literal_count: 2 * fact_count,
+            literal_count: 2 * parts.fact_count,
         }
     }
 

@@ -52,3 +52,33 @@ pub(super) fn visit_changes(
         }
     }
 }
+
+/// Calls `visit` for each fluent that several effects of one moment update, not all of them by
+/// increases and decreases.
+pub(super) fn visit_disputed(action: &ground::Action, visit: &mut impl FnMut(ground::FluentId)) {
+    let mut look = |effects: &[ground::Effect]| {
+        let updates = effects.iter().filter_map(|effect| match &effect.change {
+            ModelChange::Update {
+                operator, fluent, ..
+            } => Some((*fluent, operator.is_additive())),
+            _ => None,
+        });
+        let updates: Vec<_> = updates.collect();
+        for (place, &(fluent, is_additive)) in updates.iter().enumerate() {
+            let others = &updates[..place];
+            if others
+                .iter()
+                .any(|&(other, also)| other == fluent && !(is_additive && also))
+            {
+                visit(fluent);
+            }
+        }
+    };
+    match &action.body {
+        Body::Instantaneous(body) => look(&body.effects),
+        Body::Durative(body) => {
+            look(&body.start.effects);
+            look(&body.end.effects);
+        }
+    }
+}

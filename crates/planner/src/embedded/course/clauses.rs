@@ -1,13 +1,19 @@
 //! Conditions as clauses.
 
+use std::sync::Arc;
+
 use elbowroom_model::Task;
-use elbowroom_model::ground;
+use elbowroom_model::derivation::Rules;
+use elbowroom_model::ground::{self, FactId};
 use elbowroom_model::problem::{
     Atom, Comparison, Condition, Expression, Fluent, ObjectId, PredicateId, Term,
 };
 
 /// Most clauses of one condition.
 const MOST_CLAUSES: usize = 64;
+
+/// Most parts of one condition, with those that replace derived facts.
+const MOST_PARTS: usize = 2_000;
 
 /// A fact, a comparison of numbers, or the negation of one.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -83,56 +89,102 @@ fn fact(predicate: PredicateId, objects: &[ObjectId]) -> Condition {
     })
 }
 
-/// Clauses that together say that the condition has this truth; `None` if it reads derived facts, or
-/// has too many clauses.
+/// Clauses that together say that the condition has this truth. Derived facts are replaced by the bodies of
+/// their rules. `None` if one depends on itself, or there are too many clauses.
 pub(super) fn clauses(
     task: &Task,
     condition: &ground::Condition,
     truth: bool,
     numbers: &mut Numbers,
 ) -> Option<Vec<Vec<Literal>>> {
-    let (parts, is_all) = match condition {
-        ground::Condition::Compare(comparison, left, right) => {
-            let number = (
-                *comparison,
-                lifted_number(task, left),
-                lifted_number(task, right),
-            );
-            let matter = Matter::Number(numbers.position(number));
-            return Some(vec![vec![Literal { matter, truth }]]);
-        }
-        ground::Condition::Fact(fact) => {
-            if task.is_derived(*fact) {
-                return None;
-            }
-            let (predicate, objects) = task.atom(*fact);
-            let matter = Matter::Fact(predicate, objects);
-            return Some(vec![vec![Literal { matter, truth }]]);
-        }
-        ground::Condition::Not(part) => return clauses(task, part, !truth, numbers),
-        ground::Condition::And(parts) => (parts, truth),
-        ground::Condition::Or(parts) => (parts, !truth),
+    let mut unfolding = Unfolding {
+        task,
+        rules: task.rules(),
+        numbers,
+        open: Vec::new(),
+        parts: 0,
     };
-    let mut all: Vec<Vec<Literal>> = if is_all { Vec::new() } else { vec![Vec::new()] };
-    for part in parts {
-        let own = clauses(task, part, truth, numbers)?;
-        if is_all {
-            all.extend(own);
-        } else {
-            let joined = all.iter().flat_map(|clause| {
-                own.iter().map(move |other| {
-                    let mut clause = clause.clone();
-                    clause.extend(other.iter().cloned());
-                    clause
-                })
-            });
-            all = joined.collect();
-        }
-        if all.len() > MOST_CLAUSES {
+    unfolding.clauses(condition, truth)
+}
+
+/// A condition on its way to clauses.
+struct Unfolding<'a> {
+    task: &'a Task,
+    rules: Arc<Rules>,
+    numbers: &'a mut Numbers,
+    /// The derived facts that are being replaced, each part of the definition of the one before.
+    open: Vec<FactId>,
+    /// The number of parts replaced so far.
+    parts: usize,
+}
+
+impl Unfolding<'_> {
+    fn clauses(&mut self, condition: &ground::Condition, truth: bool) -> Option<Vec<Vec<Literal>>> {
+        self.parts += 1;
+        if self.parts > MOST_PARTS {
             return None;
         }
+        let task = self.task;
+        match condition {
+            ground::Condition::Compare(comparison, left, right) => {
+                let number = (
+                    *comparison,
+                    lifted_number(task, left),
+                    lifted_number(task, right),
+                );
+                let matter = Matter::Number(self.numbers.position(number));
+                Some(vec![vec![Literal { matter, truth }]])
+            }
+            ground::Condition::Fact(fact) if task.is_derived(*fact) => {
+                if self.open.contains(fact) {
+                    return None;
+                }
+                let rules = Arc::clone(&self.rules);
+                let bodies = rules.of(*fact).iter().map(|rule| &rule.body);
+                self.open.push(*fact);
+                let found = self.joined(bodies, truth, !truth);
+                self.open.pop();
+                found
+            }
+            ground::Condition::Fact(fact) => {
+                let (predicate, objects) = task.atom(*fact);
+                let matter = Matter::Fact(predicate, objects);
+                Some(vec![vec![Literal { matter, truth }]])
+            }
+            ground::Condition::Not(part) => self.clauses(part, !truth),
+            ground::Condition::And(parts) => self.joined(parts, truth, truth),
+            ground::Condition::Or(parts) => self.joined(parts, truth, !truth),
+        }
     }
-    Some(all)
+
+    /// Clauses that say that all of the parts have this truth, or one of them.
+    fn joined<'c>(
+        &mut self,
+        parts: impl IntoIterator<Item = &'c ground::Condition>,
+        truth: bool,
+        is_all: bool,
+    ) -> Option<Vec<Vec<Literal>>> {
+        let mut all: Vec<Vec<Literal>> = if is_all { Vec::new() } else { vec![Vec::new()] };
+        for part in parts {
+            let own = self.clauses(part, truth)?;
+            if is_all {
+                all.extend(own);
+            } else {
+                let joined = all.iter().flat_map(|clause| {
+                    own.iter().map(move |other| {
+                        let mut clause = clause.clone();
+                        clause.extend(other.iter().cloned());
+                        clause
+                    })
+                });
+                all = joined.collect();
+            }
+            if all.len() > MOST_CLAUSES {
+                return None;
+            }
+        }
+        Some(all)
+    }
 }
 
 /// The condition with objects in the place of numbers of facts.

@@ -3,26 +3,24 @@
 use std::collections::BTreeSet;
 
 use elbowroom_model::ground;
-use elbowroom_model::problem::{
-    Change, Condition, Effect, Expression, Guard, Problem, TimedChange,
-};
+use elbowroom_model::problem::{Change, Condition, Expression, Problem, TimedChange};
 use elbowroom_model::{Modal, Task};
 use elbowroom_num::Rational;
 
 use super::actions::{Changing, add, delete, holds, snaps};
 use super::clauses::{Literal, Matter, Numbers, clauses, lifted};
-use super::regression::{Difficulty, Moment, all, any, not};
+use super::regression::{Moment, all, not};
 use super::{Obstacle, counts_violations};
 
 /// Most clauses that always hold.
 const MOST_CLAUSES: usize = 5_000;
 
 const LONG: Obstacle =
-    Obstacle::Feature("trajectory constraints on derived facts or long formulas");
-const GUARDED: Obstacle = Obstacle::Feature(
+    Obstacle::Feature("trajectory constraints on recursive derived facts or long formulas");
+pub(super) const GUARDED: Obstacle = Obstacle::Feature(
     "trajectory constraints on what effects under conditions of other moments change",
 );
-const MOVING: Obstacle = Obstacle::Feature(
+pub(super) const MOVING: Obstacle = Obstacle::Feature(
     "trajectory constraints on numbers that change continuously, at given times, or in many ways",
 );
 const TOO_MANY: Obstacle = Obstacle::Feature("so many trajectory constraints");
@@ -49,8 +47,18 @@ pub(super) enum Consequence {
     Owes(Change, Condition),
 }
 
+/// The constraints that a problem without constraints accounts for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Coverage {
+    /// All of them, or there is no such problem.
+    All,
+    /// Those that have such a form. The validator rejects the plans that break the others.
+    Expressible,
+}
+
 pub(super) struct Rewriting<'a> {
     pub(super) task: &'a Task,
+    coverage: Coverage,
     pub(super) problem: Problem,
     pub(super) numbers: Numbers,
     pub(super) goals: Vec<Condition>,
@@ -61,21 +69,26 @@ pub(super) struct Rewriting<'a> {
 
 /// The problem without constraints, with these preferences (by position among the task's soft
 /// constraints) among those that are kept.
-pub(super) fn without_constraints(task: &Task, demanded: &[usize]) -> Result<Problem, Obstacle> {
-    let mut rewriting = Rewriting::new(task);
+pub(super) fn without_constraints(
+    task: &Task,
+    demanded: &[usize],
+    coverage: Coverage,
+) -> Result<Problem, Obstacle> {
+    let mut rewriting = Rewriting::new(task, coverage);
     let constraints = task.constraints();
     let soft = demanded
         .iter()
         .flat_map(|&position| &constraints.soft[position].all);
     for modal in constraints.hard.iter().chain(soft) {
-        rewriting.modal(modal)?;
+        let translated = rewriting.modal(modal);
+        rewriting.covered(translated)?;
     }
     rewriting.finish()
 }
 
 /// A problem of which every plan of the task is one: of the constraints, what holds in the end.
 pub(super) fn loosened(task: &Task) -> Problem {
-    let mut rewriting = Rewriting::new(task);
+    let mut rewriting = Rewriting::new(task, Coverage::Expressible);
     for modal in &task.constraints().hard {
         if let Modal::AtEnd(c) | Modal::HoldAfter(_, c) = modal {
             rewriting.goals.push(lifted(task, c));
@@ -86,7 +99,7 @@ pub(super) fn loosened(task: &Task) -> Problem {
 }
 
 impl<'a> Rewriting<'a> {
-    fn new(task: &'a Task) -> Self {
+    fn new(task: &'a Task, coverage: Coverage) -> Self {
         let mut problem = task.problem().clone();
         // What is violated of the preferences, the judge counts in the task itself.
         problem.constraints.clear();
@@ -97,11 +110,21 @@ impl<'a> Rewriting<'a> {
         }
         Self {
             task,
+            coverage,
             goals: vec![problem.goal.clone()],
             own: problem.predicates.len(),
             problem,
             numbers: Numbers::default(),
             watched: Vec::new(),
+        }
+    }
+
+    /// Passes on an obstacle unless it may be left out: `None`, then.
+    pub(super) fn covered<T>(&self, found: Result<T, Obstacle>) -> Result<Option<T>, Obstacle> {
+        match found {
+            Ok(found) => Ok(Some(found)),
+            Err(Obstacle::Feature(_)) if self.coverage == Coverage::Expressible => Ok(None),
+            Err(obstacle) => Err(obstacle),
         }
     }
 
@@ -258,6 +281,14 @@ impl<'a> Rewriting<'a> {
             return Ok(());
         }
         let found = self.clauses(c, true)?;
+        if self.coverage == Coverage::Expressible {
+            let changing = Changing::of(&self.problem);
+            let mut literals = found.iter().flatten();
+            if literals.any(|literal| self.moves(literal, &changing)) {
+                self.hold_at_ends(from, until, c);
+                return Ok(());
+            }
+        }
         let literals = found.iter().flatten();
         let against = literals.flat_map(|literal| self.timed_against(literal));
         let since = against.filter(|time| time <= from).max();
@@ -284,6 +315,23 @@ impl<'a> Rewriting<'a> {
             });
         }
         Ok(())
+    }
+
+    /// Adds an observer at each end of the interval in which a condition on moving numbers has to hold. Between
+    /// them, nothing is demanded.
+    fn hold_at_ends(&mut self, from: &Rational, until: Option<&Rational>, c: &ground::Condition) {
+        let epsilon = self.task.epsilon().clone();
+        let before = until.map(|until| until - &epsilon - &epsilon - &epsilon);
+        let before = before.filter(|before| before > from);
+        for time in [Some(from.clone()), before].into_iter().flatten() {
+            let open = self.predicate("open");
+            self.timed(time.clone(), TimedChange::Add(open, Vec::new()));
+            let close = time + &epsilon + &epsilon;
+            self.timed(close, TimedChange::Delete(open, Vec::new()));
+            let seen = self.predicate("seen");
+            self.look(vec![lifted(self.task, c), holds(open)], vec![add(seen)]);
+            self.goals.push(holds(seen));
+        }
     }
 
     /// Whether a clause holds in the initial state.
@@ -319,12 +367,26 @@ impl<'a> Rewriting<'a> {
         })
     }
 
+    /// Returns `true` if the literal reads a number that does not only change at happenings of actions.
+    fn moves(&self, literal: &Literal, changing: &Changing) -> bool {
+        let Matter::Number(position) = &literal.matter else {
+            return false;
+        };
+        let (_, left, right) = self.numbers.get(*position);
+        let mut moves = false;
+        for side in [left, right] {
+            side.visit_fluents(&mut |fluent| moves |= changing.moving.contains(&fluent.function));
+        }
+        moves
+    }
+
     fn finish(mut self) -> Result<Problem, Obstacle> {
         self.leave_out_what_stays()?;
         self.settle_timed()?;
         let numbers = std::mem::take(&mut self.numbers);
         let problem = self.problem.clone();
-        for schema in &mut self.problem.schemas {
+        let mut schemas = std::mem::take(&mut self.problem.schemas);
+        for schema in &mut schemas {
             let parameters = schema.parameters.clone();
             for (condition, effects) in snaps(&mut schema.body) {
                 let moment = Moment {
@@ -333,7 +395,7 @@ impl<'a> Rewriting<'a> {
                     parameters: &parameters,
                     effects,
                 };
-                let (needs, more) = consequences(&moment, &self.watched).map_err(told)?;
+                let (needs, more) = self.consequences(&moment)?;
                 effects.extend(more);
                 if !needs.is_empty() {
                     let own = std::mem::take(condition);
@@ -341,6 +403,7 @@ impl<'a> Rewriting<'a> {
                 }
             }
         }
+        self.problem.schemas = schemas;
         self.problem.goal = all(self.goals);
         Ok(self.problem)
     }
@@ -382,20 +445,9 @@ impl<'a> Rewriting<'a> {
             if rest.iter().any(|l| rest.contains(&l.clone().negated())) {
                 continue;
             }
-            for literal in &rest {
-                let Matter::Number(position) = &literal.matter else {
-                    continue;
-                };
-                let (_, left, right) = self.numbers.get(*position);
-                let mut moves = false;
-                for side in [left, right] {
-                    side.visit_fluents(&mut |fluent| {
-                        moves |= changing.moving.contains(&fluent.function);
-                    });
-                }
-                if moves {
-                    return Err(MOVING);
-                }
+            if rest.iter().any(|literal| self.moves(literal, &changing)) {
+                self.covered::<()>(Err(MOVING))?;
+                continue;
             }
             if is_never && one.during == (Rational::ZERO, None) && !known.insert(rest.clone()) {
                 continue;
@@ -403,64 +455,11 @@ impl<'a> Rewriting<'a> {
             one.clause = rest;
             kept.push(one);
             if kept.len() > MOST_CLAUSES {
-                return Err(TOO_MANY);
+                self.covered::<()>(Err(TOO_MANY))?;
+                break;
             }
         }
         self.watched = kept;
         Ok(())
     }
-}
-
-fn told(difficulty: Difficulty) -> Obstacle {
-    match difficulty {
-        Difficulty::Guarded => GUARDED,
-        Difficulty::Moving => MOVING,
-    }
-}
-
-/// What a happening needs, and does besides, because of the clauses that it can make false.
-fn consequences(
-    moment: &Moment<'_>,
-    watched: &[Watched],
-) -> Result<(Vec<Condition>, Vec<Effect>), Difficulty> {
-    let mut needs = Vec::new();
-    let mut more = Vec::new();
-    for effect in moment.effects {
-        for one in watched {
-            for literal in &one.clause {
-                let Some(falsifies) = moment.falsifies(effect, literal)? else {
-                    continue;
-                };
-                // Another literal holds after; or this one, because of another effect.
-                let is_regained = match &literal.matter {
-                    Matter::Fact(..) => literal.truth && moment.adds(literal),
-                    Matter::Number(_) => true,
-                };
-                let others = one.clause.iter();
-                let mut ways =
-                    moment.before_any(others.filter(|other| is_regained || *other != literal))?;
-                let (when, change) = match &one.consequence {
-                    Consequence::Never => {
-                        ways.insert(0, not(falsifies));
-                        needs.push(any(ways));
-                        continue;
-                    }
-                    Consequence::Effect(when, change) => (when.clone(), change),
-                    Consequence::Owes(change, _) => (Condition::TRUE, change),
-                };
-                let now = all([when, falsifies]
-                    .into_iter()
-                    .chain(ways.into_iter().map(not)));
-                more.push(Effect {
-                    variables: Vec::new(),
-                    guard: Guard {
-                        now,
-                        ..Guard::default()
-                    },
-                    change: change.clone(),
-                });
-            }
-        }
-    }
-    Ok((needs, more))
 }

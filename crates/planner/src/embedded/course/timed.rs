@@ -5,6 +5,7 @@
 
 use std::collections::BTreeSet;
 
+use elbowroom_model::Modal;
 use elbowroom_model::problem::{Condition, TimedChange};
 use elbowroom_num::Rational;
 
@@ -14,7 +15,18 @@ use super::clauses::{Literal, Matter};
 use super::regression::any;
 use super::rewriting::{Consequence, Rewriting, Watched};
 
+const ENDED: Obstacle = Obstacle::Feature(
+    "trajectory constraints under which timed initials may end what holds once at most",
+);
+
 impl Rewriting<'_> {
+    /// Returns `true` if a clause may be stricter than its constraint: a condition that may hold once counts
+    /// as over where timed initials may have ended it.
+    fn has_rough_clauses(&self) -> bool {
+        let mut constraints = self.task.constraints().hard.iter();
+        constraints.any(|modal| matches!(modal, Modal::AtMostOnce(_)))
+    }
+
     /// The times at which timed initials make a literal false.
     pub(super) fn timed_against(&self, literal: &Literal) -> BTreeSet<Rational> {
         self.timed_to(literal, !literal.truth)
@@ -53,7 +65,8 @@ impl Rewriting<'_> {
                 let is_lost = |l: &&Literal| self.timed_against(l).contains(time);
                 let rest: Vec<Literal> =
                     one.clause.iter().filter(|l| !is_lost(l)).cloned().collect();
-                more.extend(self.settle(&one, time, rest)?);
+                let settled = self.settle(&one, time, rest);
+                more.extend(self.covered(settled)?.flatten());
             }
         }
         self.watched.extend(more);
@@ -74,6 +87,9 @@ impl Rewriting<'_> {
             self.timed(time.clone(), TimedChange::Add(later, Vec::new()));
             self.look(vec![answer.clone(), holds(later)], vec![add(settled)]);
         } else if rest.is_empty() {
+            if self.has_rough_clauses() {
+                return Err(ENDED);
+            }
             return Err(Obstacle::Broken(format!(
                 "the constraint {} is broken at {}",
                 one.constraint,

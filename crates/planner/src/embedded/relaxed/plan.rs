@@ -1,7 +1,9 @@
 //! The relaxed plan: what is read off the cheapest achievers.
 
+use elbowroom_num::Rational;
+
 use super::super::apply::Step;
-use super::super::compile::NONE;
+use super::super::compile::{NONE, Timed};
 use super::super::formula::Literal;
 use super::super::state::State;
 use super::graph::Kind;
@@ -215,7 +217,8 @@ impl Relaxed<'_> {
             });
             literal.holds(&state.facts) && writes.is_some_and(|truth| truth != literal.truth())
         };
-        let undone = compiled.goal.literals.iter().filter(is_lost).count();
+        let mut undone = compiled.goal.literals.iter().filter(is_lost).count();
+        undone += self.lost_tests(state, due);
         if undone == 0 && estimate.steps > 0 {
             return;
         }
@@ -225,11 +228,38 @@ impl Relaxed<'_> {
         }
     }
 
+    /// The number of tests of the goal that pass now, and fail with the values that timed initials will
+    /// assign.
+    fn lost_tests(&self, state: &State, due: &[Timed]) -> usize {
+        let compiled = self.compiled;
+        if compiled.goal.tests.is_empty() || due.iter().all(|timed| timed.assigns.is_empty()) {
+            return 0;
+        }
+        let mut values = state.values.clone();
+        for (fluent, value) in due.iter().flat_map(|timed| &timed.assigns) {
+            values[*fluent as usize] = Some(value.clone());
+        }
+        let is_lost = |&&test: &&u32| {
+            let data = &compiled.tests[test as usize];
+            let after = data.difference.value(&values, None);
+            state.passes(compiled, test, None)
+                && after.is_some_and(|value| !data.comparison.holds(&value, &Rational::ZERO))
+        };
+        compiled.goal.tests.iter().filter(is_lost).count()
+    }
+
     /// Lists the steps whose conditions hold in the state.
     pub(super) fn list_applicable(&mut self, state: &State, estimate: &mut Estimate) {
         for &operator in &self.applicable {
             let kind = self.graph.operators[operator as usize].kind;
-            if !matches!(kind, Kind::Timed(_)) {
+            let is_possible = match kind {
+                Kind::Timed(_) => false,
+                Kind::Start(action) | Kind::Compressed(action) => {
+                    !state.excludes(self.compiled, self.compiled.action(action))
+                }
+                _ => true,
+            };
+            if is_possible {
                 push_steps(kind, state, &mut estimate.applicable);
             }
         }

@@ -8,7 +8,8 @@ use super::super::tuning::{Member, Technique};
 use super::Planner;
 
 impl Planner<'_> {
-    /// The searches that take turns, the complete one last. Where something is used up and filled
+    /// The searches that take turns, the complete one last, or the one that joins happenings of one moment
+    /// where that may be needed. Where something is used up and filled
     /// up, estimates that count it find most plans sooner, but not all. Where actions offer
     /// something while they run, some searches choose happenings in the order of time.
     pub(super) fn strategies(&self) -> Vec<Strategy> {
@@ -58,6 +59,16 @@ impl Planner<'_> {
             }
         }
         add(Member::Complete);
+        if self.frame.compiled.needs_joining {
+            strategies.push(Strategy::JOINING);
+        }
+        if self.frame.compiled.is_symbolic {
+            // Where estimates take for granted what times decide, the best ones can lead away from the goal
+            // for ever.
+            for strategy in strategies.iter_mut().filter(|s| s.is_complete()) {
+                *strategy = strategy.counting_steps();
+            }
+        }
         strategies
     }
 

@@ -3,13 +3,15 @@
 
 use std::sync::Arc;
 
-use elbowroom_model::validate::Report as Verdict;
-use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_model::validate::{self, Verdict};
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan, validate_from};
+use elbowroom_num::work;
 
 use super::super::answer::{Counts, Found, Objective, Phase, Settings};
 use super::super::apply::Step;
 use super::super::bound::MetricBound;
 use super::super::compile::Compiled;
+use super::super::course::{delayed, judged_without_observers};
 use super::super::extract;
 use super::super::needless::without_needless;
 use super::super::search::{Aim, Search, Turn};
@@ -18,6 +20,12 @@ use super::side_by_side::Tell;
 /// How much work lies between two reports, in operators of estimates and what they change: about ten
 /// milliseconds.
 const REPORT_WORK: u64 = 2_000_000;
+
+/// Work that is counted for a turn of a search: a state is made, compared and stored.
+const TURN_WORK: u64 = 8_000;
+
+/// Work that is counted for an operator of an estimate.
+const OPERATOR_WORK: u64 = 5;
 
 /// The number of looked-up pairs that lie between two reports at most: some milliseconds.
 const REPORT_LOOKUPS: u64 = 4_000_000;
@@ -32,6 +40,8 @@ const REPORT_TURNS: u64 = 256;
 #[derive(Clone, Copy)]
 pub(in super::super) struct Frame<'a> {
     pub(in super::super) task: &'a Task,
+    /// The task with constraints on the course of plans, if the search ignores some.
+    pub(in super::super) constrained: Option<&'a Task>,
     pub(in super::super) situation: &'a Situation,
     pub(in super::super) settings: &'a Settings,
     pub(in super::super) compiled: &'a Compiled,
@@ -77,6 +87,8 @@ pub(super) struct Strand<'a, 't> {
     pub(super) phase: Phase,
     /// The work since the last report.
     pub(super) unreported: u64,
+    /// The thread's work when `counts` was last updated.
+    settled: u64,
     pub(super) is_stopped: bool,
     tell: Tell<'t>,
 }
@@ -133,13 +145,15 @@ impl<'a, 't> Strand<'a, 't> {
             counts: Counts::default(),
             phase: Phase::Incomplete,
             unreported,
+            settled: work::spent(),
             is_stopped: false,
             tell,
         }
     }
 
     /// Tells what it has done, for the last time. The work since the last question.
-    pub(super) fn end(self, has_seen_everything: bool) -> u64 {
+    pub(super) fn end(mut self, has_seen_everything: bool) -> u64 {
+        self.settle();
         (self.tell)(Report {
             phase: self.phase,
             counts: self.counts,
@@ -150,6 +164,13 @@ impl<'a, 't> Strand<'a, 't> {
         self.unreported
     }
 
+    /// Counts what the thread has done since this was called last.
+    fn settle(&mut self) {
+        let now = work::spent();
+        self.counts.work += now - self.settled;
+        self.settled = now;
+    }
+
     /// Asks whether to go on.
     pub(super) fn ask(&mut self) -> bool {
         self.report(None, None)
@@ -157,6 +178,7 @@ impl<'a, 't> Strand<'a, 't> {
 
     fn report(&mut self, found: Option<Arc<Best>>, pending: Option<Arc<Best>>) -> bool {
         self.unreported = 0;
+        self.settle();
         let goes_on = (self.tell)(Report {
             phase: self.phase,
             counts: self.counts,
@@ -195,6 +217,10 @@ impl<'a, 't> Strand<'a, 't> {
             (search.labour() - labour).saturating_mul(weight)
                 + (search.lookups() - lookups) / (REPORT_LOOKUPS / REPORT_WORK)
         };
+        let spend_since = |search: &Search<'_>, from: (u64, u64)| {
+            let turns = search.labour() - from.0;
+            work::spend(TURN_WORK * turns + OPERATOR_WORK * work_since(search, from));
+        };
         let mut spent = 0;
         let outcome = loop {
             if spent >= allowance.turns && !self.keeps_its_turn(search, allowance.turns, spent) {
@@ -232,6 +258,7 @@ impl<'a, 't> Strand<'a, 't> {
             is_report_due |= search.labour() - reported.0 >= most_turns
                 || self.unreported + work_since(search, reported) >= REPORT_WORK;
             if is_report_due {
+                spend_since(search, reported);
                 reported = (search.labour(), search.lookups());
                 self.count(&before, search);
                 if !self.ask() {
@@ -240,6 +267,7 @@ impl<'a, 't> Strand<'a, 't> {
             }
         };
         self.count(&before, search);
+        spend_since(search, reported);
         self.unreported += work_since(search, reported);
         (outcome, spent, work_since(search, begin))
     }
@@ -265,6 +293,7 @@ impl<'a, 't> Strand<'a, 't> {
     /// Lets the refiner, or what it is given, count its work, and asks now and then whether to go on.
     pub(super) fn counted(&mut self, before: u64, evaluated: u64, work: u64) -> bool {
         self.counts.evaluated = before + evaluated;
+        work::spend(OPERATOR_WORK * work);
         self.unreported += work;
         self.unreported < REPORT_WORK || self.ask()
     }
@@ -273,17 +302,30 @@ impl<'a, 't> Strand<'a, 't> {
     pub(super) fn judge(&mut self, steps: &[Step]) -> Judged {
         let Frame {
             task,
+            constrained,
             situation,
+            settings,
             compiled,
-            ..
         } = self.frame;
         let judged = extract::plan_of(task, situation, compiled, steps, &mut || self.ask());
         if self.is_stopped {
             return Judged::Stopped;
         }
-        let Some((plan, verdict)) = judged else {
+        let Some((mut plan, mut verdict)) = judged else {
             return Judged::Refused;
         };
+        if let Some(constrained) = constrained
+            && judged_without_observers(constrained, settings, &plan).is_none()
+        {
+            let Some(later) = delayed(constrained, settings, &plan) else {
+                return Judged::Refused;
+            };
+            let strictness = validate::Settings::default();
+            let Verdict::Valid(report) = validate_from(task, situation, &later, &strictness) else {
+                return Judged::Refused;
+            };
+            (plan, verdict) = (later, report);
+        }
         let best = |found| Best {
             found,
             steps: steps.to_vec(),
@@ -292,7 +334,12 @@ impl<'a, 't> Strand<'a, 't> {
         let is_better = whole.is_better_than(self.best.as_deref());
         let pending = is_better.then(|| Arc::clone(&whole));
         let mut goes_on = || self.report(None, pending.clone());
-        let (plan, verdict) = without_needless(task, situation, plan, verdict, &mut goes_on);
+        let (plan, verdict) = if constrained.is_some() {
+            // A constraint may need what the goal does not.
+            (plan, verdict)
+        } else {
+            without_needless(task, situation, plan, verdict, &mut goes_on)
+        };
         if self.is_stopped {
             return Judged::Stopped;
         }
@@ -333,7 +380,7 @@ impl<'a, 't> Strand<'a, 't> {
         });
     }
 
-    fn value(&self, plan: TimeTriggeredPlan, verdict: &Verdict) -> Found {
+    fn value(&self, plan: TimeTriggeredPlan, verdict: &validate::Report) -> Found {
         let task = self.frame.task;
         let makespan = verdict.makespan.clone();
         let metric = verdict.metric(task);

@@ -2,9 +2,12 @@
 
 use std::borrow::Cow;
 
+use elbowroom_num::Rational;
+
 use super::super::apply::{Step, Stepper};
 use super::super::compile::Compiled;
 use super::super::state::State;
+use super::super::symbolic;
 use super::{ROOT, Search};
 
 /// Whether a plan could end here.
@@ -26,6 +29,23 @@ pub(crate) fn is_goal(compiled: &Compiled, state: &State) -> bool {
         let mut passes = |test| state.passes(compiled, test, None);
         compiled.goal.holds(&state.facts, &mut passes)
     }
+}
+
+/// Returns `true` if the numbers that are left after the ends of all running actions do not meet the goal.
+pub(super) fn misses_goal(compiled: &Compiled, state: &State) -> bool {
+    let settled = |fluent| symbolic::settled_value(compiled, state, fluent);
+    !compiled.goal.may_hold(&mut |test| {
+        let test = &compiled.tests[test as usize];
+        let mut values = state.values.clone();
+        let mut is_known = true;
+        test.difference.visit_fluents(&mut |fluent| {
+            let value = settled(fluent);
+            is_known &= value.is_some();
+            values[fluent as usize] = value;
+        });
+        let difference = test.difference.value(&values, None);
+        !is_known || difference.is_none_or(|value| test.comparison.holds(&value, &Rational::ZERO))
+    })
 }
 
 impl Search<'_> {

@@ -11,6 +11,9 @@ impl Search<'_> {
         state: &State,
         projection: Option<&Projection>,
     ) -> bool {
+        if state.joint.is_some() {
+            return false;
+        }
         let Some(similar) = self.known.get(&hash) else {
             return false;
         };
@@ -18,7 +21,7 @@ impl Search<'_> {
         for &number in similar {
             let node = &self.nodes[number as usize];
             let other = &node.state;
-            if other.is_discretely(state) {
+            if other.joint.is_none() && other.is_discretely(state) {
                 let mut is_no_later =
                     self.is_timeless || other.has_no_later_annotations_than(state);
                 is_no_later &= self.step_costs.is_none() || other.cost <= state.cost;

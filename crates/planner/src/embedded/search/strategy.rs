@@ -29,6 +29,11 @@ pub(crate) struct Strategy {
     pub(crate) saves_consumables: bool,
     /// Whether the estimate counts what a relaxed plan uses up, and fills it up.
     pub(crate) replenishes: bool,
+    /// `true` if happenings of one moment may bring about the over-all conditions of each other in any
+    /// order; see [`State::joint`](super::super::state::State::joint).
+    pub(crate) joins: bool,
+    /// `true` if the number of steps that led to a state is added to its estimate.
+    pub(crate) counts_steps: bool,
     /// The aim.
     pub(crate) aim: Aim,
 }
@@ -69,7 +74,15 @@ impl Strategy {
         novelty: None,
         counts_landmarks: false,
         replenishes: false,
+        joins: false,
+        counts_steps: false,
         aim: Aim::Goal,
+    };
+
+    /// Loses nothing, and joins happenings of one moment.
+    pub(crate) const JOINING: Self = Self {
+        joins: true,
+        ..Self::COMPLETE
     };
 
     /// The strategy of that member of the portfolio.
@@ -138,6 +151,14 @@ impl Strategy {
     pub(crate) fn replenishing(self) -> Self {
         Self {
             replenishes: true,
+            ..self
+        }
+    }
+
+    /// The same, adding the number of steps to the estimate.
+    pub(crate) fn counting_steps(self) -> Self {
+        Self {
+            counts_steps: true,
             ..self
         }
     }

@@ -24,6 +24,10 @@ impl Search<'_> {
             self.idle = 0;
             self.turns[0] -= self.compiled.tuning.boost;
         }
+        if self.nodes[number as usize].drift.penalty() > 0 {
+            // The long turn of the preferred successors ends.
+            self.turns[0] = self.turns[0].max(self.turns[1]);
+        }
         if number == 0 {
             self.first_estimate = estimate.steps;
         }
@@ -115,7 +119,11 @@ impl Search<'_> {
             let (overdrawn, estimate) = (estimate / OVERDRAWN, estimate % OVERDRAWN);
             return i64::from(overdrawn) << 48 | i64::from(left) << 24 | i64::from(estimate);
         }
-        let estimate = i64::from(estimate) + self.penalty(number);
+        let drift = self.nodes[number as usize].drift.penalty();
+        let mut estimate = i64::from(estimate) + self.penalty(number) + drift;
+        if self.strategy.counts_steps {
+            estimate += i64::from(self.nodes[number as usize].depth);
+        }
         let (Aim::WeightedAStar(factor), Some(step_costs)) = (self.strategy.aim, &self.step_costs)
         else {
             return estimate;
@@ -135,7 +143,8 @@ impl Search<'_> {
                     .filter(|open| open.action == action)
                     .count()
             };
-            if data.end != NONE && !(data.excludes_itself && self.strategy.is_complete()) {
+            let may_run_twice = !(data.excludes_itself && self.strategy.is_complete());
+            if data.end != NONE && data.exclusion == NONE && may_run_twice {
                 let most = usize::from(self.strategy.is_complete());
                 if runs_already() > most {
                     self.has_lost = true;
@@ -161,6 +170,7 @@ impl Search<'_> {
         let next = self.stepper.apply(state, step)?;
         if let Step::Start(action) = step
             && !self.strategy.is_chronological
+            && !self.strategy.joins
             && self.compiled.action(action).is_compression_safe
             && state.symbolic.is_none()
             && self.relaxed.is_end_the_only_way(&next, action)

@@ -65,6 +65,20 @@ pub(crate) fn not_before(floor: Ticks, compiled: &Compiled) -> Rational {
     compiled.earliest(floor + slack)
 }
 
+/// The exact distance of two nodes, where one bound of it is known exactly, and the network has `rounded`.
+/// That can come from another bound.
+pub(crate) fn exact_distance(
+    rounded: &Rational,
+    known: &Rational,
+    compiled: &Compiled,
+) -> Rational {
+    if rounded - known >= compiled.scale.units(1) {
+        rounded.clone()
+    } else {
+        known.clone()
+    }
+}
+
 /// Whether there are times that meet all demands and the network, and leave what has been spent
 /// within the limit.
 pub(crate) fn is_possible(
@@ -78,6 +92,9 @@ pub(crate) fn is_possible(
     let limit = limit.filter(|(metric, _)| metric.only_grows);
     let is_limited = limit.is_some() && !symbolic.courses.is_empty();
     if !symbolic.has_demands() && !is_limited {
+        return true;
+    }
+    if !is_limited && are_met_at_the_earliest(&state.network, &symbolic.demands, compiled) {
         return true;
     }
     let (mut program, times, end) = program(&state.network, &symbolic.demands, compiled, None);
@@ -95,6 +112,27 @@ pub(crate) fn is_possible(
         program.assert_upper(row, bound, 0);
     }
     program.check().is_ok()
+}
+
+/// Returns `true` if the earliest time of each happening satisfies all demands. That needs no linear program.
+fn are_met_at_the_earliest(
+    network: &Network,
+    demands: &[(Form, Comparison)],
+    compiled: &Compiled,
+) -> bool {
+    let earliest: Vec<Rational> = network
+        .bounds()
+        .map(|bounds| window(bounds, compiled, None).0)
+        .collect();
+    let is_met = |(form, comparison): &(Form, Comparison)| {
+        comparison.holds(&form.at(&earliest), &Rational::ZERO)
+    };
+    // Rounded to ticks, times need not keep the distances between them.
+    let is_kept = |(from, to, distance): (NodeId, NodeId, Ticks)| {
+        let gap = &earliest[usize::from(to)] - &earliest[usize::from(from)];
+        gap >= compiled.scale.units(distance)
+    };
+    demands.iter().all(is_met) && network.edges().all(is_kept)
 }
 
 /// Times that meet all demands and the network; what is known exactly replaces the network's rounded
@@ -210,7 +248,7 @@ fn program(
     for (from, to, distance) in exact.iter().flat_map(|exact| &exact.distances) {
         for edge in &mut distances {
             if (edge.0, edge.1) == (*from, *to) {
-                edge.2.clone_from(distance);
+                edge.2 = exact_distance(&edge.2, distance, compiled);
             }
         }
     }

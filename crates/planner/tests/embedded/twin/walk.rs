@@ -27,6 +27,7 @@ pub(crate) struct Twin<'a> {
     task: &'a Task,
     actions: Vec<Action>,
     sequence: Vec<Choice>,
+    self_overlap: bool,
     budget: usize,
 }
 
@@ -37,7 +38,16 @@ impl<'a> Twin<'a> {
             task,
             actions,
             sequence: Vec::new(),
+            self_overlap: true,
             budget,
+        }
+    }
+
+    /// Allows an action to overlap itself, or not.
+    pub(crate) fn with_self_overlap(self, self_overlap: bool) -> Self {
+        Self {
+            self_overlap,
+            ..self
         }
     }
 }
@@ -84,7 +94,9 @@ impl Twin<'_> {
         let ends = open.iter().map(|&place| Choice::End(place));
         let starts = (0..self.actions.len()).filter(|&number| {
             let takes = 1 + usize::from(self.actions[number].durative().is_some());
-            open.len() + takes <= room
+            let is_running = |place: &usize| self.is_start_of(*place, number);
+            let is_allowed = self.self_overlap || !open.iter().any(is_running);
+            is_allowed && open.len() + takes <= room
         });
         let choices: Vec<Choice> = ends.chain(starts.map(Choice::Start)).collect();
         for choice in choices {
@@ -96,6 +108,10 @@ impl Twin<'_> {
             }
         }
         Some(ControlFlow::Continue(()))
+    }
+
+    fn is_start_of(&self, place: usize, action: usize) -> bool {
+        matches!(self.sequence[place], Choice::Start(own) if own == action)
     }
 
     /// The places of the starts that have not ended.

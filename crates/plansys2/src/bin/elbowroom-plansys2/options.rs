@@ -54,7 +54,7 @@ pub(super) struct ServeOptions {
     #[arg(long, value_name = "COMMAND", default_value = "elbowroom")]
     pub(super) elbowroom: String,
     /// The executor, see `elbowroom run --help`
-    #[arg(long, value_name = "NAME", default_value = "guarded")]
+    #[arg(long, value_name = "NAME", default_value = "live")]
     pub(super) executor: String,
     /// How many seconds a plan may take to be found
     #[arg(long, value_name = "S", default_value = "60")]

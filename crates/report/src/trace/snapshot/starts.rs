@@ -30,9 +30,12 @@ pub struct StartLine {
     /// When it has started, if it has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub started: Option<Exact>,
-    /// When it last gave a sign of life.
+    /// When it last reported progress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heard: Option<Exact>,
+    /// The part that was done then, from 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub completion: Option<Exact>,
     /// When it has ended, if it has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<Exact>,
@@ -45,9 +48,18 @@ pub struct StartLine {
     /// When it was told to stop, if it was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cancelled: Option<Exact>,
+    /// Its time-out, if it has reached it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timed_out: Option<Exact>,
+    /// `true` if it is unknown whether it has come to its end.
+    #[serde(default, skip_serializing_if = "super::is_false")]
+    pub in_doubt: bool,
     /// Until when the plan could bear it when that was warned of.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub warned: Option<Exact>,
+    /// The time-out that the last warning of one was about.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub warned_timeout: Option<Exact>,
     /// What was measured at its start.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub measured_at_start: IndexMap<String, Exact>,
@@ -113,12 +125,16 @@ impl StartLine {
             duration: optional(start.planned.as_ref()),
             ordered: exact(&start.ordered),
             started: optional(start.started.as_ref()),
-            heard: optional(start.heard.as_ref()),
+            heard: optional(start.progress.as_ref().map(|(time, _)| time)),
+            completion: optional(start.progress.as_ref().map(|(_, done)| done)),
             ended: optional(start.ended.as_ref().map(|(time, _)| time)),
             outcome: ending.map(|it| it.name().to_owned()),
             why,
             cancelled: optional(start.cancelled.as_ref()),
+            timed_out: optional(start.timed_out.as_ref()),
+            in_doubt: start.is_in_doubt,
             warned: optional(start.warned.as_ref()),
+            warned_timeout: optional(start.warned_timeout.as_ref()),
             measured_at_start: amounts(&start.measured[0]),
             measured_at_end: amounts(&start.measured[1]),
         }
@@ -149,10 +165,13 @@ impl StartLine {
             planned: inexact(self.duration.as_ref()),
             ordered: self.ordered.0.clone(),
             started: inexact(self.started.as_ref()),
-            heard: inexact(self.heard.as_ref()),
+            progress: inexact(self.heard.as_ref()).zip(inexact(self.completion.as_ref())),
             ended: inexact(self.ended.as_ref()).zip(ending),
             cancelled: inexact(self.cancelled.as_ref()),
+            timed_out: inexact(self.timed_out.as_ref()),
+            is_in_doubt: self.in_doubt,
             warned: inexact(self.warned.as_ref()),
+            warned_timeout: inexact(self.warned_timeout.as_ref()),
             measured: [
                 measured(&self.measured_at_start)?,
                 measured(&self.measured_at_end)?,

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BinaryHeap};
 use super::{ActiveWait, Dispatcher};
 use crate::uncertain::graph::EdgeId;
 use crate::uncertain::{Extended, LinkId};
-use crate::{NodeId, Weight, WindowEnd};
+use crate::{NodeId, Weight, WindowEnd, spend_step};
 
 impl<W: Weight> Dispatcher<W> {
     /// When a link that began then ends at the latest; `None` if there is no such time.
@@ -139,6 +139,7 @@ impl<W: Weight> Dispatcher<W> {
         let mut waiting = Waiting::default();
         self.reach_before(link.end, last, link.end, &mut waiting);
         while let Some((node, time, edge)) = waiting.next() {
+            spend_step();
             if let Some(happened) = self.happened(node) {
                 let happened = Extended::from(happened.clone());
                 if time > happened {
@@ -226,6 +227,7 @@ impl<W: Weight> Waiting<W> {
     /// The next node, until when it waits, and the edge by which that follows.
     fn next(&mut self) -> Option<(NodeId, Extended<W>, EdgeId)> {
         while let Some(Reverse((negated, node))) = self.open.pop() {
+            spend_step();
             let (_, time, edge) = &self.known[self.places[&node]];
             if time.negated() == negated {
                 return Some((node, time.clone(), *edge));

@@ -159,12 +159,15 @@ impl Planner for PastPlanner<'_> {
 
     fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
         self.begun = self.next().unwrap_or(Begun::Past);
-        self.begun == Begun::Past || self.present.begin(task, situation)
+        match self.begun {
+            Begun::Past => self.past.begin(task, situation),
+            Begun::Present => self.present.begin(task, situation),
+        }
     }
 
     fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         match self.begun {
-            Begun::Past => self.past.plan(task, situation),
+            Begun::Past => self.past.collect(task, situation),
             Begun::Present => self.present.collect(task, situation),
         }
     }

@@ -12,7 +12,7 @@ use elbowroom_probability::Likelihoods;
 use elbowroom_report::statistics::Proportion;
 
 use super::{BestPlanRequest, PlanAim, PlanWorth};
-use crate::answers::envelope::{EnvelopeFinding, EnvelopeRequest, envelope};
+use crate::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Search, envelope};
 use crate::answers::plan::Course;
 use crate::answers::{Halt, RequestError, Watcher};
 use crate::execute::{Candidate, Rollouts, Tryout};
@@ -118,7 +118,7 @@ impl Judge<'_> {
                     replanning: None,
                     is_ready: true,
                 };
-                Self::Probability(Box::new(Tryout::new(task, rollouts, &|| true)))
+                Self::Probability(Box::new(Tryout::new(task, rollouts, u64::MAX, &|| true)))
             }
         }
     }
@@ -140,7 +140,7 @@ impl Judge<'_> {
 
 fn room(task: &Arc<Task>, plan: &TimeTriggeredPlan, course: &mut Course<'_>) -> Option<Value> {
     let settings = flow::Settings {
-        objective: Some(Objective::LeastSlack),
+        search: Search::best(Objective::LeastSlack),
         ..flow::Settings::default()
     };
     let request = EnvelopeRequest::new(task, plan.clone()).with_settings(&settings);

@@ -1,6 +1,8 @@
 //! The compiled problem, once all actions are numbered: annotations, timed initials, and what
 //! follows from looking at all actions together.
 
+use std::collections::BTreeSet;
+
 use elbowroom_model::ground::{self, Change as ModelChange, Condition};
 use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Footprint, Situation, TimedHappening};
@@ -79,13 +81,21 @@ impl<'a> Builder<'a> {
         };
         let (now, now_is_exact) = scale.floor(&situation.time);
         let is_symbolic = is_symbolic(&self.actions, situation);
-        let relaxation_incomplete_because =
-            completeness::obstacle_among_facts(&self.actions, &self.snaps, facts.len());
+        let parts = completeness::Parts {
+            actions: &self.actions,
+            snaps: &self.snaps,
+            timed: &timed,
+            tests: &self.symbols.tests,
+            strata: &strata,
+            fact_count: facts.len(),
+        };
+        let relaxation_incomplete_because = completeness::obstacle_among_facts(parts);
+        let starts_depend_on_each_other = relaxation_incomplete_because.is_some()
+            && completeness::do_starts_depend_on_each_other(parts);
+        let numbers = completeness::obstacle_among_numbers(parts);
         let incomplete_because = if is_symbolic {
             Some("values that depend on when things happen")
         } else {
-            let numbers =
-                completeness::obstacle_among_numbers(&self.actions, &self.snaps, facts.len());
             numbers.or(relaxation_incomplete_because)
         };
         let changes_have_values =
@@ -117,6 +127,8 @@ impl<'a> Builder<'a> {
                 && (!is_symbolic || changes_have_values),
             incomplete_because,
             relaxation_incomplete_because,
+            needs_joining: numbers.or(relaxation_incomplete_because).is_some(),
+            starts_depend_on_each_other,
             is_symbolic,
         })
     }
@@ -133,9 +145,24 @@ impl<'a> Builder<'a> {
         stratified(rules, self.task, &self.symbols)
     }
 
+    /// The timed initials after the situation that matter to some happening, condition or number.
     fn coming(&self, situation: &Situation) -> Coming<'a> {
+        let makes = self.separations.iter().flat_map(|s| &s.makes);
+        let is_write = |access: &&Access| matches!(access, Access::Added(_) | Access::Deleted(_));
+        let written: BTreeSet<Access> = makes.filter(is_write).copied().collect();
+        // A fact that nothing reads, and no action writes, keeps nothing apart.
+        let matters = |change: &ModelChange| match change {
+            ModelChange::Add(fact) | ModelChange::Delete(fact) => {
+                self.symbols.known_fact(*fact).is_some()
+                    || written.contains(&Access::Added(*fact))
+                    || written.contains(&Access::Deleted(*fact))
+            }
+            ModelChange::Update { .. } => true,
+        };
         let timed = self.task.timed().iter();
-        let happenings: Vec<_> = timed.filter(|timed| timed.time > situation.time).collect();
+        let happenings: Vec<_> = timed
+            .filter(|timed| timed.time > situation.time && timed.changes.iter().any(matters))
+            .collect();
         let separations = happenings.iter().map(|timed| {
             let footprint = Footprint::of_timed(timed);
             Separations::of(&footprint, &Shifts::default(), self.epsilon, &self.links)
@@ -171,7 +198,15 @@ impl<'a> Builder<'a> {
         for (action, over_all) in self.actions.iter_mut().zip(&self.over_all) {
             let mut needs = Separations::default();
             for conjunct in over_all.conjuncts() {
-                if matches!(conjunct, Condition::Fact(_) | Condition::Not(_)) {
+                let fact = match conjunct {
+                    Condition::Fact(fact) => Some(*fact),
+                    Condition::Not(part) => match **part {
+                        Condition::Fact(fact) => Some(fact),
+                        _ => None,
+                    },
+                    _ => None,
+                };
+                if fact.is_some_and(|fact| !self.task.is_derived(fact)) {
                     needs.needed_until_now(self.task, conjunct, &self.links);
                 }
             }

@@ -4,6 +4,7 @@ use elbowroom_model::ground::{self, Change as ModelChange};
 
 use super::super::{Change, Conditional, Snap, Update};
 use super::Builder;
+use crate::embedded::compile::is_conflict;
 use crate::embedded::formula::Formula;
 
 impl Builder<'_> {
@@ -46,6 +47,10 @@ impl Builder<'_> {
         if !costs.is_empty() {
             let sum = ground::Expression::Add(costs);
             snap.cost = Some(self.symbols.numeric(&sum));
+        }
+        if is_conflict(&snap.updates) {
+            // A choice without alternatives never holds.
+            snap.condition.choices.push(Vec::new());
         }
         // An addition wins over a deletion by the same happening.
         let adds = std::mem::take(&mut snap.adds);

@@ -5,6 +5,8 @@
 //! need (causal links and threats; `McAllester` & Rosenblitt, AAAI 1991; for the reordering of plans:
 //! Siddiqui & Haslum, 2012; Muise, Beck & `McIlraith`, JAIR 57, 2016).
 
+use std::collections::BTreeMap;
+
 use super::super::super::apply::Stepper;
 use super::super::super::compile::{Compiled, NONE};
 use super::super::super::formula::Formula;
@@ -93,6 +95,7 @@ impl<'a> Model<'a> {
         model.find_blocks(ticker)?;
         model.place();
         model.separate(ticker)?;
+        model.keep_apart(ticker)?;
         model.note_changers();
         model.support_all(ticker)?;
         model.demand_all(ticker)?;
@@ -249,6 +252,51 @@ impl<'a> Model<'a> {
             }
         }
         ticker.ask().then_some(())
+    }
+
+    /// Demands that of two instances of an action that must not overlap itself one ends before the other one
+    /// starts.
+    fn keep_apart(&mut self, ticker: &mut Ticker<'_>) -> Option<()> {
+        let mut instances: BTreeMap<u32, Vec<Block>> = BTreeMap::new();
+        for block in &self.blocks {
+            let Some(&first) = block.nodes.first() else {
+                continue;
+            };
+            let item = self.items[first as usize];
+            if item.kind == Kind::Timed {
+                continue;
+            }
+            let exclusion = self.compiled.action(item.action).exclusion;
+            if exclusion != NONE {
+                instances.entry(exclusion).or_default().push(block.clone());
+            }
+        }
+        for blocks in instances.values() {
+            self.size += blocks.len() * blocks.len();
+            ticker.work += 20 * (blocks.len() * blocks.len()) as u64;
+            if self.size > MOST || !ticker.ask() {
+                return None;
+            }
+            for (place, one) in blocks.iter().enumerate() {
+                for other in &blocks[..place] {
+                    if one.start.is_some() && other.start.is_some() {
+                        continue;
+                    }
+                    let clause = [self.follows(one, other), self.follows(other, one)];
+                    self.solver.add(&clause);
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// Returns the literal that one instance starts after the end of the other one.
+    fn follows(&mut self, later: &Block, earlier: &Block) -> u32 {
+        match (earlier.nodes.last(), later.nodes.first(), later.start) {
+            (Some(&end), Some(&start), None) => self.before(end, start),
+            // It was running in the beginning.
+            _ => FALSE,
+        }
     }
 
     /// A pair that may come in either order, with the distances to keep, or that keeps its own.

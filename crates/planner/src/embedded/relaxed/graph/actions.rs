@@ -1,6 +1,12 @@
 //! From actions to operators.
 
-use super::super::super::compile::{Action, Change, Compiled, Compressibility, NONE, Snap, Update};
+use elbowroom_model::problem::Comparison;
+use elbowroom_num::Rational;
+
+use super::super::super::compile::{
+    Action, Change, Compiled, Compressibility, Flow, NONE, Snap, Update,
+};
+use super::super::super::formula::{Numeric, Test};
 use super::super::super::hash::Map;
 use super::super::super::time::{NEVER, Ticks};
 use super::super::numbers;
@@ -49,18 +55,12 @@ impl Graph {
         if action.start != NONE {
             let start = compiled.snap(action.start);
             let mut needs = self.propositions(&start.condition);
-            // What must hold from the start on, and is not the start's own doing. Another start
-            // at the same moment may bring it about, if such a pair exists; see the compiler's
-            // gap.
-            let gained: Vec<u32> = effects_of(start).collect();
-            let over_all = self.propositions(&action.over_all);
-            let tests = self.first_test..self.first_running;
-            needs.extend(
-                over_all
-                    .iter()
-                    .filter(|need| !gained.contains(need) && !tests.contains(need)),
-            );
+            needs.extend(self.propositions(&compiled.needed_before_start(action)));
             needs.extend(stays.needs(compiled, action));
+            let gained: Vec<u32> = effects_of(start).collect();
+            let literals = action.over_all.literals.iter().map(|literal| literal.0);
+            let tests = action.over_all.tests.iter().map(|&test| self.test(test));
+            let over_all: Vec<u32> = literals.chain(tests).collect();
             let is_compressed = compresses
                 .is_some_and(|compresses| action.compressibility >= compresses)
                 && end_needs
@@ -109,9 +109,8 @@ impl Graph {
         let span = if draft.snaps.len() > 1 { least } else { 0 };
         let updates: Vec<&Update> = draft.snaps.iter().flat_map(|snap| &snap.updates).collect();
         let mut gains = self.gains_of(compiled, &updates);
-        // A continuous change may reach any value, from the start to the end.
         for flow in &draft.action.flows {
-            self.add_any_gain(flow.fluent, &mut gains);
+            self.add_flow_gain(compiled, flow, &mut gains);
         }
         let windows = self.windows_of(compiled, draft);
         let operator = self.add(draft.kind, 1, draft.needs.clone(), &effects, gains);
@@ -155,12 +154,41 @@ impl Graph {
         gains
     }
 
+    /// Adds the gains of a continuous change, which may reach any value in its direction.
+    fn add_flow_gain(&self, compiled: &Compiled, flow: &Flow, gains: &mut Vec<(u32, Gain)>) {
+        let Some(rate) = flow.rate.as_constant() else {
+            self.add_any_gain(flow.fluent, gains);
+            return;
+        };
+        for &test in &self.tests_of_fluent[flow.fluent as usize] {
+            let data = &compiled.tests[test as usize];
+            if may_help(data, flow.fluent, rate) {
+                gains.retain(|(known, _)| *known != test);
+                gains.push((test, Gain::Reaches(0)));
+            }
+        }
+    }
+
     /// Adds every gain of the fluent that a test can ask for.
     pub(super) fn add_any_gain(&self, fluent: u32, gains: &mut Vec<(u32, Gain)>) {
         for &test in &self.tests_of_fluent[fluent as usize] {
             gains.retain(|(known, _)| *known != test);
             gains.push((test, Gain::Reaches(0)));
         }
+    }
+}
+
+/// Returns `true` if a test may pass because a fluent grows at a rate.
+fn may_help(test: &Test, fluent: u32, rate: &Rational) -> bool {
+    let Numeric::Linear(linear) = &test.difference else {
+        return !rate.is_zero();
+    };
+    let of_fluent = linear.terms.iter().find(|(other, _)| *other == fluent);
+    let slope = of_fluent.map_or(Rational::ZERO, |(_, coefficient)| coefficient * rate);
+    match test.comparison {
+        Comparison::Less | Comparison::AtMost => slope.is_negative(),
+        Comparison::Equal => !slope.is_zero(),
+        Comparison::AtLeast | Comparison::Greater => slope.is_positive(),
     }
 }
 

@@ -4,11 +4,16 @@
 use elbowroom_num::Rational;
 use elbowroom_verify::no_plan::pairs::{Bounds, Claims, Earliest, Key, Structure};
 
+use super::{Effort, Spent};
+
 /// The most atoms, and the most actions.
 const MOST: usize = 1_000;
 
 /// The most bounds that are looked up: some seconds.
 const MOST_LOOKS: usize = 200_000_000;
+
+/// Bounds that are looked up in one unit of work: see [`Effort`].
+const LOOKS_OF_A_WORK: u64 = 10;
 
 /// What a proof by pairs lacks.
 pub(super) enum Failure {
@@ -21,13 +26,13 @@ pub(super) enum Failure {
 /// Claims that exclude the goal and that follow from each other.
 pub(super) fn claims(
     structure: &Structure<'_>,
-    goes_on: &mut dyn FnMut() -> bool,
+    effort: &mut Effort<'_>,
 ) -> Result<Claims, Failure> {
     if structure.atom_count() > MOST || structure.action_count() > MOST {
         return Err(Failure::TooMany);
     }
     let mut table = Table::of(structure);
-    table.settle(goes_on)?;
+    table.settle(effort)?;
     table.needed()
 }
 
@@ -100,7 +105,7 @@ impl<'a> Table<'a> {
     }
 
     /// Lets everything happen until no bound is lowered any more.
-    fn settle(&mut self, goes_on: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
+    fn settle(&mut self, effort: &mut Effort<'_>) -> Result<(), Failure> {
         let happenings = self.structure.happening_count();
         let mut last = vec![0; happenings];
         let mut looks = 0;
@@ -111,11 +116,11 @@ impl<'a> Table<'a> {
                 if *last > 0 && !self.is_due(happening, *last) {
                     continue;
                 }
-                if !goes_on() {
-                    return Err(Failure::Stopped);
-                }
                 *last = self.round;
-                looks += self.count * (1 + self.structure.needed_by(happening).count());
+                let own = self.count * (1 + self.structure.needed_by(happening).count());
+                looks += own;
+                let spent = effort.spend(1 + own as u64 / LOOKS_OF_A_WORK);
+                spent.map_err(|Spent| Failure::Stopped)?;
                 changed |= self.fire(happening);
             }
             if !changed {

@@ -10,6 +10,8 @@ use elbowroom_verify::no_plan::closed::zone::Zone;
 use elbowroom_verify::no_plan::closed::{Closed, Closure, FIRST_START, NOW, Node, UnderWay, ZERO};
 use elbowroom_verify::no_plan::{Instances, Reached};
 
+use super::{Effort, Spent};
+
 /// The most states.
 const MOST_STATES: usize = 5_000;
 
@@ -18,6 +20,9 @@ const MOST_MADE: usize = 200_000;
 
 /// The most actions under way at one time: where an action may overlap with itself, there is no end of them.
 const MOST_UNDER_WAY: usize = 6;
+
+/// Work that the expansion of a state, and each state that it makes, counts: see [`Effort`].
+const WORK_OF_A_STATE: u64 = 500;
 
 /// Why there is no closed set.
 pub(super) enum Failure {
@@ -33,13 +38,13 @@ pub(super) fn closed(
     task: &Task,
     instances: &Instances,
     reached: &Reached,
-    goes_on: &mut dyn FnMut() -> bool,
+    effort: &mut Effort<'_>,
 ) -> Result<Closed, Failure> {
     let alike = alike(task, instances, reached)?;
     let closure = Closure::of(instances, reached, &alike);
     let closure = closure.map_err(|flaw| Failure::Unknown(flaw.to_string()))?;
-    let states = match states(&closure, false, goes_on) {
-        Err(Failure::InReach | Failure::TooMany) => states(&closure, true, goes_on)?,
+    let states = match states(&closure, false, effort) {
+        Err(Failure::InReach | Failure::TooMany) => states(&closure, true, effort)?,
         other => other?,
     };
     let name = |object: &ObjectId| task.problem().objects[object.index()].name.clone();
@@ -79,7 +84,7 @@ fn alike(
 fn states(
     closure: &Closure<'_>,
     with_times: bool,
-    goes_on: &mut dyn FnMut() -> bool,
+    effort: &mut Effort<'_>,
 ) -> Result<Vec<Node>, Failure> {
     let last = closure.times().last().cloned();
     let mut known: BTreeMap<(Vec<UnderWay>, usize), Vec<usize>> = BTreeMap::new();
@@ -134,14 +139,14 @@ fn states(
     };
     add(closure.initial(), &mut nodes, &mut open)?;
     while let Some(next) = open.pop_front() {
-        if !goes_on() {
-            return Err(Failure::Stopped);
-        }
         let Some(node) = nodes[next].clone() else {
             continue;
         };
         let after = closure.successors(&node);
-        for node in after.map_err(|flaw| Failure::Unknown(flaw.to_string()))? {
+        let after = after.map_err(|flaw| Failure::Unknown(flaw.to_string()))?;
+        let work = WORK_OF_A_STATE * (1 + after.len() as u64);
+        effort.spend(work).map_err(|Spent| Failure::Stopped)?;
+        for node in after {
             add(node, &mut nodes, &mut open)?;
         }
     }

@@ -1,0 +1,96 @@
+//! The promise of an envelope, and the time-outs of its actions.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use elbowroom::answers::envelope::{Chosen, QuantityKind, Room};
+use elbowroom::execution::run::TimeoutRule;
+use elbowroom::num::Rational;
+
+use crate::number;
+use crate::table::{self, Row};
+
+/// The promise, in words.
+pub(super) fn meaning(parameters: &[Room], rows: &[Row]) -> String {
+    let is_duration = |room: &Room| room.range.quantity.kind == QuantityKind::Duration;
+    let has_timeouts = parameters.iter().any(|room| room.range.timeout.is_some());
+    let before = match (parameters, has_timeouts) {
+        (_, false) => "",
+        ([_], _) => ", as long as the action ends before its time-out",
+        (all, _) if all.iter().all(is_duration) => " and ends before its time-out",
+        _ => " and each action ends before its time-out",
+    };
+    let mut meaning = if parameters.len() == 1 {
+        format!("The plan works for any value in the interval{before}.")
+    } else {
+        format!(
+            "The plan works as long as each of these stays inside its interval{before}, whatever \
+             the others do in theirs."
+        )
+    };
+    let critical = rows.iter().filter(|row| row.is_critical()).count();
+    if critical > 0 {
+        let _ = write!(
+            meaning,
+            " Critical (!), with less room than {} %: {critical} of {}.",
+            table::CRITICAL,
+            rows.len()
+        );
+    }
+    meaning
+}
+
+/// The time-out of each action, and the rule that it follows.
+pub(super) fn line(rule: &TimeoutRule, parameters: &[Room], chosen: &[Chosen]) -> Option<String> {
+    /// Of many different time-outs only the most frequent ones are listed.
+    const MOST_LISTED: usize = 4;
+    let open = parameters.iter().filter_map(|room| {
+        let name = room.range.quantity.name.clone();
+        Some((room.range.timeout.clone()?, name))
+    });
+    let told = chosen.iter().filter_map(|one| {
+        let timeout = one.timeout.clone()?;
+        Some((timeout.0, one.action.clone()))
+    });
+    let mut groups: BTreeMap<Rational, Vec<String>> = BTreeMap::new();
+    for (timeout, name) in open.chain(told) {
+        groups.entry(timeout).or_default().push(name);
+    }
+    if groups.is_empty() {
+        return None;
+    }
+    let rule = rule.in_words();
+    let mut groups: Vec<(Rational, Vec<String>)> = groups.into_iter().collect();
+    groups.sort_by_key(|(_, names)| std::cmp::Reverse(names.len()));
+    if let [(timeout, _)] = groups.as_slice() {
+        let timeout = number::nearest(timeout);
+        return Some(if rule == timeout {
+            format!("Time-out of each action: {timeout} (--timeout changes it).")
+        } else {
+            format!("Time-out of each action: {timeout} ({rule}; --timeout changes it).")
+        });
+    }
+    let mut listed: Vec<String> = Vec::new();
+    for (timeout, names) in groups.iter().take(MOST_LISTED) {
+        let named = names.iter().take(MOST_LISTED).cloned();
+        let mut named: Vec<String> = named.collect();
+        if names.len() > MOST_LISTED {
+            named.push(format!("{} more", names.len() - MOST_LISTED));
+        }
+        listed.push(format!(
+            "{} for {}",
+            number::nearest(timeout),
+            named.join(", ")
+        ));
+    }
+    if groups.len() > MOST_LISTED {
+        listed.push(format!(
+            "{} others (--json lists them)",
+            groups.len() - MOST_LISTED
+        ));
+    }
+    Some(format!(
+        "Time-outs ({rule}; --timeout changes them): {}.",
+        listed.join("; ")
+    ))
+}

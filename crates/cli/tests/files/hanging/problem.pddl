@@ -1,0 +1,5 @@
+(define (problem one-parcel)
+  (:domain loading)
+  (:objects left right - robot box - parcel)
+  (:init (waiting box))
+  (:goal (loaded box)))

@@ -1,0 +1,128 @@
+//! Time-outs in an envelope's answer: inside the box *and* before its time-out, no action is
+//! cancelled.
+
+use elbowroom_execution::run::TimeoutRule;
+use elbowroom_num::{End, Rational};
+use elbowroom_plan::{Bound, DecoupledEnvelope, ParameterId, ParametrizedPlan};
+
+use super::Subject;
+use super::answer::Counterexample;
+use crate::answers::Exact;
+
+/// Returns, for each parameter, the time-out of the action whose duration it is, or `None` if it is
+/// no duration, or if time-outs are off.
+pub(super) fn timeouts(plan: &ParametrizedPlan, rule: &TimeoutRule) -> Vec<Option<Rational>> {
+    let mut timeouts = vec![None; plan.parameters.len()];
+    for (_, id) in plan.open_durations() {
+        timeouts[id.index()] = rule.of(&plan.parameter(id).nominal);
+    }
+    timeouts
+}
+
+/// An action that is planned to take longer than its time-out.
+pub(crate) struct PlannedBeyond {
+    action: String,
+    planned: Rational,
+    timeout: Rational,
+}
+
+impl PlannedBeyond {
+    /// Returns the first action of the plan that times out before its planned end.
+    pub(crate) fn find(plan: &ParametrizedPlan, rule: &TimeoutRule) -> Option<Self> {
+        let constraints = plan.plan.constraints.iter();
+        let set = constraints.filter_map(|constraint| {
+            let id = plan.plan.duration_of(constraint)?;
+            match &constraint.lower {
+                lower if *lower != constraint.upper => None,
+                Bound::Finite(planned) => Some((id, planned)),
+                Bound::Parameter(own) => Some((id, &plan.parameter(*own).nominal)),
+                Bound::Infinite => None,
+            }
+        });
+        let told = plan.told.iter().map(|(id, planned)| (*id, planned));
+        set.chain(told).find_map(|(id, planned)| {
+            let timeout = rule.of(planned).filter(|timeout| planned > timeout)?;
+            Some(Self {
+                action: plan.plan.instance(id).action.name.clone(),
+                planned: planned.clone(),
+                timeout,
+            })
+        })
+    }
+
+    /// Returns the mistake and its remedy, for users.
+    pub(crate) fn message(&self) -> String {
+        let Self {
+            action,
+            planned,
+            timeout,
+        } = self;
+        format!(
+            "{action} is planned to take {}, but times out after {}; give a longer --timeout, or \
+             `none`",
+            planned.to_decimal(3),
+            timeout.to_decimal(3),
+        )
+    }
+}
+
+impl Subject<'_> {
+    /// Returns a counterexample if an action of the plan times out even as planned.
+    pub(super) fn planned_beyond(&self) -> Option<Counterexample> {
+        let found = PlannedBeyond::find(self.plan, &self.request.timeout)?;
+        let shortfall = Some(&found.planned - &found.timeout);
+        let values = self.plan.nominal().iter().cloned().collect();
+        Some(self.at_timeout(found.message(), shortfall, values))
+    }
+
+    /// Returns a counterexample if an action can time out inside the box.
+    pub(super) fn beyond_timeout(&self, envelope: &DecoupledEnvelope) -> Option<Counterexample> {
+        let rule = &self.request.timeout;
+        let plan = self.plan;
+        let all = timeouts(plan, rule).into_iter().enumerate();
+        let (id, timeout) = all
+            .filter_map(|(index, timeout)| Some((ParameterId::from(index), timeout?)))
+            .find(|(id, timeout)| match &envelope.interval(*id).upper {
+                End::Closed(upper) | End::Open(upper) => upper > timeout,
+                End::Infinite => true,
+            })?;
+        let interval = envelope.interval(id);
+        let upper = interval.upper.value();
+        let may_take = match upper {
+            Some(upper) => format!("as long as {}", upper.to_decimal(3)),
+            None => "any time".to_owned(),
+        };
+        let message = format!(
+            "{} may be {may_take} in this box, but the action times out after {}; give a smaller \
+             box, a longer --timeout, or `none`",
+            self.explainer.quantity(id),
+            timeout.to_decimal(3),
+        );
+        let lower = interval.lower.value().cloned().unwrap_or_default();
+        let beyond = match upper {
+            Some(upper) => (&timeout + upper) / Rational::from(2),
+            None => timeout.clone() + Rational::ONE,
+        };
+        let mut values: Vec<Rational> = plan.nominal().iter().cloned().collect();
+        values[id.index()] = beyond.max(lower);
+        let shortfall = upper.map(|upper| upper - &timeout);
+        Some(self.at_timeout(message, shortfall, values))
+    }
+
+    fn at_timeout(
+        &self,
+        message: String,
+        shortfall: Option<Rational>,
+        values: Vec<Rational>,
+    ) -> Counterexample {
+        let names = self.plan.parameters.iter().map(|own| own.name.clone());
+        Counterexample {
+            message,
+            shortfall,
+            verdict: None,
+            values: names.zip(values.into_iter().map(Exact)).collect(),
+            schedule: Vec::new(),
+            plays: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Validation of each execution while it is recorded: [`Validated`].
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use elbowroom_execution::run::Stand;
+use elbowroom_execution::{Entry, Recorder};
+use elbowroom_model::Task;
+use elbowroom_report::validation::{Invalid, Validation};
+
+use super::read_goal;
+
+/// A recorder that also gives each entry to the validator.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use elbowroom::execute::{Execution, Validated};
+/// use elbowroom::execution::NoRecord;
+/// use elbowroom::model::{Problem, Task};
+/// use elbowroom::sim::{SimWorld, WorldModel};
+///
+/// let task = Arc::new(Task::new(Problem::default()));
+/// let (recorder, validation) = Validated::new(NoRecord, &task, None);
+/// let model = WorldModel::default();
+/// let report = Execution::of(&task)
+///     .recorded_by(recorder)
+///     .run_in(&mut SimWorld::new(Arc::clone(&task), &model, 0));
+/// assert_eq!(report.verdict.name(), "goal-reached");
+/// assert!(validation.found().is_empty());
+/// ```
+pub struct Validated<'a, R> {
+    inner: R,
+    validation: Findings,
+    told: usize,
+    listener: Option<Listener<'a>>,
+}
+
+type Listener<'a> = Box<dyn FnMut(&Invalid) + Send + 'a>;
+
+/// The validator's findings in a run so far; shared by clones.
+#[derive(Clone)]
+pub struct Findings(Arc<Mutex<Validation<'static>>>);
+
+impl<'a, R: Recorder> Validated<'a, R> {
+    /// Creates the recorder and its findings. `stand` is the snapshot from which the run continues, or
+    /// `None` for a new run.
+    pub fn new(inner: R, task: &Arc<Task>, stand: Option<&Stand>) -> (Self, Findings) {
+        let mut validation = Validation::new(task, read_goal);
+        if let Some(stand) = stand {
+            validation = validation.standing(stand);
+        }
+        let validation = Findings(Arc::new(Mutex::new(validation)));
+        let recorder = Self {
+            inner,
+            validation: validation.clone(),
+            told: 0,
+            listener: None,
+        };
+        (recorder, validation)
+    }
+
+    /// Tells `listener` each of the first findings when it is found, not only at the end of the run.
+    #[must_use]
+    pub fn told_to(mut self, listener: impl FnMut(&Invalid) + Send + 'a) -> Self {
+        self.listener = Some(Box::new(listener));
+        self
+    }
+}
+
+impl Findings {
+    /// Returns the first findings: bugs of this program.
+    pub fn found(&self) -> Vec<Invalid> {
+        self.validation().found().to_vec()
+    }
+
+    fn validation(&self) -> MutexGuard<'_, Validation<'static>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<R: Recorder> Recorder for Validated<'_, R> {
+    fn record(&mut self, entry: &Entry<'_>) {
+        self.inner.record(entry);
+        let mut validation = self.validation.validation();
+        validation.note(entry);
+        let new = validation.found()[self.told..].to_vec();
+        drop(validation);
+        self.told += new.len();
+        if let Some(listener) = &mut self.listener {
+            new.iter().for_each(listener);
+        }
+    }
+
+    fn commit(&mut self) {
+        self.inner.commit();
+    }
+
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        self.inner.begin_anew(stand)
+    }
+}

@@ -1,0 +1,62 @@
+//! Separation of starts and planned ends where the network does not order what interferes.
+
+use std::sync::Arc;
+
+use elbowroom_model::Footprint;
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, Node, NodeId};
+
+use super::{Dispatch, is_instantaneous};
+use crate::executor::StepId;
+use crate::separation::Separation;
+
+impl Dispatch {
+    /// Keeps ε between starts and planned ends and all that interferes with them, also where the network does not
+    /// order them. Happenings before `now`, on the plan's clock, count from the last ε on.
+    pub(crate) fn keeping_apart(mut self, now: &Rational) -> Self {
+        let mut separation = Separation::new(&self.task, &self.origin);
+        for (index, &[start, end]) in self.ends.iter().enumerate() {
+            let id = InstanceId::from(index);
+            let action = (&*self.task, &*self.actions[index]);
+            let is_recent = |time: &&Rational| *time + &self.epsilon > *now;
+            // What was running when the plan began has not started then.
+            if let Some(time) = self.happened(start).filter(is_recent)
+                && !self.resumed.contains(&id)
+            {
+                separation.note(Footprint::of_start(action.0, action.1), time);
+            }
+            if let Some(time) = self.happened(end).filter(is_recent)
+                && start != end
+            {
+                separation.note(Footprint::of_end(action.0, action.1), time);
+            }
+            if self.progress.running.contains(&id) {
+                // With the plan, the rest of a running action begins.
+                let begun = self.happened(start).cloned().unwrap_or_default();
+                let end = begun + self.nominal_duration(id);
+                separation.expect(StepId::from(id).0, action, end);
+            }
+        }
+        self.separation = Some(separation);
+        self
+    }
+
+    /// Returns a time after `now` before which a start has to wait for the sake of separation, or `None` if it may
+    /// happen now. In that case it is taken as happening now.
+    pub(super) fn separated(&mut self, start: NodeId, now: &Rational) -> Option<Rational> {
+        let (Node::Start(id) | Node::Instant(id)) = self.plan.nodes[start.index()] else {
+            return None;
+        };
+        self.separation.as_ref()?;
+        let action = Arc::clone(&self.actions[id.index()]);
+        let duration = self.told_duration(id, now);
+        let duration = (!is_instantaneous(&action)).then_some(&duration);
+        let action = (&*self.task, &*action);
+        let separation = self.separation.as_mut()?;
+        let separated = separation.separated(action, duration, now);
+        if separated.is_none() {
+            separation.start(StepId::from(id).0, action, duration, now);
+        }
+        separated
+    }
+}

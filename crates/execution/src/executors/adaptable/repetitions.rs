@@ -1,0 +1,67 @@
+//! Actions that succeed in the same state again and again: [`Repetitions`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_model::State;
+use elbowroom_model::ground::{FactId, FluentId};
+use elbowroom_num::Rational;
+use elbowroom_plan::InstanceId;
+
+use crate::executor::StepId;
+
+/// Limit on the number of states that are kept; beyond it, all are forgotten.
+const MOST_KEPT: usize = 4096;
+
+/// Facts, numbers and running actions at the start of an action, and the action.
+type Place = (
+    BTreeSet<FactId>,
+    BTreeMap<FluentId, Rational>,
+    Vec<InstanceId>,
+    InstanceId,
+);
+
+/// Number of successes of actions by the state at their start.
+///
+/// An executor that always chooses the same in the same state repeats such a circle for ever, unless the world changes
+/// something by itself. Likelihoods may promise that in a world that never does it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Repetitions {
+    started: BTreeMap<StepId, Place>,
+    successes: BTreeMap<Place, u32>,
+}
+
+impl Repetitions {
+    /// The number of successes of an action after a start in this state.
+    pub(super) fn count(&self, state: &State, running: &[InstanceId], instance: InstanceId) -> u32 {
+        let place = place(state, running, instance);
+        self.successes.get(&place).copied().unwrap_or(0)
+    }
+
+    /// Records the start of an action.
+    pub(super) fn start(
+        &mut self,
+        step: StepId,
+        state: &State,
+        running: &[InstanceId],
+        instance: InstanceId,
+    ) {
+        self.started.insert(step, place(state, running, instance));
+    }
+
+    /// Notes the end of an action.
+    pub(super) fn end(&mut self, step: StepId, succeeded: bool) {
+        let Some(place) = self.started.remove(&step).filter(|_| succeeded) else {
+            return;
+        };
+        if self.successes.len() >= MOST_KEPT {
+            self.successes.clear();
+        }
+        *self.successes.entry(place).or_default() += 1;
+    }
+}
+
+fn place(state: &State, running: &[InstanceId], instance: InstanceId) -> Place {
+    let mut running = running.to_vec();
+    running.sort_unstable();
+    (state.facts.clone(), state.values.clone(), running, instance)
+}

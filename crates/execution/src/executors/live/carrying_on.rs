@@ -1,0 +1,172 @@
+//! Continuation of a plan without a guarantee: only time is lacking, and no other plan was found.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, Node, NodeId, StnPlan};
+use elbowroom_stn::ConsistentNetwork;
+
+use super::{Rest, esterel, promise};
+use crate::dispatch::replan;
+use crate::executor::{Decided, Decision, Executor, Moment};
+use crate::preparation::Region;
+use crate::reason::{About, Cause, Promise, Reason};
+
+/// The reduction of durations that the rest of a plan needs so that it works.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Hope {
+    /// It cannot work, however little it takes.
+    #[default]
+    None,
+    /// More than half.
+    Faint,
+    /// At most half.
+    Fair,
+}
+
+impl Hope {
+    /// The least share of the planned durations that the rest may take.
+    fn share(self) -> Rational {
+        match self {
+            Self::Fair => Rational::new(1, 2),
+            Self::Faint | Self::None => Rational::ZERO,
+        }
+    }
+}
+
+/// A plan that lacks time and is executed nevertheless.
+pub(super) struct CarriedOn {
+    executor: Box<dyn Executor>,
+    /// It is abandoned if there is less hope.
+    hope: Hope,
+    /// There is that much hope until then if nothing ends before; on the world's clock.
+    until: Option<Rational>,
+}
+
+impl CarriedOn {
+    pub(super) fn executor(&self) -> &dyn Executor {
+        self.executor.as_ref()
+    }
+
+    pub(super) fn fork(&self) -> Option<Self> {
+        Some(Self {
+            executor: self.executor.fork()?,
+            hope: self.hope,
+            until: self.until.clone(),
+        })
+    }
+}
+
+impl Rest {
+    /// Returns the hope for the rest of the plan after this reason to abandon it.
+    pub(super) fn hope(&self, reason: &Reason, now: &Rational, region: &mut dyn Region) -> Hope {
+        let lacks_only_time = match (reason.cause, &reason.about) {
+            // The limits of running actions come from numbers and from deadlines.
+            (
+                Cause::Outlived | Cause::GuaranteeLost,
+                Some(About::LaterNumbers | About::Said(_)),
+            ) => self.works_without_deadlines(now, region),
+            _ => promise::lacks_time(reason),
+        };
+        let may_work = |hope: &Hope| lacks_only_time && self.times(*hope, now).is_some();
+        let mut hopes = [Hope::Fair, Hope::Faint].into_iter();
+        hopes.find(may_work).unwrap_or_default()
+    }
+
+    fn times(&self, hope: Hope, now: &Rational) -> Option<ConsistentNetwork> {
+        promise::times_if_faster(&self.dispatch, &self.values, &hope.share(), now)
+    }
+
+    /// Returns until when there is this much hope if nothing ends before; `Err` if there is less.
+    fn hopes_until(&self, hope: Hope, now: &Rational) -> Result<Option<Rational>, ()> {
+        let times = self.times(hope, now).ok_or(())?;
+        let running = self.dispatch.running().iter();
+        let ends = running.filter_map(|it| self.dispatch.latest_end_in(&times, *it));
+        Ok(ends.min())
+    }
+
+    fn works_without_deadlines(&self, now: &Rational, region: &mut dyn Region) -> bool {
+        let rest = Self {
+            ignores_deadlines: true,
+            ..self.clone()
+        };
+        let (plan, values) = rest.remainder(now);
+        region
+            .objection(&self.mission.task, &plan, &values)
+            .is_none()
+    }
+
+    /// Continues by the plan's orderings. Deadlines are ignored from now on; numbers still limit running actions.
+    pub(super) fn carry_on(
+        &mut self,
+        hope: Hope,
+        now: &Rational,
+        region: &mut dyn Region,
+    ) -> Option<CarriedOn> {
+        let until = self.hopes_until(hope, now).ok()?;
+        let executor = esterel::carry_on(self.dispatch.clone(), now)?;
+        self.ignores_deadlines = true;
+        self.limit_by_numbers(now, region);
+        Some(CarriedOn {
+            executor,
+            hope,
+            until,
+        })
+    }
+
+    /// Follows an executor that knows no guarantee, as long as there is hope.
+    pub(super) fn decide_carried_on(
+        &mut self,
+        moment: &Moment<'_>,
+        carried_on: &mut CarriedOn,
+        region: &mut dyn Region,
+    ) -> Decided {
+        let now = moment.now;
+        let is_over = carried_on.until.as_ref().is_some_and(|until| until < now);
+        if !moment.news.is_empty() {
+            // The executor that is followed finds out by itself what prevents the rest.
+            let _ = self.dispatch.take(moment);
+            self.observe(moment);
+            self.limit_by_numbers(now, region);
+        }
+        if !moment.news.is_empty() || is_over {
+            let Ok(until) = self.hopes_until(carried_on.hope, now) else {
+                let reason = Reason::new(Cause::GuaranteeLost).about(About::TooLittleTime);
+                return replan(reason.since(now.clone()));
+            };
+            carried_on.until = until;
+        }
+        if let Some(reason) = self.outlived(now) {
+            return replan(reason);
+        }
+        let mut decided = carried_on.executor.decide(moment);
+        if let Decision::Wait { until } = &mut decided.decision {
+            let epsilon = self.mission.task.epsilon();
+            let hope = carried_on.until.as_ref().map(|until| until + epsilon);
+            let others = self.after_limit().into_iter().chain(hope);
+            *until = others.chain(until.take()).min();
+        }
+        decided.reason.promise = match decided.decision {
+            Decision::Start(_) | Decision::Wait { .. } => Some(Promise::Luck),
+            _ => None,
+        };
+        decided
+    }
+
+    /// Finds the limits of running actions by numbers. Where the rest does not work at all, there are none to find.
+    fn limit_by_numbers(&mut self, now: &Rational, region: &mut dyn Region) {
+        self.limits.clear();
+        if self.durations_move_numbers && self.works_without_deadlines(now, region) {
+            self.find_limits(now, region);
+        }
+    }
+}
+
+/// Allows timed initials to come later, so that nothing has to come before a given time.
+pub(super) fn remove_deadlines(plan: &mut StnPlan) {
+    let nodes = &plan.nodes;
+    for constraint in &mut plan.constraints {
+        let is_timed = matches!(nodes[constraint.to.index()], Node::Timed(_));
+        if constraint.from == NodeId::ZERO && is_timed {
+            constraint.upper = Bound::Infinite;
+        }
+    }
+}

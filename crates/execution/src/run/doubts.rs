@@ -1,0 +1,190 @@
+//! Facts and values that are in doubt, because it is unknown whether an action has come to its end.
+//!
+//! Such a fact counts as false, for planners as for executors, and a fluent keeps its value. The world is asked about them
+//! before a plan is requested. A report on the action's end settles the doubt however late it comes, and so does whatever
+//! the world reports about the facts and values themselves.
+
+use std::sync::Arc;
+
+use elbowroom_model::ground::{Action, Body, SnapAction};
+use elbowroom_num::Rational;
+
+use super::agenda::Todo;
+use super::dead_end::What;
+use super::intake::Remark;
+use super::{MissingPlan, Next, Run, Stop, Verdict};
+use crate::event::{Ending, Measured, Ticket};
+use crate::executor::News;
+use crate::planning::PlanAnswer;
+use crate::progression::Doubt;
+use crate::reason::Reason;
+
+/// The doubts that the world has been asked about.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Inquiry {
+    /// Those that arose until then.
+    until: Option<Rational>,
+    /// `true` until the world has answered.
+    pub(super) is_open: bool,
+}
+
+impl Run<'_> {
+    /// It is unknown whether an action has come to its end, or whether it has started at all.
+    pub(super) fn doubt(&mut self, ticket: Ticket, action: &Action, has_started: bool) {
+        let doubt = Doubt {
+            since: self.now.clone(),
+            ticket,
+            action: action.name.clone(),
+        };
+        for effects in unknown_effects(action, has_started) {
+            self.belief.doubt(effects, &doubt);
+        }
+    }
+
+    /// The end of an action is reported after it has timed out.
+    pub(super) fn ended_after_all(
+        &mut self,
+        ticket: Ticket,
+        time: &Rational,
+        ending: &Ending,
+        measured: &[Measured],
+    ) -> Remark {
+        let entry = self.account.get(ticket)?;
+        let (action, has_started) = (Arc::clone(&entry.action), entry.started.is_some());
+        let started = entry.started.as_ref().unwrap_or(&entry.ordered).clone();
+        let time = &started.clone().max(time.clone());
+        self.account.note_doubt(ticket, false);
+        self.believe_until(time);
+        let (facts, fluents) = if *ending == Ending::Succeeded {
+            self.account.note_end(ticket, time, ending, measured);
+            let effects = unknown_effects(&action, has_started);
+            let duration = time - &started;
+            let belief = &mut self.belief;
+            belief.settle_happened(ticket, &effects, &duration, measured)
+        } else {
+            self.belief.settle(ticket)
+        };
+        for fact in facts {
+            let truth = self.belief.fact(fact);
+            self.note(time, What::Fact(fact, truth));
+            self.news.push(News::Fact(fact));
+        }
+        for fluent in fluents {
+            if let Some(value) = self.belief.value(fluent).cloned() {
+                self.note(time, What::Value(fluent, value));
+            }
+            self.news.push(News::Value(fluent));
+        }
+        self.note_surprise();
+        Some("it had timed out; its effects are known now")
+    }
+
+    /// Asks the world about doubtful facts and values, before a plan is requested, if it has not been asked yet. Returns
+    /// whether it does.
+    pub(super) fn inquire(&mut self, reason: &Reason) -> bool {
+        let (facts, values) = (self.belief.doubtful_facts(), self.belief.doubtful_values());
+        let doubts = facts.values().chain(values.values()).flatten();
+        let latest = doubts.map(|doubt| &doubt.since).max();
+        let inquiry = &self.lost.inquiry;
+        let Some(latest) = latest.filter(|latest| inquiry.until.as_ref() < Some(*latest)) else {
+            return false;
+        };
+        let look = Next::Look {
+            facts: facts.keys().copied().collect(),
+            fluents: values.keys().copied().collect(),
+        };
+        self.lost.inquiry = Inquiry {
+            until: Some(latest.clone()),
+            is_open: true,
+        };
+        self.agenda.push(Todo::Plan(reason.clone()));
+        self.asked = Some(look);
+        true
+    }
+
+    /// Ends the run if the goal holds, but only by the assumptions about doubtful facts: a plan would change nothing.
+    pub(super) fn stop_if_goal_is_in_doubt(&mut self) -> Result<(), Stop> {
+        let is_idle = self.account.open_tickets().next().is_none();
+        if !is_idle || !self.belief.is_goal_in_doubt() {
+            return Ok(());
+        }
+        let why = format!(
+            "whether the goal holds is in doubt: {}",
+            self.doubts_in_words()
+        );
+        Err(Stop::Over(Verdict::NoPlan {
+            why,
+            missing: MissingPlan::InDoubt,
+        }))
+    }
+
+    /// Continues with the present plan, if the executor does, or ends the run. While actions run, doubts may be settled:
+    /// a plan is requested again when one has been, or when the actions have ended.
+    pub(super) fn go_on_without_plan(
+        &mut self,
+        answer: &PlanAnswer,
+        reason: Reason,
+    ) -> Result<(), Stop> {
+        let outcome = self.carry_on_or_stop(self.verdict_without_plan(answer));
+        let running: Vec<Ticket> = self.account.open_tickets().collect();
+        let doubts = self.belief.doubt_count();
+        if outcome.is_err() && !running.is_empty() && doubts > 0 {
+            self.agenda.push(Todo::Plan(reason));
+            self.agenda.push(Todo::Linger(running, doubts));
+            return Ok(());
+        }
+        outcome
+    }
+
+    /// Returns the verdict if the planner has answered this, and no plan. If anything is in doubt, the situation that was
+    /// refuted may not be the real one.
+    fn verdict_without_plan(&self, answer: &PlanAnswer) -> Verdict {
+        let verdict = Verdict::without_plan(answer);
+        let doubts = self.doubts_in_words();
+        let why = match &verdict {
+            _ if doubts.is_empty() => return verdict,
+            Verdict::Unsolvable => answer.why_not().unwrap_or_default(),
+            Verdict::NoPlan {
+                why,
+                missing: MissingPlan::NotFound,
+            } => why,
+            _ => return verdict,
+        };
+        Verdict::NoPlan {
+            why: format!("{why}, but {doubts}"),
+            missing: MissingPlan::InDoubt,
+        }
+    }
+
+    /// The facts and fluents that are in doubt, and the reason; empty if there are none.
+    fn doubts_in_words(&self) -> String {
+        let facts = self.belief.doubtful_facts().iter();
+        let facts = facts.map(|(fact, doubts)| (self.task.fact_name(*fact), doubts));
+        let values = self.belief.doubtful_values().iter();
+        let values = values.map(|(fluent, doubts)| (self.task.fluent_name(*fluent), doubts));
+        let mut by_doubt: Vec<(&Doubt, Vec<String>)> = Vec::new();
+        for (name, doubts) in facts.chain(values) {
+            for doubt in doubts {
+                match by_doubt.iter_mut().find(|(known, _)| *known == doubt) {
+                    Some((_, names)) => names.push(name.clone()),
+                    None => by_doubt.push((doubt, vec![name.clone()])),
+                }
+            }
+        }
+        let doubts = by_doubt.iter().map(|(doubt, names)| {
+            let (since, action) = (doubt.since.to_decimal(3), &doubt.action);
+            let names = names.join(", ");
+            format!("since {since} it is unknown whether {action} has come to its end, so in doubt: {names}")
+        });
+        doubts.collect::<Vec<_>>().join("; ")
+    }
+}
+
+/// The effects that may have taken place if nothing is reported on the action's end.
+fn unknown_effects(action: &Action, has_started: bool) -> Vec<&SnapAction> {
+    match &action.body {
+        Body::Instantaneous(snap) => vec![snap],
+        Body::Durative(body) if has_started => vec![&body.end],
+        Body::Durative(body) => vec![&body.start, &body.end],
+    }
+}

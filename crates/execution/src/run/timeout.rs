@@ -1,0 +1,203 @@
+//! Time-outs of actions: the rule, the warning before a time-out, and the cancellation at it.
+
+use std::fmt;
+use std::str::FromStr;
+
+use elbowroom_num::Rational;
+
+use super::agenda::Todo;
+use super::{Run, UnknownSetting};
+use crate::event::Ticket;
+use crate::record::{Entry, WarningCause};
+
+/// Longest wait for the end of a cancelled action, in seconds of the world.
+const STOPPING: i64 = 600;
+
+/// The same for an action that was cancelled because it had reached its time-out.
+const STOPPING_AFTER_TIMEOUT: i64 = 10;
+
+/// The rule that sets the time-out of each action: the longest time from its start, or from its
+/// last progress, to its end. An action that reaches its time-out is cancelled and counts as
+/// failed.
+///
+/// ```
+/// use elbowroom_execution::run::TimeoutRule;
+/// use elbowroom_num::Rational;
+///
+/// let rule: TimeoutRule = "10x,600".parse()?;
+/// assert_eq!(rule, TimeoutRule::default());
+/// assert_eq!(rule.of(&Rational::from(90)), Some(Rational::from(900)));
+/// assert_eq!(rule.of(&Rational::from(5)), Some(Rational::from(600)));
+/// # Ok::<(), elbowroom_execution::run::UnknownSetting>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum TimeoutRule {
+    /// No action ever times out.
+    Off,
+    /// An action times out after `factor` times its planned duration, but not before `at_least`
+    /// seconds.
+    After {
+        /// Multiple of the planned duration.
+        factor: Rational,
+        /// Shortest time-out; positive.
+        at_least: Rational,
+    },
+}
+
+impl Default for TimeoutRule {
+    /// Ten times the planned duration, at least 600 seconds.
+    fn default() -> Self {
+        Self::After {
+            factor: Rational::from(10),
+            at_least: Rational::from(600),
+        }
+    }
+}
+
+impl TimeoutRule {
+    const OFF: &str = "none";
+
+    /// Returns the time-out of an action with this planned duration, or `None` if time-outs are off.
+    pub fn of(&self, planned: &Rational) -> Option<Rational> {
+        match self {
+            Self::Off => None,
+            Self::After { factor, at_least } => Some((planned * factor).max(at_least.clone())),
+        }
+    }
+
+    /// Returns the rule in words: `10 times the planned duration, at least 600`.
+    pub fn in_words(&self) -> String {
+        match self {
+            Self::Off => "none".to_owned(),
+            Self::After { factor, at_least } if factor.is_zero() => at_least.to_decimal(3),
+            Self::After { factor, at_least } => {
+                let (factor, at_least) = (factor.to_decimal(3), at_least.to_decimal(3));
+                format!("{factor} times the planned duration, at least {at_least}")
+            }
+        }
+    }
+}
+
+impl fmt::Display for TimeoutRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Off => f.write_str(Self::OFF),
+            Self::After { factor, at_least } if factor.is_zero() => at_least.fmt(f),
+            Self::After { factor, at_least } => write!(f, "{factor}x,{at_least}"),
+        }
+    }
+}
+
+impl FromStr for TimeoutRule {
+    type Err = UnknownSetting;
+
+    /// Reads `none`, a positive number of seconds, or `10x,600`.
+    fn from_str(text: &str) -> Result<Self, UnknownSetting> {
+        let number = |text: &str| text.trim().parse::<Rational>().ok();
+        let rule = match text.split_once("x,") {
+            _ if text == Self::OFF => Some(Self::Off),
+            None => number(text).map(|at_least| Self::After {
+                factor: Rational::ZERO,
+                at_least,
+            }),
+            Some((factor, at_least)) => {
+                let numbers = number(factor).zip(number(at_least));
+                numbers.map(|(factor, at_least)| Self::After { factor, at_least })
+            }
+        };
+        let is_sensible = |rule: &Self| match rule {
+            Self::Off => true,
+            Self::After { factor, at_least } => !factor.is_negative() && at_least.is_positive(),
+        };
+        rule.filter(is_sensible).ok_or_else(|| UnknownSetting {
+            text: text.to_owned(),
+            expected: "a time-out: `none`, a positive number of seconds, or `10x,600` for 10 \
+                       times the planned duration, but at least 600 seconds",
+        })
+    }
+}
+
+/// An action that can time out.
+struct Limit {
+    ticket: Ticket,
+    /// When a warning is due; `None` if it was given, or if the action has been cancelled.
+    warn: Option<Rational>,
+    /// When the action times out.
+    until: Rational,
+}
+
+impl Run<'_> {
+    /// The time-outs of the actions that have not ended, on the world's clock.
+    fn limits(&self) -> impl Iterator<Item = Limit> + '_ {
+        let open = self.account.open_tickets();
+        open.filter_map(|ticket| {
+            let entry = self.account.get(ticket)?;
+            if let Some(cancelled) = &entry.cancelled {
+                let stopping = match entry.timed_out {
+                    Some(_) => STOPPING_AFTER_TIMEOUT,
+                    None => STOPPING,
+                };
+                return Some(Limit {
+                    ticket,
+                    warn: None,
+                    until: cancelled + Rational::from(stopping),
+                });
+            }
+            let planned = entry.planned.clone().unwrap_or_default();
+            let timeout = self.settings.timeout.of(&planned)?;
+            let began = entry.started.as_ref().unwrap_or(&entry.ordered);
+            let progress = entry.progress.as_ref().map_or(began, |(time, _)| time);
+            let until = began.max(progress) + &timeout;
+            // A quarter of the time between the planned end and the time-out is left then.
+            let since = if planned < timeout {
+                planned
+            } else {
+                Rational::ZERO
+            };
+            let ahead = (timeout - since) * Rational::new(1, 4);
+            let is_new = entry.warned_timeout.as_ref() != Some(&until);
+            Some(Limit {
+                ticket,
+                warn: is_new.then(|| &until - ahead),
+                until,
+            })
+        })
+    }
+
+    /// Returns when the next warning or time-out is due. An action may end at its time-out, and several
+    /// reports of one moment may come one after the other, so it is cancelled ε later. While an action
+    /// runs that never times out, the end of the run is the last moment to wait for.
+    pub(super) fn next_timeout(&self) -> Option<Rational> {
+        let epsilon = self.task.epsilon();
+        let due = self.limits();
+        let due = due.map(|limit| limit.warn.unwrap_or_else(|| limit.until + epsilon));
+        let mut open = self.account.open_tickets();
+        let end = open.next().map(|_| self.settings.time_limit.clone());
+        due.chain(end).min()
+    }
+
+    /// Warns of time-outs that come near, and cancels the actions that have reached theirs.
+    pub(super) fn check_timeouts(&mut self) {
+        let limits: Vec<Limit> = self.limits().collect();
+        let (expired, running): (Vec<_>, Vec<_>) =
+            limits.into_iter().partition(|limit| limit.until < self.now);
+        let is_due = |limit: &&Limit| limit.warn.as_ref().is_some_and(|warn| *warn <= self.now);
+        for limit in running.iter().filter(is_due) {
+            let Some(entry) = self.account.get(limit.ticket) else {
+                continue;
+            };
+            self.ports.recorder.record(&Entry::Warning {
+                now: &self.now,
+                ticket: limit.ticket,
+                action: &entry.action.name,
+                until: &limit.until,
+                cause: WarningCause::Timeout,
+            });
+            self.account
+                .note_timeout_warning(limit.ticket, &limit.until);
+        }
+        let expired = expired.into_iter().rev();
+        let expired = expired.map(|limit| Todo::TimeOut(limit.ticket, limit.until));
+        self.agenda.extend(expired);
+    }
+}

@@ -1,0 +1,107 @@
+//! The least separation of happenings that interfere, for executors whose networks do not order them.
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::ground::Action;
+use elbowroom_model::{Footprint, Task};
+use elbowroom_num::Rational;
+
+/// Recent and expected happenings, on the plan's clock.
+///
+/// An executor that knows only orderings starts an action as soon as possible. [`separated`](Self::separated)
+/// delays it until neither its start nor its planned end is less than ε from something that interferes.
+#[derive(Clone, Debug)]
+pub(crate) struct Separation {
+    epsilon: Rational,
+    /// Changes of the last ε, each with the first time at which something that interferes may happen.
+    recent: Vec<(Footprint, Rational)>,
+    /// The planned ends of running actions, by a number that the executor chooses.
+    expected: BTreeMap<u32, (Footprint, Rational)>,
+    /// Timed initials, in order of time.
+    timed: Vec<(Footprint, Rational)>,
+}
+
+impl Separation {
+    /// Creates it for a plan whose clock reads 0 at `origin`.
+    pub(crate) fn new(task: &Task, origin: &Rational) -> Self {
+        let timed = task.timed().iter();
+        let timed = timed.map(|it| (Footprint::of_timed(it), &it.time - origin));
+        Self {
+            epsilon: task.epsilon().clone(),
+            recent: Vec::new(),
+            expected: BTreeMap::new(),
+            timed: timed.collect(),
+        }
+    }
+
+    /// Notes a change at `time`.
+    pub(crate) fn note(&mut self, change: Footprint, time: &Rational) {
+        self.recent.push((change, time + &self.epsilon));
+    }
+
+    /// Notes that an action starts at `time` and is expected to take `duration`.
+    pub(crate) fn start(
+        &mut self,
+        number: u32,
+        (task, action): (&Task, &Action),
+        duration: Option<&Rational>,
+        time: &Rational,
+    ) {
+        self.note(Footprint::of_start(task, action), time);
+        if let Some(duration) = duration {
+            self.expect(number, (task, action), time + duration);
+        }
+    }
+
+    /// Notes that a running action is expected to end at `end`.
+    pub(crate) fn expect(&mut self, number: u32, (task, action): (&Task, &Action), end: Rational) {
+        let footprint = Footprint::of_end(task, action);
+        self.expected.insert(number, (footprint, end));
+    }
+
+    /// Notes that an action has ended at `time`; `succeeded` if its end effects took place.
+    pub(crate) fn end(&mut self, number: u32, succeeded: bool, time: &Rational) {
+        let ended = self.expected.remove(&number);
+        if let Some((footprint, _)) = ended.filter(|_| succeeded) {
+            self.note(footprint, time);
+        }
+    }
+
+    /// Returns a time after `now` before which the action must not start, or `None` if it may start now.
+    pub(crate) fn separated(
+        &mut self,
+        (task, action): (&Task, &Action),
+        duration: Option<&Rational>,
+        now: &Rational,
+    ) -> Option<Rational> {
+        self.recent.retain(|(_, separated)| separated > now);
+        let start = Footprint::of_start(task, action);
+        let recent = self.recent.iter();
+        let recent = recent.filter(|(change, _)| change.interferes_with(&start));
+        let recent = recent.map(|(_, separated)| separated.clone());
+        let soon = self.near(&start, now).filter(|time| time > now);
+        let ends = duration.into_iter().flat_map(|duration| {
+            let end = Footprint::of_end(task, action);
+            let times: Vec<Rational> = self.near(&end, &(now + duration)).collect();
+            times.into_iter().map(move |time| time - duration)
+        });
+        recent.chain(soon).chain(ends).max()
+    }
+
+    /// Returns, for each expected happening that interferes and is less than ε from `time`, the first time that is
+    /// separated from it.
+    fn near<'s>(
+        &'s self,
+        footprint: &'s Footprint,
+        time: &'s Rational,
+    ) -> impl Iterator<Item = Rational> + 's {
+        let (from, until) = (time - &self.epsilon, time + &self.epsilon);
+        let first = self.timed.partition_point(|(_, it)| *it <= from);
+        let timed = self.timed[first..].iter();
+        let timed = timed.take_while(move |(_, it)| *it < until);
+        let expected = self.expected.values().chain(timed);
+        let near = expected.filter(move |(_, it)| (it - time).abs() < self.epsilon);
+        let near = near.filter(|(other, _)| other.interferes_with(footprint));
+        near.map(|(_, it)| it + &self.epsilon)
+    }
+}

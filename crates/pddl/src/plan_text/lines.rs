@@ -1,0 +1,186 @@
+//! The lines of a text that form its last plan.
+//!
+//! Each line that is not blank is one of: a comment, a heading that begins another plan, a step, a
+//! mistake, or log text. Log text is skipped before the first and after the last step only, and
+//! only if it holds nothing that may be an action.
+
+use std::ops::Range;
+
+use super::form::Form;
+use super::line::{Line, RawStep, line};
+use super::near::{classical, known_action, possible_action, single_word};
+use super::vocabulary::Vocabulary;
+
+/// Steps of the last plan in a text, in their order, and the lines that are not read.
+#[derive(Default)]
+pub(super) struct LastPlan<'s> {
+    pub(super) steps: Vec<RawStep<'s>>,
+    pub(super) mistakes: Vec<Misread>,
+    /// The number of plans in the text.
+    pub(super) plans: usize,
+    /// The text has other lines than comments and headings.
+    pub(super) has_text: bool,
+}
+
+/// A line that is not read.
+pub(super) struct Misread {
+    pub(super) range: Range<usize>,
+    pub(super) kind: Misreading,
+}
+
+pub(super) enum Misreading {
+    /// It begins like an action; the expected form.
+    Broken(&'static str),
+    /// It may hold an action.
+    Possible,
+    /// It stands between two actions.
+    Between,
+}
+
+/// A line that is not blank.
+enum Entry<'s> {
+    Steps(Vec<RawStep<'s>>),
+    Misread(Misread),
+    Rule(Range<usize>),
+    Noise(Range<usize>),
+}
+
+/// Reads the lines of a text.
+pub(super) fn last_plan<'s>(text: &'s str, vocabulary: &Vocabulary) -> LastPlan<'s> {
+    let mut sections = sections(text, vocabulary);
+    let has_text = sections.iter().any(|section| !section.is_empty());
+    sections.retain(|section| {
+        let is_plan = |entry: &Entry<'_>| matches!(entry, Entry::Steps(_) | Entry::Misread(_));
+        section.iter().any(is_plan)
+    });
+    let plans = sections.len();
+    let mut plan = LastPlan {
+        plans,
+        has_text,
+        ..LastPlan::default()
+    };
+    let mut last = sections.pop().unwrap_or_default();
+    name_words_beside_steps(text, &mut last);
+    for entry in without_log(last) {
+        match entry {
+            Entry::Steps(steps) => plan.steps.extend(steps),
+            Entry::Misread(misread) => plan.mistakes.push(misread),
+            Entry::Rule(range) | Entry::Noise(range) => plan.mistakes.push(Misread {
+                range,
+                kind: Misreading::Between,
+            }),
+        }
+    }
+    plan
+}
+
+/// The lines between headings.
+fn sections<'s>(text: &'s str, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s>>> {
+    let mut sections = vec![Vec::new()];
+    let mut start = 0;
+    for raw in text.split_inclusive('\n') {
+        let shown = raw.trim_end();
+        let indent = shown.len() - shown.trim_start().len();
+        let range = start + indent..start + shown.len();
+        let entry = match line(shown, start) {
+            Line::Blank => None,
+            Line::Heading => {
+                sections.push(Vec::new());
+                let place = known_action(&text[range.clone()], vocabulary);
+                let is_comment = shown[indent..].starts_with(';');
+                place
+                    .filter(|_| !is_comment)
+                    .map(|it| possible(&range, &it))
+            }
+            Line::Rule => Some(Entry::Rule(range)),
+            Line::Noise => Some(match classical(shown, start, vocabulary) {
+                Some(step) => Entry::Steps(vec![step]),
+                None => noise(text, range, vocabulary),
+            }),
+            Line::Steps(steps) => Some(Entry::Steps(steps)),
+            Line::Broken(at, expected) => Some(Entry::Misread(Misread {
+                range: at..at,
+                kind: Misreading::Broken(expected),
+            })),
+        };
+        if let Some(section) = sections.last_mut() {
+            section.extend(entry);
+        }
+        start += raw.len();
+    }
+    sections
+}
+
+/// Log text, unless it may hold an action.
+fn noise<'s>(text: &'s str, range: Range<usize>, vocabulary: &Vocabulary) -> Entry<'s> {
+    match possible_action(&text[range.clone()], vocabulary) {
+        Some(place) => possible(&range, &place),
+        None => Entry::Noise(range),
+    }
+}
+
+/// A line that may hold an action, at a place relative to the line.
+fn possible<'s>(line: &Range<usize>, place: &Range<usize>) -> Entry<'s> {
+    Entry::Misread(Misread {
+        range: line.start + place.start..line.start + place.end,
+        kind: Misreading::Possible,
+    })
+}
+
+/// Marks a single word on the line before or behind the steps of a plan without times: there it may be an action
+/// without arguments.
+fn name_words_beside_steps(text: &str, section: &mut [Entry<'_>]) {
+    let is_untimed = |entry: &Entry<'_>| match entry {
+        Entry::Steps(steps) => steps.iter().all(|step| step.time.is_none()),
+        _ => false,
+    };
+    let place = |entry: &Entry<'_>| match entry {
+        Entry::Noise(range) => Some((range.clone(), single_word(&text[range.clone()])?)),
+        _ => None,
+    };
+    let lines = |range: &Range<usize>| text[range.clone()].matches('\n').count();
+    for index in 0..section.len() {
+        let Some((range, word)) = place(&section[index]) else {
+            continue;
+        };
+        let beside = [index.checked_sub(1), Some(index + 1)];
+        let mut beside = beside
+            .into_iter()
+            .flatten()
+            .filter_map(|it| section.get(it));
+        let is_beside = beside.any(|entry| {
+            let Entry::Steps(steps) = entry else {
+                return false;
+            };
+            let steps = steps.first().map_or(range.clone(), RawStep::range);
+            let between = range.end.min(steps.end)..range.start.max(steps.start);
+            is_untimed(entry) && lines(&between) == 1
+        });
+        if is_beside {
+            section[index] = possible(&range, &word);
+        }
+    }
+}
+
+/// The lines of a plan without log text before the first and after the last step.
+fn without_log(mut section: Vec<Entry<'_>>) -> Vec<Entry<'_>> {
+    let is_step = |entry: &Entry<'_>| matches!(entry, Entry::Steps(_));
+    let first = section.iter().position(is_step);
+    let last = section.iter().rposition(is_step);
+    // Contingent-FF rules off the levels of its tree.
+    let is_tree = section.iter().any(|entry| match entry {
+        Entry::Steps(steps) => steps.iter().any(|step| step.form == Form::ContingentFf),
+        _ => false,
+    });
+    let mut index = 0;
+    section.retain(|entry| {
+        let is_inside = first.is_some_and(|it| it <= index) && last.is_some_and(|it| index <= it);
+        index += 1;
+        match entry {
+            Entry::Rule(_) => is_inside && !is_tree,
+            Entry::Noise(_) => is_inside,
+            Entry::Steps(_) | Entry::Misread(_) => true,
+        }
+    });
+    section
+}

@@ -1,0 +1,287 @@
+//! Text that may contain an action, although the reader cannot parse it.
+//!
+//! Log text around a plan is skipped. A mistyped action must not be skipped with it, because the
+//! verdict would be about another plan than the one written. So text that looks like an action
+//! in any way is an error.
+
+use std::ops::Range;
+
+use super::form::Form;
+use super::line::{RawStep, Word};
+use super::vocabulary::Vocabulary;
+
+/// Phrases of planners with words in parentheses, in lower case.
+const HARMLESS: &[&str] = &["(ignoring no-moving-targets-rule)"];
+
+/// A piece of a line.
+#[derive(Clone, Copy)]
+enum Piece<'s> {
+    Word {
+        text: &'s str,
+        at: usize,
+    },
+    /// An opening parenthesis; `is_attached` to the word before, as in `step(s)`.
+    Open {
+        at: usize,
+        is_attached: bool,
+    },
+    Close,
+    Comma,
+    Other,
+}
+
+impl Piece<'_> {
+    fn is_word(&self) -> bool {
+        matches!(self, Self::Word { .. })
+    }
+
+    fn is_object(&self, vocabulary: &Vocabulary) -> bool {
+        matches!(self, Self::Word { text, .. } if vocabulary.object(text).is_some())
+    }
+}
+
+/// Returns the place of a possible action in `text`, relative to its beginning.
+///
+/// Possible actions are:
+///
+/// - the name of an action in or before parentheses, with all its arguments, or after a number;
+/// - the name of an action, and as many of the objects as it has parameters anywhere behind it;
+/// - a line that begins with the name of an action, and has one of the objects, or nothing but numbers;
+/// - words in parentheses on a line with a number;
+/// - a number, words, and a number in brackets;
+/// - words and a whole number in parentheses, or a word and nothing but objects.
+pub(super) fn possible_action(text: &str, vocabulary: &Vocabulary) -> Option<Range<usize>> {
+    let pieces = pieces(text);
+    known_action(text, vocabulary)
+        .or_else(|| words_and_number(text, &pieces))
+        .or_else(|| words_and_duration(text, &pieces))
+        .or_else(|| leading_name(&pieces, vocabulary))
+        .or_else(|| words_and_cost(text, &pieces))
+        .or_else(|| word_and_objects(&pieces, vocabulary))
+}
+
+/// Returns the place of a text that is a single word, such as the name of an action without arguments.
+pub(super) fn single_word(text: &str) -> Option<Range<usize>> {
+    match pieces(text)[..] {
+        [Piece::Word { text, at }] if text.starts_with(char::is_alphabetic) => {
+            Some(at..at + text.len())
+        }
+        _ => None,
+    }
+}
+
+/// Returns the place of a possible action of the domain in `text`.
+pub(super) fn known_action(text: &str, vocabulary: &Vocabulary) -> Option<Range<usize>> {
+    let pieces = pieces(text);
+    // Counted once, so that long lines are read in time in proportion to their length.
+    let mut objects = pieces.iter().filter(|it| it.is_object(vocabulary)).count();
+    (0..pieces.len()).find_map(|index| {
+        objects -= usize::from(pieces[index].is_object(vocabulary));
+        named_action(&pieces, index, objects, vocabulary)
+    })
+}
+
+/// Returns the place of an action name that may begin an action. `objects` of the pieces behind it are objects.
+fn named_action(
+    pieces: &[Piece<'_>],
+    index: usize,
+    objects: usize,
+    vocabulary: &Vocabulary,
+) -> Option<Range<usize>> {
+    let Piece::Word { text, at } = pieces[index] else {
+        return None;
+    };
+    let Some(parameters) = vocabulary.parameters(text) else {
+        // A number that sticks to the name: `6snap`.
+        let name = text.trim_start_matches(|c: char| !c.is_alphabetic());
+        let is_stuck = is_number(text) && vocabulary.parameters(name).is_some();
+        return is_stuck.then_some(at..at + text.len());
+    };
+    let before = index.checked_sub(1).map(|before| pieces[before]);
+    let is_opened = matches!(before, Some(Piece::Open { .. }))
+        || matches!(
+            pieces.get(index + 1),
+            Some(Piece::Open {
+                is_attached: true,
+                ..
+            })
+        );
+    let number = pieces[..index]
+        .iter()
+        .rev()
+        .find(|piece| !matches!(piece, Piece::Other | Piece::Comma));
+    let is_numbered = matches!(number, Some(Piece::Word { text, .. }) if is_number(text));
+    let has_arguments = parameters > 0 && objects >= parameters;
+    (is_opened || is_numbered || has_arguments).then_some(at..at + text.len())
+}
+
+/// An action at the beginning of the line with a part of its arguments: `charge [3]`, `go: r1`.
+fn leading_name(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> {
+    let first = pieces.iter().position(Piece::is_word)?;
+    let Piece::Word { text, at } = pieces[first] else {
+        return None;
+    };
+    vocabulary.parameters(text)?;
+    let mut words = pieces[first + 1..].iter().filter(|piece| piece.is_word());
+    let has_object = words.clone().any(|piece| piece.is_object(vocabulary));
+    let has_numbers_only =
+        words.all(|piece| matches!(piece, Piece::Word { text, .. } if is_number(text)));
+    (has_object || has_numbers_only).then_some(at..at + text.len())
+}
+
+/// `jump high (1)`: Fast Downward prints the cost behind each action.
+fn words_and_cost(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
+    let (before, cost) = text.trim_end().strip_suffix(')')?.rsplit_once('(')?;
+    let is_cost = !cost.is_empty() && cost.bytes().all(|byte| byte.is_ascii_digit());
+    let is_plain = |c: char| c.is_alphanumeric() || c.is_whitespace() || matches!(c, '-' | '_');
+    let Some(&Piece::Word { text, at }) = pieces.first() else {
+        return None;
+    };
+    let is_name = text.starts_with(char::is_alphabetic);
+    (is_cost && is_name && before.chars().all(is_plain)).then_some(at..at + text.len())
+}
+
+/// `jump r1 l2`: every word behind the first is an object.
+fn word_and_objects(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> {
+    let (&Piece::Word { text, at }, objects) = pieces.split_first()? else {
+        return None;
+    };
+    let is_action = text.starts_with(char::is_alphabetic)
+        && !objects.is_empty()
+        && objects.iter().all(|piece| piece.is_object(vocabulary));
+    is_action.then_some(at..at + text.len())
+}
+
+/// Words in parentheses on a line with a number.
+fn words_and_number(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
+    let lower = text.to_ascii_lowercase();
+    if HARMLESS.iter().any(|phrase| lower.contains(phrase)) {
+        return None;
+    }
+    let mut group = None;
+    let mut has_number = false;
+    let mut index = 0;
+    while let Some(piece) = pieces.get(index) {
+        index += 1;
+        match *piece {
+            Piece::Open { at, is_attached } => {
+                // Up to the next parenthesis, so that all groups together are read once.
+                let inside = text[at + 1..].split(['(', ')']).next().unwrap_or("");
+                let behind = text[at + 1 + inside.len()..].strip_prefix(')');
+                // POPF: `b (10.000 | 0.100)`.
+                if inside.contains('|') && !inside.contains(char::is_alphabetic) {
+                    let rest = pieces[index..].iter();
+                    index += rest.take_while(|it| !matches!(it, Piece::Close)).count();
+                    continue;
+                }
+                let is_named = inside.trim_start().starts_with(char::is_alphabetic);
+                let is_word = !inside.trim().contains(char::is_whitespace);
+                // A unit or kind, as in `Planning Time (msec): 200`; a plural, as in `step(s)`.
+                let is_label = is_word && behind.is_some_and(|it| it.starts_with([':', '=']))
+                    || is_attached && matches!(inside, "s" | "es" | "n");
+                if is_named && !is_label {
+                    group.get_or_insert(at..at + 1);
+                }
+            }
+            Piece::Word { text, .. } => has_number |= is_number(text),
+            Piece::Close | Piece::Comma | Piece::Other => {}
+        }
+    }
+    group.filter(|_| has_number)
+}
+
+/// `6 launch rocket [3]`
+fn words_and_duration(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
+    let mut words = pieces.iter().filter_map(|piece| match *piece {
+        Piece::Word { text, at } => Some((text, at)),
+        _ => None,
+    });
+    let ((time, _), (name, at)) = (words.next()?, words.next()?);
+    let is_action = is_number(time) && name.starts_with(char::is_alphabetic);
+    let mut brackets = text.split('[').skip(1);
+    let has_duration = brackets.any(|inside| is_number(inside.trim_start()));
+    (is_action && has_duration).then_some(at..at + name.len())
+}
+
+/// The whole text as the step of a plan without times: `name argument …`, perhaps with a cost as
+/// Fast Downward prints it, `(1)`.
+pub(super) fn classical<'s>(
+    text: &'s str,
+    start: usize,
+    vocabulary: &Vocabulary,
+) -> Option<RawStep<'s>> {
+    let text = match text.split_once(';') {
+        Some((before, _)) => before,
+        None => text,
+    };
+    let trimmed = text.trim_end();
+    let is_cost = |cost: &str| !cost.is_empty() && cost.bytes().all(|byte| byte.is_ascii_digit());
+    let text = match trimmed.strip_suffix(')').and_then(|it| it.rsplit_once('(')) {
+        Some((before, cost)) if is_cost(cost) => before,
+        Some(_) => return None,
+        None => trimmed,
+    };
+    let words: Vec<Word<'_>> = pieces(text)
+        .into_iter()
+        .map(|piece| match piece {
+            Piece::Word { text, at } => Some(Word {
+                text,
+                range: start + at..start + at + text.len(),
+            }),
+            _ => None,
+        })
+        .collect::<Option<_>>()?;
+    let (name, arguments) = words.split_first()?;
+    let is_action = vocabulary.parameters(name.text)? == arguments.len()
+        && arguments
+            .iter()
+            .all(|it| vocabulary.object(it.text).is_some());
+    is_action.then_some(RawStep {
+        form: Form::FastDownward,
+        time: None,
+        words,
+        duration: None,
+        unit: None,
+        counter: None,
+    })
+}
+
+fn pieces(text: &str) -> Vec<Piece<'_>> {
+    let mut pieces = Vec::new();
+    let mut word: Option<usize> = None;
+    for (at, character) in text.char_indices().chain([(text.len(), ' ')]) {
+        let is_part = !character.is_whitespace() && !"()[]{}<>,;:=\"'`|#*".contains(character);
+        if is_part {
+            word.get_or_insert(at);
+            continue;
+        }
+        let mut is_attached = false;
+        if let Some(from) = word.take() {
+            let whole = &text[from..at];
+            // A full stop, a bullet or a dash is no part of a name.
+            let trimmed = whole.trim_end_matches(['.', '!', '?']);
+            if trimmed.chars().any(char::is_alphanumeric) {
+                is_attached = trimmed.len() == whole.len();
+                let text = trimmed.trim_start_matches(['+', '-', '~', '.']);
+                let at = from + trimmed.len() - text.len();
+                pieces.push(Piece::Word { text, at });
+            } else {
+                pieces.push(Piece::Other);
+            }
+        }
+        match character {
+            '(' => pieces.push(Piece::Open { at, is_attached }),
+            ')' => pieces.push(Piece::Close),
+            ',' => pieces.push(Piece::Comma),
+            _ if character.is_whitespace() => {}
+            _ => pieces.push(Piece::Other),
+        }
+    }
+    pieces
+}
+
+/// Returns `true` if the word is a number, perhaps with a sign before and a unit behind.
+fn is_number(word: &str) -> bool {
+    word.trim_start_matches(|c: char| !c.is_alphanumeric())
+        .starts_with(|c: char| c.is_ascii_digit())
+}

@@ -1,0 +1,446 @@
+//! No action of a plan's text is dropped: it is read, or an error names its line.
+
+mod reading;
+
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_pddl::{Diagnostic, Diagnostics, Source, read_plan, write_plan};
+use proptest::prelude::*;
+use reading::{domain, problem, task};
+
+fn house() -> Task {
+    let domain = domain(
+        "(:durative-action walk :parameters (?from ?to - room) :duration (= ?duration 4))
+         (:durative-action wait :duration (>= ?duration 1) :effect (at end (lit)))
+         (:action snap :parameters (?b - ball))",
+    );
+    task(&domain, &problem("(:init) (:goal (lit))"))
+}
+
+fn read(text: &str) -> Result<(TimeTriggeredPlan, Vec<Diagnostic>), Diagnostics> {
+    read_plan(&Source::new("plan", text), &house())
+}
+
+/// The plan in a text, written out again on one line.
+fn plan(text: &str) -> String {
+    match read(text) {
+        Ok((plan, _)) => write_plan(&house(), &plan).trim_end().replace('\n', "; "),
+        Err(found) => panic!("{}", found.render(false)),
+    }
+}
+
+/// The messages of the warnings.
+fn notes(text: &str) -> String {
+    let (_, notes) = read(text).unwrap_or_else(|found| panic!("{}", found.render(false)));
+    let messages: Vec<_> = notes.into_iter().map(|note| note.message).collect();
+    messages.join("\n")
+}
+
+/// Line and message of the errors.
+fn errors(text: &str) -> String {
+    let Err(found) = read(text) else {
+        return "none".to_owned();
+    };
+    let errors: Vec<_> = found
+        .errors()
+        .map(|error| format!("{}: {}", error.line(), error.message))
+        .collect();
+    errors.join("\n")
+}
+
+/// Lines that resemble an action: prefix, time, separator, action, suffix.
+fn nearly_an_action() -> impl Strategy<Value = String> {
+    let before = prop::sample::select(vec![
+        "",
+        " ",
+        "- ",
+        "* ",
+        "> ",
+        "1. ",
+        "2) ",
+        "// ",
+        "# ",
+        "[INFO] ",
+        "t=",
+        "at ",
+        "step ",
+        "| ",
+        "12:30 ",
+        "12:30:45 ",
+        "+",
+        "~",
+        "(",
+        "\"",
+    ]);
+    let time = prop::sample::select(vec![
+        "6", "6.5", "06", "6s", "6 s", "6 min", "0x6", "6,5", "6/1", "1e1", "-6", "6.", ".6", "",
+    ]);
+    let between = prop::sample::select(vec![
+        ": ", ":", " ", " : ", "; ", " - ", "= ", ") ", ", ", "\t", " -> ", "::", ". ", "",
+    ]);
+    let action = prop::sample::select(vec![
+        "(snap b1)",
+        "(SNAP B2)",
+        "( snap b1 )",
+        "(walk hall kitchen)",
+        "(wait)",
+        "(snap b1",
+        "((snap b1))",
+        "[snap b1]",
+        "{snap b1}",
+        "snap(b1)",
+        "walk(hall, kitchen)",
+        "snap b1",
+        "walk hall kitchen",
+        "start (wait)",
+        "(launch rocket)",
+        "(snap rocket)",
+        "launch(rocket)",
+        "(walk hall)",
+        "(snap b1) (snap b2)",
+    ]);
+    let behind = prop::sample::select(vec![
+        "",
+        " [4]",
+        "[4]",
+        " 4",
+        " [4",
+        " 4]",
+        " [4 s]",
+        " [D:4; C:1]",
+        " [4; 5]",
+        " ; done",
+        " done",
+        " (1)",
+        " [4] [4]",
+        ",",
+        " #1",
+        " [4] 8",
+        " [4 ; 9: (wait) [4]",
+    ]);
+    (before, time, between, action, behind)
+        // `6snap` is another name.
+        .prop_filter("a name", |(_, time, between, action, _)| {
+            time.is_empty() || !between.is_empty() || !action.starts_with(char::is_alphabetic)
+        })
+        .prop_map(|(before, time, between, action, behind)| {
+            format!("{before}{time}{between}{action}{behind}")
+        })
+}
+
+const PLAN: [&str; 3] = [
+    "0: (wait) [2]",
+    "2.001: (walk hall kitchen) [4]",
+    "7: (snap b1)",
+];
+
+/// Text that planners print before and after plans.
+fn log_text() -> impl Strategy<Value = &'static str> {
+    prop::sample::select(vec![
+        "",
+        "; States evaluated: 4",
+        "b (10.000 | 0.100)b (8.000 | 0.200)(G)",
+        "Initial heuristic = 9.000, admissible cost estimate 0.000",
+        "80% of the ground temporal actions in this problem are compression-safe",
+        "Solution with original makespan 12 found (ignoring no-moving-targets-rule).",
+        "Plan length: 3 step(s).",
+        "Planning Time (msec): 200",
+        "[t=0.003s, 10084 KB] Evaluated 6 state(s).",
+        "Cueing down from goal distance:    4 into depth [1][2]",
+        "                                   3            [1]",
+        "Total time:      0.01",
+        "-------------",
+        "```",
+        "3. This is the plan of today:",
+    ])
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4000))]
+
+    #[test]
+    fn line_that_is_nearly_an_action_is_read_or_named(
+        line in nearly_an_action(),
+        at in 0..=PLAN.len(),
+        head in log_text(),
+        tail in log_text(),
+    ) {
+        // Words that are no action, and no number: log text.
+        prop_assume!(!line.contains("launch") || line.contains(|c: char| c.is_ascii_digit()));
+        prop_assume!(!line.trim_start().starts_with(';'));
+        let mut lines = vec![head];
+        lines.extend(&PLAN[..at]);
+        lines.push(&line);
+        lines.extend(&PLAN[at..]);
+        lines.push(tail);
+        let text = lines.join("\n");
+        match read(&text) {
+            Ok((plan, _)) => {
+                let shown = write_plan(&house(), &plan);
+                // `(snap b1) (snap b2)` are two.
+                prop_assert!(plan.steps.len() > PLAN.len(), "dropped from\n{text}\n->\n{shown}");
+                for step in ["0.000: (wait) [2.000]", "2.001: (walk hall kitchen) [4.000]", "7.000: (snap b1)"] {
+                    prop_assert!(shown.contains(step), "{step} is gone from\n{text}\n->\n{shown}");
+                }
+            }
+            Err(found) => {
+                let is_named = found.errors().any(|error| error.line() == at + 2);
+                prop_assert!(is_named, "no error at line {}\n{text}\n{found}", at + 2);
+            }
+        }
+    }
+
+    #[test]
+    fn log_text_around_a_plan_changes_nothing(head in log_text(), tail in log_text()) {
+        let text = [&[head], &PLAN[..], &[tail]].concat().join("\n");
+        prop_assert_eq!(plan(&text), plan(&PLAN.join("\n")));
+    }
+
+    #[test]
+    fn log_text_between_actions_is_an_error_or_begins_a_plan(text in log_text(), at in 1..PLAN.len()) {
+        let lines = [&PLAN[..at], &[text], &PLAN[at..]].concat().join("\n");
+        match read(&lines) {
+            Ok((plan, notes)) if text.is_empty() => {
+                prop_assert!(plan.steps.len() == PLAN.len() && notes.is_empty());
+            }
+            Ok((_, notes)) => prop_assert!(notes[0].message.contains("2 plans in one text"), "{lines}"),
+            Err(found) => prop_assert!(found.errors().all(|error| error.line() == at + 1), "{found}"),
+        }
+    }
+
+    #[test]
+    fn no_text_makes_the_reader_panic(text in "([ -~]{0,30}\n?){0,6}") {
+        let _ = read(&text);
+    }
+}
+
+#[test]
+fn text_between_actions_is_an_error_with_its_line() {
+    assert_eq!(
+        errors("0: (wait) [2]\nand then\n3: (snap b1)"),
+        "2: this line between actions is not an action of a plan"
+    );
+    assert_eq!(errors("0: (wait) [2]\n; and then\n\n3: (snap b1)"), "none");
+    assert_eq!(
+        errors("0: (wait) [2]\n-----\n3: (snap b1)")
+            .split(':')
+            .next(),
+        Some("2")
+    );
+}
+
+#[test]
+fn text_that_may_hold_an_action_is_an_error_before_and_after_a_plan() {
+    let possible = "this line may hold an action, but cannot be read as one";
+    for line in [
+        "- 6: (snap b1)",
+        "[INFO] 6.0: (snap b1)",
+        "t=6: (launch rocket) [3]",
+        "5.002; (wait) [1]",
+        "at 6 snap b1",
+        "then (snap b1)",
+        "6 launch rocket [3]",
+    ] {
+        let (before, after) = (
+            format!("{line}\n0: (wait) [2]"),
+            format!("0: (wait) [2]\n{line}"),
+        );
+        assert_eq!(errors(&before), format!("1: {possible}"), "{line}");
+        assert_eq!(errors(&after), format!("2: {possible}"), "{line}");
+    }
+}
+
+#[test]
+fn action_that_is_written_in_part_or_with_unknown_words_is_an_error() {
+    let timed = "0: (walk hall kitchen) [4]\n4.001: (walk kitchen hall) [4]\n";
+    let untimed = "walk hall kitchen (1)\nwalk kitchen hall (1)\n";
+    for line in [
+        "walk hall cellar (1)",
+        "walk hall (1)",
+        "jump hall (1)",
+        "jump (1)",
+        "walk hall cellar",
+        "walk hall",
+        "walk: hall",
+        "walk:",
+        "jump hall kitchen",
+        "wait [3]",
+        "wait 8",
+        "{\"time\": 7, \"name\": \"walk\", \"args\": [\"hall\", \"kitchen\"]}",
+    ] {
+        for plan in [timed, untimed] {
+            for text in [format!("{line}\n{plan}"), format!("{plan}{line}\n")] {
+                assert_ne!(errors(&text), "none", "{text}");
+            }
+        }
+    }
+    for text in [format!("jump\n{untimed}"), format!("{untimed}jump\n")] {
+        assert_ne!(errors(&text), "none", "{text}");
+    }
+    // A blank line separates a word of a log.
+    assert_eq!(errors(&format!("{untimed}\nDone\n")), "none");
+    assert_eq!(errors(&format!("{timed}Done\n")), "none");
+}
+
+#[test]
+fn comment_begins_at_the_line_or_behind_a_complete_action() {
+    assert_eq!(
+        plan("0: (wait) [2] ; (snap b1)\n  ; 3: (snap b1)"),
+        "0.000: (wait) [2.000]"
+    );
+    assert_ne!(errors("0: (wait) ; [2]"), "none");
+    assert_ne!(errors("0: (wait) [2]\n5; (snap b1)"), "none");
+    assert_ne!(errors("0: (wait) [2 ; 5: (snap b1) [1]"), "none");
+}
+
+#[test]
+fn last_plan_of_a_log_is_read_with_a_note() {
+    let log = "; Plan found with metric 9\n0: (wait) [9]\nnoise\n; Plan found with metric 4\n0: (wait) [4]\n";
+    assert_eq!(plan(log), "0.000: (wait) [4.000]");
+    assert_eq!(notes(log), "2 plans in one text");
+    assert_eq!(
+        errors("Found plan: 0: (snap b1)\n1: (wait) [1]")
+            .split(':')
+            .next(),
+        Some("1")
+    );
+}
+
+#[test]
+fn text_without_an_action_is_no_plan_unless_nothing_has_to_be_done() {
+    let no_plan = "1: this is not a plan: it has no action";
+    for text in [
+        "",
+        "; nothing\n",
+        "no plan was found\n",
+        "# Title\n\nSome text.",
+    ] {
+        assert_eq!(errors(text), no_plan, "{text}");
+    }
+    let idle = task(
+        &domain("(:action rest)"),
+        &problem("(:init (lit)) (:goal (lit))"),
+    );
+    let read = |text: &str| read_plan(&Source::new("plan", text), &idle);
+    assert!(read("; nothing to do\n").unwrap().0.steps.is_empty());
+    assert!(read("no plan was found\n").is_err());
+}
+
+#[test]
+fn plan_of_the_terminal_of_plansys2_is_read() {
+    let text =
+        "> get plan\nplan: \n0\t(walk hall kitchen)\t4\n4.001\t(wait)\t1.5\n5.502\t(snap b1)\t0\n";
+    let same = "0.000: (walk hall kitchen) [4.000]; 4.001: (wait) [1.500]; 5.502: (snap b1)";
+    assert_eq!(plan(text), same);
+    assert!(notes(text).contains("PlanSys2"));
+    assert_eq!(plan("0: (wait) 2"), "0.000: (wait) [2.000]");
+    // A number without a duration may be the number of the action.
+    assert_eq!(errors("1 (snap b1)"), "1: this is not an action of a plan");
+}
+
+#[test]
+fn plan_of_unified_planning_is_read() {
+    let text = "TimeTriggeredPlan:\n    0.0: walk(hall, kitchen) [4.0]\n    4.001: snap(b1)\n    5.0: wait [1.5]";
+    assert_eq!(
+        plan(text),
+        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1); 5.000: (wait) [1.500]"
+    );
+    assert!(notes(text).contains("unified-planning"));
+    let sequence = "SequentialPlan:\n    walk(hall, kitchen)\n    snap(b1)";
+    assert_eq!(
+        plan(sequence),
+        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1)"
+    );
+    let partial = "PartialOrderPlan:\n  actions:\n    0) snap(b1)\n  constraints:\n";
+    assert_eq!(errors(partial).split(':').next(), Some("3"));
+}
+
+#[test]
+fn plan_without_parentheses_is_read() {
+    let text = "0.0: walk hall kitchen [4.0]\n4.001: SNAP B1";
+    assert_eq!(
+        plan(text),
+        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1)"
+    );
+    assert!(notes(text).contains("Aries"));
+    assert_eq!(
+        errors("0: (wait) [2]\n6: launch rocket"),
+        "2: unknown action `launch`\n2: unknown object `rocket`"
+    );
+}
+
+#[test]
+fn steps_of_ff_start_when_the_step_before_has_ended() {
+    let text = "ff: found legal plan as follows\n\nstep    0: WALK HALL KITCHEN\n        1: SNAP B1\n        2: WALK KITCHEN HALL\n     \n\ntime spent:    0.00 seconds instantiating 21 easy, 0 hard action templates\n";
+    assert_eq!(
+        plan(text),
+        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1); 5.001: (walk kitchen hall) [4.000]"
+    );
+    assert!(notes(text).contains("steps of FF"));
+    assert!(!notes(text).contains("Aries"));
+    assert_eq!(
+        errors("step 0: SNAP B1\n     2: SNAP B2"),
+        "2: expected step 1 here"
+    );
+    assert_eq!(
+        errors("step 0: SNAP B1\n1.5: (snap b2)"),
+        "1: an action without a time"
+    );
+}
+
+#[test]
+fn steps_of_contingent_ff_are_read_unless_they_branch() {
+    let rule = "-------------------------------------------------";
+    let text = format!(
+        "ff: found plan as follows\n{rule}\n  0||0 --- WALK HALL KITCHEN --- SON: 1||0\n{rule}\n  1||0 --- SNAP B1 --- SON: 2||-1\n{rule}\n tree layout: 2 levels"
+    );
+    assert_eq!(
+        plan(&text),
+        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1)"
+    );
+    assert!(notes(&text).contains("Contingent-FF"));
+    let branch = "0||0 --- SNAP B1 --- TRUESON: 1||0 --- FALSESON: 1||1\n1||0 --- SNAP B2 --- SON: 2||-1\n1||1 --- WAIT --- SON: 2||-1";
+    assert!(errors(branch).starts_with("1: "), "{}", errors(branch));
+}
+
+#[test]
+fn steps_of_fast_downward_are_read() {
+    let text = "[t=0.003s, 10084 KB] Solution found!\nActual search time: 0.001s\nwalk hall kitchen (1)\nsnap b1 (1)\nPlan length: 2 step(s).\nPlan cost: 2\n";
+    assert_eq!(errors(text), "none");
+    assert_eq!(
+        plan(text),
+        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1)"
+    );
+    assert!(notes(text).contains("Fast Downward"));
+}
+
+#[test]
+fn happenings_are_paired() {
+    let text = "0.000: start (wait)\n1: (snap b1)\n2.5: end (wait)\n3: start (walk hall kitchen) #1\n7: end (walk hall kitchen) #1";
+    assert_eq!(
+        plan(text),
+        "0.000: (wait) [2.500]; 1.000: (snap b1); 3.000: (walk hall kitchen) [4.000]"
+    );
+    assert!(notes(text).contains("vscode-pddl"));
+    let overlapping = "0: start (wait) #1\n1: start (wait) #2\n3: end (wait) #1\n5: end (wait) #2";
+    assert_eq!(
+        plan(overlapping),
+        "0.000: (wait) [3.000]; 1.000: (wait) [4.000]"
+    );
+    let ambiguous = overlapping.replace(" #1", "").replace(" #2", "");
+    assert_eq!(
+        errors(&ambiguous),
+        "2: this action starts again before it has ended"
+    );
+    assert_eq!(
+        errors("0: start (wait)"),
+        "1: this action starts, but does not end"
+    );
+    assert_eq!(
+        errors("0: start (wait)\n2: end (wait)\n3: end (wait)"),
+        "3: this action ends, but does not start"
+    );
+    assert_eq!(
+        errors("0: start (wait)\n2: end (wait)\n3: (walk hall kitchen)"),
+        "3: `walk` has no duration here"
+    );
+}

@@ -1,0 +1,49 @@
+//! Plans that satisfy constraints only if they start later.
+//!
+//! A search that ignores the constraints schedules everything as early as possible. A constraint on given
+//! times may need a later start: after `hold-during`, after the time of `hold-after`, after a timed initial.
+
+use std::collections::BTreeSet;
+
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
+use super::super::answer::Settings;
+use super::judged_without_observers;
+
+/// Most delays that are tried for one plan.
+const MOST_DELAYS: usize = 32;
+
+/// Returns a plan with the same steps that satisfies the constraints: the steps from some start on are later
+/// by the same time, so that the first of them starts at, or just after, a time that a constraint or a timed
+/// initial names.
+pub(in super::super) fn delayed(
+    task: &Task,
+    settings: &Settings,
+    plan: &TimeTriggeredPlan,
+) -> Option<TimeTriggeredPlan> {
+    let hard = &task.constraints().hard;
+    let timed = task.timed().iter().map(|timed| &timed.time);
+    let named: BTreeSet<&Rational> = hard
+        .iter()
+        .flat_map(|modal| modal.times())
+        .chain(timed)
+        .collect();
+    let starts: BTreeSet<&Rational> = plan.steps.iter().map(|step| &step.start).collect();
+    let delays = starts.iter().flat_map(|&start| {
+        let moments = named
+            .iter()
+            .flat_map(|&time| [time.clone(), time + task.epsilon()]);
+        moments.map(move |moment| (start, moment - start))
+    });
+    let positive = delays.filter(|(_, delay)| delay.is_positive());
+    positive.take(MOST_DELAYS).find_map(|(from, delay)| {
+        let mut later = plan.clone();
+        for step in &mut later.steps {
+            if step.start >= *from {
+                step.start += &delay;
+            }
+        }
+        judged_without_observers(task, settings, &later).map(|_| later)
+    })
+}

@@ -1,0 +1,51 @@
+//! Sequences of steps that only change numbers and come no nearer to the goal.
+//!
+//! Numbers have no bound, so such a sequence can be infinite, each state of it new. After some steps, each
+//! further one adds to the rank.
+
+use super::super::state::State;
+use super::Search;
+
+/// The number of such steps that are free.
+const FREE: u32 = 8;
+
+/// Length of the latest part of a state's path that only changed numbers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Drift {
+    /// Hash of all but the numbers.
+    facts: u64,
+    estimate: u32,
+    /// The number of earlier states with the same facts, one or two steps apart, none of them with a higher
+    /// estimate than the next one.
+    length: u32,
+}
+
+impl Drift {
+    /// Its addition to the rank.
+    pub(super) fn penalty(self) -> i64 {
+        i64::from(self.length.saturating_sub(FREE))
+    }
+}
+
+impl Search<'_> {
+    /// Returns the drift of a state that a step from `parent` led to.
+    pub(super) fn drift(&self, parent: u32, state: &State, estimate: u32) -> Drift {
+        if self.compiled.fluents.is_empty() {
+            return Drift::default();
+        }
+        let facts = state.fact_hash();
+        let parent = self.nodes.get(parent as usize);
+        let grandparent = parent.and_then(|parent| self.nodes.get(parent.parent as usize));
+        let mut before = [parent, grandparent].into_iter().flatten();
+        let similar = before.find(|node| node.drift.facts == facts);
+        let length = match similar {
+            Some(node) if node.drift.estimate <= estimate => node.drift.length + 1,
+            _ => 0,
+        };
+        Drift {
+            facts,
+            estimate,
+            length,
+        }
+    }
+}

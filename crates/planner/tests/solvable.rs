@@ -1,0 +1,78 @@
+//! Random problems that are solvable by construction: the planner never claims that there is no plan, and
+//! nearly always finds one.
+
+#[path = "../../../testing/solvable/mod.rs"]
+mod solvable;
+
+use elbowroom_model::validate::{Settings, Verdict, validate};
+use solvable::{Outcome, Tally, outcome, outcome_with, problem};
+
+/// Number of seeds; `examples/solvable` tries more.
+const SEEDS: u64 = 1_000;
+
+/// The most states per problem.
+const STATES: u64 = 1_000;
+
+/// The most problems without a plan found, refused ones included.
+const MOST_MISSED: usize = 2;
+
+#[test]
+fn solvable_problems_are_never_called_unsolvable_and_rarely_missed() {
+    let mut tally = Tally::default();
+    let mut missed = Vec::new();
+    for seed in 0..SEEDS {
+        let problem = problem(seed).unwrap_or_else(|| panic!("seed {seed} gives no problem"));
+        let outcome = outcome(&problem, STATES);
+        tally.count(&outcome);
+        match &outcome {
+            Outcome::Found => {}
+            Outcome::FalseClaim(_) | Outcome::Invalid(_) => {
+                panic!("seed {seed}: {outcome:?}\n{problem}")
+            }
+            Outcome::NoneFound(_) | Outcome::Unsupported(_) => missed.push(seed),
+        }
+    }
+    assert!(missed.len() <= MOST_MISSED, "{tally:?}, {missed:?}");
+    assert!(tally.found + missed.len() == tally.problems);
+}
+
+#[test]
+fn without_self_overlap_no_claim_is_false_and_no_plan_has_it() {
+    let (mut needing, mut found) = (0, 0);
+    for seed in 0..SEEDS {
+        let problem = problem(seed).unwrap_or_else(|| panic!("seed {seed} gives no problem"));
+        if !problem.overlaps_itself() {
+            continue;
+        }
+        needing += 1;
+        match outcome_with(&problem, STATES, false) {
+            Outcome::Found => found += 1,
+            outcome @ (Outcome::FalseClaim(_) | Outcome::Invalid(_)) => {
+                panic!("seed {seed}: {outcome:?}\n{problem}")
+            }
+            Outcome::NoneFound(_) | Outcome::Unsupported(_) => {}
+        }
+    }
+    assert!(
+        found > 100,
+        "{found} of {needing} problems have a plan without self-overlap"
+    );
+}
+
+#[test]
+fn witness_plans_are_valid_and_needed() {
+    for seed in 0..100 {
+        let Some(problem) = problem(seed) else {
+            panic!("seed {seed} gives no problem");
+        };
+        let task = problem.task();
+        let verdict = validate(&task, &problem.witness(&task), &Settings::default());
+        assert!(matches!(verdict, Verdict::Valid(_)), "{problem}");
+        let empty = validate(
+            &task,
+            &elbowroom_model::TimeTriggeredPlan::default(),
+            &Settings::default(),
+        );
+        assert!(!matches!(empty, Verdict::Valid(_)), "{problem}");
+    }
+}

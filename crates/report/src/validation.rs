@@ -1,0 +1,404 @@
+//! Validation of a run from its record: [`Validation`].
+//!
+//! `model::validate` has no notion of executors, commands and reports. This module translates the entries of a record
+//! into the events of an [`Execution`]. Reports that are late, repeated or contradictory follow the rules of
+//! [`Run`](elbowroom_execution::run::Run). Each entry is processed when it is recorded, in a live run or in a replay.
+//! The memory needed does not grow with the length of the run.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+use elbowroom_execution::run::{FIRST_GOAL, GoalReader, Stand, Verdict};
+use elbowroom_execution::{
+    Command, Ending, Entry, Event, Measured, Observation, Progression, Request, Ticket,
+};
+use elbowroom_model::ground::{Action, Body, Condition};
+use elbowroom_model::validate::{Execution, MeasuredAmount, Violation};
+use elbowroom_model::{RunningAction, Situation, Task};
+use elbowroom_num::{Interval, Rational};
+
+/// Findings beyond this number are only counted.
+const MOST_LISTED: usize = 20;
+
+/// Number of ended starts that are remembered, to recognise contradictory reports about them.
+const MOST_ENDED: usize = 1000;
+
+/// Reason for an invalid run: a bug of the executor, not a failure of the world.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Invalid {
+    /// A start whose conditions or duration bounds did not hold in the state at the command, or which interferes
+    /// with a happening less than ε ago.
+    Start(Violation),
+    /// The run reports the goal as reached, but the goal does not hold at the end.
+    NotReached {
+        /// The time of the report.
+        time: Rational,
+        /// The parts of the goal that do not hold.
+        unmet: Vec<String>,
+    },
+    /// The run reports the goal as reached while an action is running.
+    StillRunning {
+        /// The time of the report.
+        time: Rational,
+    },
+    /// The run reports that no plan reaches the goal, but the goal holds.
+    Reached {
+        /// The time of the report.
+        time: Rational,
+    },
+}
+
+impl fmt::Display for Invalid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let at = |time: &Rational| time.to_decimal(3);
+        match self {
+            Self::Start(violation) => write!(f, "{violation}"),
+            Self::NotReached { time, unmet } => {
+                let unmet = unmet.join(" and ");
+                write!(
+                    f,
+                    "at {}: the run reports the goal as reached, but {unmet} does not hold",
+                    at(time)
+                )
+            }
+            Self::StillRunning { time } => {
+                write!(
+                    f,
+                    "at {}: the run reports the goal as reached while an action is running",
+                    at(time)
+                )
+            }
+            Self::Reached { time } => {
+                write!(
+                    f,
+                    "at {}: the run reports that no plan exists, but the goal holds",
+                    at(time)
+                )
+            }
+        }
+    }
+}
+
+/// Validates a run entry by entry.
+pub struct Validation<'a> {
+    task: Arc<Task>,
+    execution: Execution,
+    reader: Box<dyn GoalReader + 'a>,
+    /// The open goals by name.
+    goals: Vec<(String, Condition)>,
+    starts: BTreeMap<Ticket, Start>,
+    /// Number of starts that have ended.
+    ended: usize,
+    now: Rational,
+    found: Vec<Invalid>,
+    count: usize,
+}
+
+/// A start that was commanded.
+#[derive(Clone, Debug)]
+struct Start {
+    action: Arc<Action>,
+    commanded: Rational,
+    has_started: bool,
+    /// `Some(true)` if it ended with its end effects; `None` if it has not ended.
+    ended: Option<bool>,
+}
+
+impl<'a> Validation<'a> {
+    /// Creates the validation of a new run of `task`. `reader` reads goals that are given during the run.
+    pub fn new(task: &Arc<Task>, reader: impl GoalReader + 'a) -> Self {
+        let goal = task.goal().clone();
+        let goals = Some((FIRST_GOAL.to_owned(), goal)).filter(|(_, goal)| !goal.is_trivial());
+        Self {
+            execution: Execution::new(task),
+            task: Arc::clone(task),
+            reader: Box::new(reader),
+            goals: goals.into_iter().collect(),
+            starts: BTreeMap::new(),
+            ended: 0,
+            now: Rational::ZERO,
+            found: Vec::new(),
+            count: 0,
+        }
+    }
+
+    /// Continues from `stand` instead of the beginning of the run.
+    #[must_use]
+    pub fn standing(mut self, stand: &Stand) -> Self {
+        if stand.goals.are_others {
+            let task = Arc::clone(&self.task);
+            let open = stand.goals.open.iter();
+            let read = open.filter_map(|(name, text)| match text {
+                None => Some((name.clone(), task.goal().clone())),
+                Some(text) => Some((name.clone(), self.read(text)?)),
+            });
+            self.goals = read.collect();
+        }
+        let (situation, running) = situation(&stand.belief);
+        let numbers: Vec<u64> = running.iter().map(|ticket| ticket.0).collect();
+        self.execution = Execution::from(&self.task, &situation, &numbers);
+        self.now = situation.time;
+        for known in &stand.starts {
+            let is_running = stand.belief.running().contains_key(&known.ticket);
+            let start = Start {
+                action: Arc::clone(&known.action),
+                commanded: known.ordered.clone(),
+                has_started: known.started.is_some(),
+                ended: (known.ended.as_ref()).map(|(_, ending)| *ending == Ending::Succeeded),
+            };
+            if start.ended.is_none() && !is_running {
+                let planned = known.planned.clone();
+                self.execution
+                    .expect(known.ticket.0, &known.action, planned);
+            }
+            self.ended += usize::from(start.ended.is_some());
+            self.starts.insert(known.ticket, start);
+        }
+        self
+    }
+
+    /// Returns the first findings in the run so far.
+    pub fn found(&self) -> &[Invalid] {
+        &self.found
+    }
+
+    /// Returns the number of findings so far.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Processes the next entry of the record.
+    pub fn note(&mut self, entry: &Entry<'_>) {
+        match entry {
+            Entry::Passed { now, .. } | Entry::Looked { now, .. } => {
+                // The reports about this period follow as entries. The execution advances after them.
+                self.now = (*now).clone().max(self.now.clone());
+            }
+            Entry::Taken {
+                now,
+                observation,
+                remark,
+                ..
+            } => {
+                self.now = (*now).clone().max(self.now.clone());
+                self.take(observation, *remark);
+            }
+            Entry::Command { now, command, .. } => {
+                self.pass(now);
+                self.command(command);
+            }
+            Entry::Decided { now, .. }
+            | Entry::Planning { now, .. }
+            | Entry::Kept { now, .. }
+            | Entry::Warning { now, .. }
+            | Entry::Interrupted { now } => self.pass(now),
+            Entry::Resting { now, verdict, .. } => {
+                self.pass(now);
+                if let Some(verdict) = verdict {
+                    self.judge(verdict);
+                }
+            }
+            Entry::Over(report) => {
+                self.pass(&report.time);
+                self.judge(&report.verdict);
+            }
+            Entry::Mission(_) | Entry::Planned { .. } => {}
+        }
+    }
+
+    fn pass(&mut self, now: &Rational) {
+        self.now = now.clone().max(self.now.clone());
+        let now = self.now.clone();
+        self.execution.advance(&now);
+    }
+
+    fn find(&mut self, invalid: Invalid) {
+        self.count += 1;
+        if self.found.len() < MOST_LISTED {
+            self.found.push(invalid);
+        }
+    }
+
+    fn command(&mut self, command: &Command) {
+        match command {
+            Command::Start {
+                ticket,
+                action,
+                duration,
+            } => {
+                let start = Start {
+                    action: Arc::clone(action),
+                    commanded: self.now.clone(),
+                    has_started: false,
+                    ended: None,
+                };
+                self.starts.insert(*ticket, start);
+                let judged = self.execution.command(ticket.0, action, duration.as_ref());
+                if let Err(violation) = judged {
+                    self.find(Invalid::Start(*violation));
+                }
+            }
+            Command::Cancel { ticket } => self.execution.cancel(ticket.0),
+        }
+    }
+
+    fn take(&mut self, observation: &Observation, remark: Option<&str>) {
+        let time = observation.time.clone().min(self.now.clone());
+        match &observation.event {
+            Event::Started { ticket, measured } => self.started(*ticket, &time, measured),
+            Event::Ended {
+                ticket,
+                ending,
+                measured,
+            } => {
+                self.ended(*ticket, &time, *ending == Ending::Succeeded, measured);
+            }
+            Event::Fact { fact, truth } => self.execution.see_fact(&time, *fact, *truth),
+            Event::Value { fluent, value } => self.execution.see_value(&time, *fluent, value),
+            // A request with a remark was ignored.
+            Event::Asked(request) if remark.is_none() => self.asked(request),
+            Event::Asked(_)
+            | Event::Feedback { .. }
+            | Event::PlanMade
+            | Event::PlanReady
+            | Event::Unintelligible { .. } => {}
+        }
+    }
+
+    fn started(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) {
+        let Some(start) = self.starts.get_mut(&ticket) else {
+            return;
+        };
+        if start.has_started || start.ended.is_some() {
+            return;
+        }
+        start.has_started = true;
+        let is_over = matches!(start.action.body, Body::Instantaneous(_));
+        let time = time.clone().max(start.commanded.clone());
+        self.execution.start(ticket.0, &time, &amounts(measured));
+        if is_over {
+            self.close(ticket, true);
+        }
+    }
+
+    fn ended(&mut self, ticket: Ticket, time: &Rational, succeeded: bool, measured: &[Measured]) {
+        let Some(start) = self.starts.get(&ticket) else {
+            return;
+        };
+        if let Some(earlier) = start.ended {
+            if earlier != succeeded {
+                let action = Arc::clone(&start.action);
+                self.execution.contradict(&action);
+            }
+            return;
+        }
+        let commanded = start.commanded.clone();
+        if !start.has_started && succeeded {
+            self.started(ticket, &commanded, &[]);
+        }
+        if self.starts.get(&ticket).is_none_or(|it| it.ended.is_some()) {
+            return;
+        }
+        let time = time.clone().max(commanded);
+        if succeeded {
+            self.execution.end(ticket.0, &time, &amounts(measured));
+        } else {
+            self.execution.stop(ticket.0, &time);
+        }
+        self.close(ticket, succeeded);
+    }
+
+    /// Records the end of an action, and drops the earliest of too many ended ones.
+    fn close(&mut self, ticket: Ticket, succeeded: bool) {
+        if let Some(start) = self.starts.get_mut(&ticket) {
+            start.ended = Some(succeeded);
+            self.ended += 1;
+        }
+        if self.ended >= 2 * MOST_ENDED {
+            let mut surplus = self.ended - MOST_ENDED;
+            self.starts.retain(|_, start| {
+                let is_forgotten = surplus > 0 && start.ended.is_some();
+                surplus -= usize::from(is_forgotten);
+                !is_forgotten
+            });
+            self.ended = MOST_ENDED;
+        }
+    }
+
+    fn asked(&mut self, request: &Request) {
+        match request {
+            Request::Pursue { name, goal } => {
+                let Some(condition) = self.read(goal) else {
+                    return;
+                };
+                match self.goals.iter_mut().find(|(known, _)| known == name) {
+                    Some((_, known)) => *known = condition,
+                    None => self.goals.push((name.clone(), condition)),
+                }
+            }
+            Request::Abandon { name } => self.goals.retain(|(known, _)| known != name),
+            Request::Pause | Request::Resume => {}
+        }
+    }
+
+    fn read(&self, goal: &str) -> Option<Condition> {
+        let condition = self.reader.read(&self.task, goal).ok()?;
+        Some(self.task.with_goal(condition).goal().clone())
+    }
+
+    /// Compares a verdict of the run with the state. Goals that are reported as reached are closed.
+    fn judge(&mut self, verdict: &Verdict) {
+        let time = self.now.clone();
+        match verdict {
+            Verdict::GoalReached => {
+                let goals = std::mem::take(&mut self.goals);
+                let goals = goals.iter().map(|(_, goal)| goal);
+                let unmet: Vec<String> = goals
+                    .flat_map(Condition::conjuncts)
+                    .filter(|part| self.execution.reaches(part) == Some(false))
+                    .map(|part| self.task.describe_condition(part))
+                    .collect();
+                if !unmet.is_empty() {
+                    self.find(Invalid::NotReached { time, unmet });
+                } else if !self.execution.is_idle() {
+                    self.find(Invalid::StillRunning { time });
+                }
+            }
+            Verdict::Unsolvable => {
+                let mut goals = self.goals.iter();
+                let holds = goals.all(|(_, goal)| self.execution.reaches(goal) == Some(true));
+                if holds && !self.goals.is_empty() && self.execution.is_idle() {
+                    self.find(Invalid::Reached { time });
+                }
+            }
+            Verdict::NoPlan { .. }
+            | Verdict::PlannerFailed { .. }
+            | Verdict::ReplanLimit
+            | Verdict::TimeLimit
+            | Verdict::Interrupted
+            | Verdict::WorldFailed { .. } => {}
+        }
+    }
+}
+
+/// Returns a belief as a situation, and the tickets of its running actions in the same order.
+fn situation(belief: &Progression) -> (Situation, Vec<Ticket>) {
+    let running = belief.running().iter();
+    let running = running.map(|(ticket, underway)| {
+        let planned = Interval::point(underway.planned.clone());
+        (*ticket, belief.running_action(underway, planned))
+    });
+    let (tickets, running): (Vec<Ticket>, Vec<RunningAction>) = running.unzip();
+    let situation = Situation {
+        time: belief.time().clone(),
+        state: belief.state(),
+        running,
+    };
+    (situation, tickets)
+}
+
+fn amounts(measured: &[Measured]) -> Vec<MeasuredAmount> {
+    let measured = measured.iter();
+    measured.map(|it| (it.fluent, it.amount.clone())).collect()
+}
