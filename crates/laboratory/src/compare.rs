@@ -19,6 +19,7 @@ mod trials;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use elbowroom_num::work;
 use rayon::prelude::*;
 
 pub use beginnings::Beginning;
@@ -112,8 +113,10 @@ pub fn run_recorded(
     records: Option<&TrialRecords>,
     observe: &(dyn Fn(u64) -> bool + Sync),
 ) -> Result<Results, ExperimentError> {
+    let stop = work::Stop::of_this_thread();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(part.jobs)
+        .start_handler(move |_| stop.iter().for_each(work::Stop::obey))
         .build()
         .map_err(|error| ExperimentError::other(format!("cannot start threads: {error}")))?;
     let fillings = experiment.fillings();

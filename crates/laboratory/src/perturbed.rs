@@ -23,6 +23,7 @@ use crate::untimed::{
 use crate::worlds::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
 use elbowroom_model::ground::Action;
 use elbowroom_model::{State, Task};
+use elbowroom_num::work;
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_probability::Likelihoods;
 use elbowroom_probability::optimum::{self, DeadEnds};
@@ -103,8 +104,10 @@ pub fn run_recorded(
     let rows: Vec<_> = rows(experiment)
         .map(|(case, world, executor)| (&settings[case], (world, executor)))
         .collect();
+    let stop = work::Stop::of_this_thread();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(part.jobs)
+        .start_handler(move |_| stop.iter().for_each(work::Stop::obey))
         .build()
         .map_err(|error| PerturbedError::other(format!("cannot start threads: {error}")))?;
     let rows: Result<Vec<Row>, _> = pool.install(|| {
@@ -406,6 +409,10 @@ impl<'e> Setting<'e> {
                     &mut sound
                 };
             let made = trial(&mut game, world, &mut *executor);
+            // What was interrupted says nothing about the executor.
+            if work::is_stopped() {
+                break;
+            }
             if let Some(records) = watch.records {
                 records.add(self.record(kind_of_world, kind, (number, seed), &made));
             }

@@ -14,11 +14,69 @@
 //! ```
 //!
 //! One unit is about a nanosecond of one core of a machine of 2024.
+//!
+//! Such computations can also be interrupted: they ask [`is_stopped`] now and then, and end early with what they have
+//! once the thread's [`Stop`] has been requested.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 thread_local! {
     static SPENT: Cell<u64> = const { Cell::new(0) };
+    static STOP: RefCell<Option<Stop>> = const { RefCell::new(None) };
+}
+
+/// A request that computations end early. Clones are the same request.
+///
+/// ```
+/// use elbowroom_num::work::{self, Stop};
+///
+/// let stop = Stop::default();
+/// stop.obey();
+/// assert!(!work::is_stopped());
+/// stop.request();
+/// assert!(work::is_stopped() && work::Budget::new(1_000).is_spent());
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Stop(Arc<AtomicBool>);
+
+impl Stop {
+    /// Requests that computations of the threads that obey end early. Cannot be undone.
+    pub fn request(&self) {
+        self.0.store(true, Ordering::SeqCst);
+    }
+
+    /// Returns `true` if it has been requested.
+    pub fn is_requested(&self) -> bool {
+        self.0.load(Ordering::SeqCst)
+    }
+
+    /// From now on, computations of this thread obey this request instead of any other.
+    ///
+    /// Threads that are started later do not inherit it: pass [`Stop::of_this_thread`] on to them.
+    pub fn obey(&self) {
+        STOP.set(Some(self.clone()));
+    }
+
+    /// The request that computations of this thread obey.
+    pub fn of_this_thread() -> Option<Self> {
+        STOP.with_borrow(Clone::clone)
+    }
+}
+
+impl PartialEq for Stop {
+    /// Equal if they are the same request.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl Eq for Stop {}
+
+/// Returns `true` if computations of this thread should end early: see [`Stop`].
+pub fn is_stopped() -> bool {
+    STOP.with_borrow(|stop| stop.as_ref().is_some_and(Stop::is_requested))
 }
 
 /// Counts work of this thread.
@@ -39,7 +97,7 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// A budget of this number of units; [`u64::MAX`] is never spent.
+    /// A budget of this number of units; [`u64::MAX`] has no limit.
     pub fn new(units: u64) -> Self {
         Self {
             begin: spent(),
@@ -57,9 +115,9 @@ impl Budget {
         self.units.saturating_sub(self.used())
     }
 
-    /// Returns `true` if nothing is left.
+    /// Returns `true` if nothing is left, or if the thread's computations should end early ([`is_stopped`]).
     pub fn is_spent(&self) -> bool {
-        self.left() == 0 && self.units < u64::MAX
+        self.left() == 0 && self.units < u64::MAX || is_stopped()
     }
 }
 

@@ -71,7 +71,8 @@ const ACTION_WORK: u64 = 20_000;
 /// Finds a plan from `situation`.
 ///
 /// `observe` is called now and then, and for each better plan; with `Break` the search ends, and
-/// the best plan so far is the answer. Every plan has been found valid by
+/// the best plan so far is the answer; so it does when the thread's computations should end early
+/// ([`work::is_stopped`]). Every plan has been found valid by
 /// [`elbowroom_model::validate_from`], exactly, with the given ε. The same input gives the same
 /// answer, and the same sequence of reports.
 pub fn plan(
@@ -86,6 +87,14 @@ pub fn plan(
             place: format!("domain {}", task.problem().domain),
         });
     }
+    let observe = &mut |progress: &Progress| {
+        let flow = observe(progress);
+        if work::is_stopped() {
+            ControlFlow::Break(())
+        } else {
+            flow
+        }
+    };
     // Threads of this search count for this one.
     work::counted_as(
         || {

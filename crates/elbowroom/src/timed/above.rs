@@ -3,8 +3,9 @@
 
 use indexmap::IndexSet;
 
+use super::Stop;
 use super::chances::Chances;
-use super::graph::{Choice, Expansion, Hopes, Layers, Nodes, Target};
+use super::graph::{Choice, Expansion, Hopes, Layers, Limits, MOST_WAYS, Nodes, Target};
 use super::moments::{Alike, Reasons};
 use super::state::{Phase, State};
 use super::world::TimedWorld;
@@ -79,12 +80,15 @@ impl<'a> Above<'a> {
 }
 
 /// What the cell brings: which of the actions under way may end, and which events happen.
+///
+/// # Errors
+/// When it is too much.
 fn revealed(
     world: &TimedWorld,
     chances: &Chances,
     cell: usize,
     state: &State,
-) -> Vec<(f64, Moment)> {
+) -> Result<Vec<(f64, Moment)>, Stop> {
     let mut moments = vec![(1.0, (state.clone(), Coming::default()))];
     for (place, running) in state.running.iter().enumerate() {
         let age = cell - usize::from(running.since);
@@ -120,15 +124,21 @@ fn revealed(
             });
         }
     }
-    moments
+    if moments.len() > MOST_WAYS {
+        return Err(Stop::TooManyStates);
+    }
+    Ok(moments)
 }
 
-/// Each moment in each way, with what then is different.
+/// Each moment in each way, with what then is different. Where there are too many already, they stay as they are.
 fn split<T>(
     moments: Vec<(f64, Moment)>,
     ways: &[(f64, T)],
     change: impl Fn(&mut Moment, &T),
 ) -> Vec<(f64, Moment)> {
+    if moments.len() > MOST_WAYS {
+        return moments;
+    }
     let mut all = Vec::with_capacity(moments.len());
     for (weight, moment) in moments {
         for (p, way) in ways.iter().filter(|(p, _)| *p > 0.0) {
@@ -156,8 +166,8 @@ impl Expansion for Above<'_> {
         states: &IndexSet<State>,
         later: &mut Layers,
         hopes: &mut Hopes,
-        most: usize,
-    ) -> Option<Nodes> {
+        limits: &Limits<'_>,
+    ) -> Result<Nodes, Stop> {
         let mut here = Cell {
             bound: self,
             number: cell,
@@ -169,7 +179,8 @@ impl Expansion for Above<'_> {
         };
         let mut nodes = Nodes::of(cell);
         for state in states {
-            let revealed = revealed(self.world, self.chances, cell, state).into_iter();
+            limits.check(&nodes)?;
+            let revealed = revealed(self.world, self.chances, cell, state)?.into_iter();
             nodes.push(vec![
                 revealed
                     .map(|(p, moment)| (p, vec![here.target(moment)]))
@@ -178,13 +189,11 @@ impl Expansion for Above<'_> {
         }
         let mut done = 0;
         while let Some(moment) = here.moments.get_index(done).cloned() {
-            if nodes.len() >= most {
-                return None;
-            }
+            limits.check(&nodes)?;
             nodes.push(here.choices(&moment));
             done += 1;
         }
-        Some(nodes)
+        Ok(nodes)
     }
 
     fn last(&self, state: &State) -> f64 {

@@ -3,12 +3,12 @@
 
 use indexmap::IndexSet;
 
-use super::Side;
 use super::chances::Chances;
 use super::failures::Ending;
-use super::graph::{Choice, Expansion, Hopes, Layers, Nodes, Target};
+use super::graph::{Choice, Expansion, Hopes, Layers, Limits, MOST_WAYS, Nodes, Target};
 use super::state::{Phase, State};
 use super::world::TimedWorld;
+use super::{Side, Stop};
 
 /// What more than so many happenings in one cell lead to is taken to be lost.
 const MOST_ORDERED: usize = 5;
@@ -138,9 +138,15 @@ impl<'a> Below<'a> {
     }
 
     /// What may happen in a cell, with how likely all of it is.
-    fn happenings(&self, cell: usize, state: &State) -> Vec<(f64, Vec<Happening>)> {
+    ///
+    /// # Errors
+    /// When it is too much.
+    fn happenings(&self, cell: usize, state: &State) -> Result<Vec<(f64, Vec<Happening>)>, Stop> {
         let mut all = vec![(1.0, Vec::new())];
         let mut split = |ways: &[(f64, Option<Happening>)]| {
+            if all.len() > MOST_WAYS {
+                return;
+            }
             let mut longer = Vec::new();
             for (weight, happenings) in &all {
                 for (p, way) in ways.iter().filter(|(p, _)| *p > 0.0) {
@@ -178,7 +184,10 @@ impl<'a> Below<'a> {
                 ]);
             }
         }
-        all
+        if all.len() > MOST_WAYS {
+            return Err(Stop::TooManyStates);
+        }
+        Ok(all)
     }
 
     /// What a state may be after all of these, in whatever order; `None` if that is too much.
@@ -292,8 +301,8 @@ impl Expansion for Below<'_> {
         states: &IndexSet<State>,
         later: &mut Layers,
         hopes: &mut Hopes,
-        most: usize,
-    ) -> Option<Nodes> {
+        limits: &Limits<'_>,
+    ) -> Result<Nodes, Stop> {
         let mut here = Cell {
             bound: self,
             number: cell,
@@ -303,12 +312,10 @@ impl Expansion for Below<'_> {
         };
         let mut nodes = Nodes::of(cell);
         while let Some(state) = here.moments.get_index(nodes.len()).cloned() {
-            if nodes.len() >= most {
-                return None;
-            }
-            nodes.push(here.choices(&state));
+            limits.check(&nodes)?;
+            nodes.push(here.choices(&state)?);
         }
-        Some(nodes)
+        Ok(nodes)
     }
 
     fn last(&self, state: &State) -> f64 {
@@ -328,37 +335,35 @@ impl Cell<'_> {
         Target::here(self.moments.insert_full(state).0)
     }
 
-    fn choices(&mut self, state: &State) -> Vec<Choice> {
+    fn choices(&mut self, state: &State) -> Result<Vec<Choice>, Stop> {
         let world = self.bound.world;
         if state.is_won(world) {
-            return vec![vec![(1.0, vec![Target::Won])]];
+            return Ok(vec![vec![(1.0, vec![Target::Won])]]);
         }
         if !state.is_hopeful(world, self.hopes) {
-            return Vec::new();
+            return Ok(Vec::new());
         }
         let moves = self.bound.moves(state).into_iter();
         moves.map(|choice| self.choice(state, choice)).collect()
     }
 
     /// What comes of a move.
-    fn choice(&mut self, state: &State, choice: Move) -> Choice {
+    fn choice(&mut self, state: &State, choice: Move) -> Result<Choice, Stop> {
         let world = self.bound.world;
-        match choice {
+        let after = match choice {
             Move::Cancel(place) => {
                 let mut after = state.clone();
                 after.running.remove(place);
-                vec![(1.0, vec![self.target(after)])]
+                after
             }
-            Move::Start(act) => {
-                let after = state.started(world, act, (act, self.number, Phase::Goes));
-                vec![(1.0, vec![self.target(after)])]
-            }
-            Move::Wait => self.wait(state),
-        }
+            Move::Start(act) => state.started(world, act, (act, self.number, Phase::Goes)),
+            Move::Wait => return self.wait(state),
+        };
+        Ok(vec![(1.0, vec![self.target(after)])])
     }
 
     /// What comes of doing nothing until the next boundary, or until something has happened.
-    fn wait(&mut self, state: &State) -> Choice {
+    fn wait(&mut self, state: &State) -> Result<Choice, Stop> {
         let world = self.bound.world;
         let chances = self.bound.chances;
         let is_always = self.bound.manner == Manner::Always;
@@ -367,11 +372,11 @@ impl Cell<'_> {
         } else {
             match chances.next(state, self.number) {
                 Some(cell) => cell,
-                None => return vec![(1.0, vec![Target::Lost])],
+                None => return Ok(vec![(1.0, vec![Target::Lost])]),
             }
         };
         let mut choice = Choice::new();
-        for (p, happenings) in self.bound.happenings(cell, state) {
+        for (p, happenings) in self.bound.happenings(cell, state)? {
             let outcomes = self.bound.outcomes(state, &happenings).unwrap_or_default();
             let may_act = is_always || !happenings.is_empty();
             let targets = outcomes.into_iter().map(|mut outcome| {
@@ -390,6 +395,6 @@ impl Cell<'_> {
             });
             choice.push((p, targets.collect()));
         }
-        choice
+        Ok(choice)
     }
 }

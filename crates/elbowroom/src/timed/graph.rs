@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use elbowroom_num::work;
 use indexmap::{IndexMap, IndexSet};
 
 use super::Stop;
@@ -57,19 +58,66 @@ pub(super) trait Expansion {
     fn initial(&self) -> Vec<(f64, State)>;
 
     /// The nodes of a cell, which depend on nothing but these states; those to which they lead are
-    /// entered into the layers of later cells. `None` if there are more nodes than `most`.
+    /// entered into the layers of later cells.
+    ///
+    /// # Errors
+    /// Beyond the limits.
     fn expand(
         &self,
         cell: usize,
         states: &IndexSet<State>,
         later: &mut Layers,
         hopes: &mut Hopes,
-        most: usize,
-    ) -> Option<Nodes>;
+        limits: &Limits<'_>,
+    ) -> Result<Nodes, Stop>;
 
     /// What a state is worth when the last cell is over.
     fn last(&self, state: &State) -> f64;
 }
+
+/// How far an expansion may go.
+pub(super) struct Limits<'l> {
+    /// The number of nodes of a cell.
+    pub(super) nodes: usize,
+    /// Asked before each node.
+    pub(super) goes_on: &'l dyn Fn() -> bool,
+}
+
+impl Limits<'static> {
+    /// None.
+    pub(super) const NONE: Self = Self {
+        nodes: usize::MAX,
+        goes_on: &|| true,
+    };
+}
+
+impl Limits<'_> {
+    /// Whether one more node may be made.
+    ///
+    /// # Errors
+    /// Otherwise, with the reason.
+    pub(super) fn check(&self, nodes: &Nodes) -> Result<(), Stop> {
+        if !(self.goes_on)() {
+            return Err(Stop::Interrupted);
+        }
+        let ways = nodes.ways.len() / WAYS;
+        if nodes.len().max(ways) >= self.nodes {
+            return Err(Stop::TooManyStates);
+        }
+        Ok(())
+    }
+}
+
+/// The average number of ways of a node at most, once there are as many nodes as there may be.
+const WAYS: usize = 16;
+
+/// What can come of one state at most: each action under way may end or not, in each way, so that their number grows
+/// exponentially.
+pub(super) const MOST_WAYS: usize = 1 << 16;
+
+/// Work that is counted for each node and each of its ways, in units of [`elbowroom_num::work`].
+const NODE_WORK: u64 = 500;
+const WAY_WORK: u64 = 300;
 
 /// Where there is hope, as far as that has been looked at.
 pub(super) type Hopes = IndexMap<(Facts, u64, u32), bool>;
@@ -108,6 +156,8 @@ impl Nodes {
 
     /// One more node, with its choices.
     pub(super) fn push(&mut self, choices: Vec<Choice>) {
+        let ways: usize = choices.iter().map(Vec::len).sum();
+        work::spend(NODE_WORK + WAY_WORK.saturating_mul(ways as u64));
         for choice in choices {
             for (p, targets) in choice {
                 self.targets.extend(targets);
@@ -203,8 +253,12 @@ pub(super) fn backwards(
         let values = if cell as usize >= bound.cells() {
             states.iter().map(|state| bound.last(state)).collect()
         } else {
-            let nodes = bound.expand(cell as usize, &states, &mut layers, &mut hopes, usize::MAX);
-            let mut values = settled(&nodes.unwrap_or_default(), &found, tolls);
+            let limits = Limits {
+                goes_on,
+                ..Limits::NONE
+            };
+            let nodes = bound.expand(cell as usize, &states, &mut layers, &mut hopes, &limits)?;
+            let mut values = settled(&nodes, &found, tolls);
             values.truncate(states.len());
             values
         };
@@ -227,15 +281,17 @@ fn explored(
 ) -> Result<Layers, Stop> {
     let initial = bound.initial().into_iter();
     let mut layers = Layers::from([(0, initial.map(|(_, state)| state).collect())]);
-    let most_nodes = left.saturating_mul(NODES);
+    let limits = Limits {
+        nodes: left.saturating_mul(NODES),
+        goes_on,
+    };
     let mut cell = 0;
     loop {
         if !goes_on() {
             return Err(Stop::Interrupted);
         }
         let states = layers.remove(&cell).unwrap_or_default();
-        let nodes = bound.expand(cell as usize, &states, &mut layers, hopes, most_nodes);
-        nodes.ok_or(Stop::TooManyStates)?;
+        bound.expand(cell as usize, &states, &mut layers, hopes, &limits)?;
         let new = layers.range(cell..).map(|(_, states)| states.len());
         if new.sum::<usize>() > *left {
             return Err(Stop::TooManyStates);

@@ -10,7 +10,7 @@ use indexmap::{IndexMap, IndexSet};
 
 use super::below::{Below, Manner, Move};
 use super::chances::Chances;
-use super::graph::{Expansion, Hopes, Layers, Tolls, Values, backwards, settled};
+use super::graph::{Expansion, Hopes, Layers, Limits, Tolls, Values, backwards, settled};
 use super::numbers::Span;
 use super::state::{Phase, Running, State};
 use super::within::Search;
@@ -287,7 +287,7 @@ impl Policy {
         let bound = Below::new(world, &self.chances, self.manner);
         let mut later = Layers::new();
         let only = IndexSet::from([state.clone()]);
-        let nodes = bound.expand(cell, &only, &mut later, &mut hopes, usize::MAX);
+        let nodes = bound.expand(cell, &only, &mut later, &mut hopes, &Limits::NONE);
         let nodes = nodes.unwrap_or_default();
         let after = later.into_iter().map(|(cell, states)| {
             let values = states.iter().map(|state| self.value(cell, state));

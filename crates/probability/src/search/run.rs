@@ -137,7 +137,7 @@ impl<'s, 'w> Run<'s, 'w> {
             sequences: self.sequences,
             best: self.best.as_ref().map(|best| best.probability),
         };
-        if (self.watch)(&progress).is_break() {
+        if (self.watch)(&progress).is_break() || work::is_stopped() {
             return Ok(ControlFlow::Break(()));
         }
         self.consider()?;

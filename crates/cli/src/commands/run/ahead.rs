@@ -9,6 +9,7 @@ use elbowroom::execute::{FirstPlan, RunSpec};
 use elbowroom::execution::{PlanAnswer, Planner, PlannerAnswer};
 use elbowroom::model::problem::Condition;
 use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan};
+use elbowroom::num::work::Stop;
 
 use crate::bell::{Bell, Ring};
 use crate::clock::Clock;
@@ -91,10 +92,12 @@ impl<'a> Ahead<'a> {
         );
         let most_memory = self.aside.most_memory;
         let (own, from) = (task.with_own_table(), situation.clone());
+        let interrupted = Stop::of_this_thread();
         let made = thread::Builder::new()
             .name("planner".to_owned())
             .spawn(move || {
                 let _rings = clapper;
+                interrupted.iter().for_each(Stop::obey);
                 let begun = Clock::start();
                 let clock = || begun.seconds();
                 let limit = most_memory.map(|most| Mutex::new(MemoryLimit::of(most)));

@@ -9,6 +9,7 @@ use elbowroom::execute::{Analyst, RunSpec, SpecError, WholeRegion};
 use elbowroom::execution::executors::ExecutorSpec;
 use elbowroom::execution::{Mission, Need, PrepareError, Prepared, Preparer, Wanted};
 use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::work::Stop;
 
 use crate::bell::{Bell, Ring};
 
@@ -51,9 +52,11 @@ impl Readied {
         let (plan, situation) = (wanted.plan.clone(), wanted.situation.clone());
         let (running, now, need) = (wanted.running.to_vec(), wanted.now.clone(), wanted.need);
         let (analyst, executor) = (self.analyst.clone(), self.executor.clone());
+        let interrupted = Stop::of_this_thread();
         let made = thread::Builder::new().name("preparer".to_owned());
         let made = made.spawn(move || {
             let _rings = clapper;
+            interrupted.iter().for_each(Stop::obey);
             let mut analyst = analyst.until(move || {
                 if stop.load(Ordering::SeqCst) {
                     ControlFlow::Break(())

@@ -10,7 +10,7 @@ use elbowroom_execution::{Need, NoPlanner, Odds, Outlook, Planner, PrepareError,
 use elbowroom_external::{self as external, PlannerError};
 use elbowroom_model::problem::Problem;
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, work};
 use elbowroom_planner::embedded;
 use elbowroom_probability::Likelihoods;
 use elbowroom_sim::{Paced, SimWorld, WorldModel};
@@ -404,21 +404,7 @@ impl RunSpec {
         let model = model.filter(|_| self.executor.asks_odds());
         let is_embedded = matches!(self.whom()?, Whom::Embedded);
         let outlook = model.as_ref().filter(|_| self.executor.asks_outlook());
-        let outlook = outlook.and_then(|model| {
-            let sets = if is_embedded {
-                ActionSets::to_tabulate(task, model, self.embedded(), &|| true)
-            } else {
-                ActionSets::default()
-            };
-            let settings = Settings {
-                plans: sets.plans,
-                fallbacks: sets.fallbacks,
-                ..Settings::default()
-            };
-            let policy = Policy::close(task, model, &settings, &|| true);
-            let policy = policy.ok()??;
-            Some(Arc::new(policy) as Arc<dyn Outlook>)
-        });
+        let outlook = outlook.and_then(|model| self.outlook(task, model, is_embedded));
         let model = model.filter(|_| is_embedded);
         let rehearsal = match &outlook {
             Some(_) => None,
@@ -438,6 +424,30 @@ impl RunSpec {
             .with_odds(odds)
             .with_outlook(outlook)
             .with_rehearsal(rehearsal))
+    }
+
+    /// What moves are worth in the world of `model`; `None` if that cannot be found out within the planning budget.
+    fn outlook(
+        &self,
+        task: &Arc<Task>,
+        model: &WorldModel,
+        is_embedded: bool,
+    ) -> Option<Arc<dyn Outlook>> {
+        let embedded = self.embedded();
+        let budget = work::Budget::new(embedded.work);
+        let goes_on = || !budget.is_spent();
+        let sets = if is_embedded {
+            ActionSets::to_tabulate(task, model, embedded, &goes_on)
+        } else {
+            ActionSets::default()
+        };
+        let settings = Settings {
+            plans: sets.plans,
+            fallbacks: sets.fallbacks,
+            ..Settings::default()
+        };
+        let policy = Policy::close(task, model, &settings, &goes_on).ok()??;
+        Some(Arc::new(policy))
     }
 }
 
