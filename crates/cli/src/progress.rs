@@ -1,8 +1,16 @@
-//! The line that shows how a search is getting on: on a terminal only, nothing in a pipe.
+//! Shows the progress of a search or a run on standard error: a line that is overwritten on a terminal, a new line every
+//! few seconds elsewhere.
 
+use std::io::{self, IsTerminal};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::clock::Clock;
+use crate::output;
 
 /// Searches that end sooner than this show no line at all.
 const PATIENCE: Duration = Duration::from_millis(200);
@@ -10,39 +18,95 @@ const PATIENCE: Duration = Duration::from_millis(200);
 /// How often the line turns.
 const TURN: Duration = Duration::from_millis(250);
 
-/// A line on standard error that overwrites itself and vanishes at the end.
+/// The time between two lines where standard error is not a terminal.
+const INTERVAL: Duration = Duration::from_secs(5);
+
+/// Shows the last message, also while no new one comes.
 pub(crate) struct Progress {
-    line: Option<ProgressBar>,
+    is_terminal: bool,
+    shown: Option<Shown>,
+}
+
+enum Shown {
+    Overwritten(ProgressBar),
+    Appended(Appended),
+}
+
+/// A thread that writes the last message now and then, until this is dropped.
+struct Appended {
+    message: Arc<Mutex<String>>,
+    _until: Sender<()>,
 }
 
 impl Progress {
     /// No line yet.
     pub(crate) fn new() -> Self {
-        Self { line: None }
+        Self {
+            is_terminal: io::stderr().is_terminal(),
+            shown: None,
+        }
     }
 
-    /// Shows how far the search has come.
+    /// Shows the progress after this time.
     pub(crate) fn show(&mut self, elapsed: Duration, message: impl FnOnce() -> String) {
-        if elapsed < PATIENCE {
+        if self.is_terminal && elapsed < PATIENCE {
             return;
         }
-        let line = self.line.get_or_insert_with(|| {
-            let style = ProgressStyle::with_template("{spinner} {wide_msg}")
-                .expect("a template without mistakes");
-            let line = ProgressBar::new_spinner().with_style(style);
-            // It turns also while nothing new is told.
-            line.enable_steady_tick(TURN);
-            line
+        let is_terminal = self.is_terminal;
+        let shown = self.shown.get_or_insert_with(|| {
+            if is_terminal {
+                Shown::Overwritten(spinner())
+            } else {
+                Shown::Appended(Appended::new())
+            }
         });
-        line.set_message(message());
-        line.tick();
+        match shown {
+            Shown::Overwritten(line) => {
+                line.set_message(message());
+                line.tick();
+            }
+            Shown::Appended(lines) => lines.set_message(message()),
+        }
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Some(line) = &self.line {
+        if let Some(Shown::Overwritten(line)) = &self.shown {
             line.finish_and_clear();
         }
+    }
+}
+
+fn spinner() -> ProgressBar {
+    let style = ProgressStyle::with_template("{spinner} {elapsed}: {wide_msg}")
+        .expect("a template without mistakes");
+    let line = ProgressBar::new_spinner().with_style(style);
+    // It turns also while nothing new is told.
+    line.enable_steady_tick(TURN);
+    line
+}
+
+impl Appended {
+    fn new() -> Self {
+        let message = Arc::new(Mutex::new(String::new()));
+        let (until, ended) = mpsc::channel();
+        let last = Arc::clone(&message);
+        let clock = Clock::start();
+        // Without a thread to spare there is no progress to see.
+        let _ = thread::Builder::new().spawn(move || {
+            while ended.recv_timeout(INTERVAL) == Err(RecvTimeoutError::Timeout) {
+                let last = last.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                output::tell(&format!("{} s: {last}", clock.elapsed().as_secs()));
+            }
+        });
+        Self {
+            message,
+            _until: until,
+        }
+    }
+
+    fn set_message(&mut self, message: String) {
+        *self.message.lock().unwrap_or_else(PoisonError::into_inner) = message;
     }
 }

@@ -108,8 +108,72 @@ fn ends_the_search_with_the_best_box_so_far(name: &str, signal: u32) {
         Some(3) => println!("interrupted before there was a box"),
         other => panic!("exit code {other:?}: {document}"),
     }
-    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    let progress = String::from_utf8_lossy(&output.stderr);
+    let is_progress = |line: &str| line.ends_with(" widenings");
+    assert!(progress.lines().all(is_progress), "{progress}");
 }
+
+/// Twenty robots that work at the same time: too many states for a table of moves.
+#[test]
+fn ctrl_c_ends_the_table_of_policy() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("table");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let robots = |text: &str| -> String {
+        (0..20)
+            .map(|robot| text.replace('#', &robot.to_string()))
+            .collect()
+    };
+    let problem = format!(
+        "(define (problem twenty) (:domain robots) (:objects{}) (:init (open){} (at 5.4 (not (open)))) (:goal (and{})))",
+        robots(" r#"),
+        robots(" (idle r#)"),
+        robots(" (done r#)")
+    );
+    let files = [
+        ("domain.pddl", ROBOTS),
+        ("problem.pddl", &problem),
+        ("robots.plan", &robots("0: (work r#) [5]\n")),
+        (
+            "world.toml",
+            "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"*\"\n\
+             uniform = { from = 0.9, to = 1.1 }\nrelative = true\n",
+        ),
+    ];
+    for (name, text) in files {
+        std::fs::write(folder.join(name), text).expect("a file");
+    }
+    let child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .args([
+            "run",
+            "domain.pddl",
+            "problem.pddl",
+            "robots.plan",
+            "--world",
+        ])
+        .args([
+            "world.toml",
+            "--executor",
+            "policy",
+            "--planning-budget",
+            "1e9",
+        ])
+        .current_dir(&folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the command");
+    wait_until_it_listens(&child, 2);
+    sleep(Duration::from_secs(1));
+    send(&child, 2);
+    let output = child.wait_with_output().expect("its output");
+    assert_eq!(output.status.code(), Some(130));
+}
+
+const ROBOTS: &str = "(define (domain robots) (:requirements :durative-actions)
+  (:predicates (idle ?r) (done ?r) (open))
+  (:durative-action work :parameters (?r) :duration (= ?duration 5)
+    :condition (and (at start (idle ?r)) (over all (open)))
+    :effect (and (at start (not (idle ?r))) (at end (idle ?r)) (at end (done ?r)))))";
 
 /// In a terminal made by `script`, of util-linux; skipped where there is none.
 #[test]

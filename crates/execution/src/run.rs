@@ -102,7 +102,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, work};
 
 pub use account::{Account, ExecutedStep, KnownStart};
 pub use amid::{Amid, Beginning};
@@ -131,6 +131,10 @@ use lasting::Lasting;
 use pending::Pending;
 use progress::Progress;
 use search::{Lost, Search};
+
+/// Work that is counted for a decision, and for each step of the plan in it, in units of [`elbowroom_num::work`].
+const DECISION_WORK: u64 = 10_000;
+const STEP_WORK: u64 = 250;
 
 /// The components that a run calls itself.
 pub struct Ports<'a> {
@@ -297,6 +301,7 @@ impl<'a> Run<'a> {
     }
 
     fn decide(&mut self) -> Decided {
+        work::spend(DECISION_WORK + STEP_WORK.saturating_mul(self.steps as u64));
         let news = std::mem::take(&mut self.news);
         let as_planned = self.belief_of_the_plan();
         let decided = self.ports.executor.decide(&Moment {

@@ -11,13 +11,13 @@ use elbowroom_laboratory::answer::{
 };
 use elbowroom_laboratory::compare::Part;
 use elbowroom_laboratory::record::TrialRecords;
-use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::CompareArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::look::{BAD, Look, styled};
 use crate::output::Output;
+use crate::progress::Progress;
 use crate::stopwatch::Stopwatch;
 use crate::words::plain;
 use crate::{input, output};
@@ -98,20 +98,17 @@ fn make(
         jobs: arguments.jobs,
     };
     let mut watch = Watch {
-        bar: ProgressBar::no_length().with_style(
-            ProgressStyle::with_template("{bar:30} {pos}/{len} trials, {eta} left")
-                .expect("a template without mistakes"),
-        ),
+        line: Progress::new(),
         stopwatch: Stopwatch::start(&Interrupt::listen()),
     };
     let answer = compare_recorded(CompareRequest { experiment, part }, records, &mut watch);
-    watch.bar.finish_and_clear();
+    drop(watch);
     Ok(answer?)
 }
 
 /// Shows how many trials have been made, and ends them when the user asks to.
 struct Watch {
-    bar: ProgressBar,
+    line: Progress,
     stopwatch: Stopwatch,
 }
 
@@ -122,8 +119,12 @@ impl Watcher for Watch {
 
     fn notice(&mut self, event: &Event<'_>) {
         if let Event::Trials(progress) = event {
-            self.bar.set_length(progress.of);
-            self.bar.set_position(progress.done);
+            let elapsed = self.stopwatch.elapsed();
+            let (done, of) = (progress.done, progress.of);
+            self.line.show(elapsed, || {
+                let left = of.saturating_sub(done) * elapsed.as_secs() / done.max(1);
+                format!("{done} of {of} trials, about {left} s left")
+            });
         }
     }
 }

@@ -14,7 +14,7 @@ use elbowroom_execution::{
 };
 use elbowroom_model::ground::FactId;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, work};
 use elbowroom_sim::{ExogenousChange, Rule};
 
 use super::first_plan::renumbered;
@@ -73,7 +73,8 @@ const SEED: u64 = 0x7265_6865_0000_0000;
 /// has failed, or skips what is not needed), another plan, and waiting.
 ///
 /// All are tried in the same samples (common random numbers), and who is behind by more than
-/// chance is tried no further. How much is tried is counted, so that no clock matters.
+/// chance is tried no further. How much is tried is counted, so that no clock matters; when the planner's work limit is
+/// spent, the samples so far decide.
 pub struct Rehearse {
     rollouts: Rollouts,
     planner: Embedded<'static>,
@@ -374,10 +375,14 @@ impl Rehearse {
     }
 
     fn choose(&mut self, scene: &Scene<'_>, mut ways: Vec<Way>) -> (Vec<Way>, Choice) {
+        let budget = work::Budget::new(self.planner.work);
         let mut stage = Stage::new(scene, &self.rollouts);
         let mut first = Vec::new();
         for sample in 0..FIRST_LOOK {
             first.push(stage.succeeds(self, scene, &ways[0], sample));
+            if budget.is_spent() {
+                break;
+            }
         }
         let failed = first.iter().filter(|success| !**success).count();
         let few = match scene {
@@ -386,7 +391,7 @@ impl Rehearse {
             _ => FEWER,
         };
         if failed <= few {
-            let share = Rational::ONE - count(failed as u64) / count(FIRST_LOOK);
+            let share = Rational::ONE - count(failed as u64) / count(first.len() as u64);
             let choice = Choice {
                 way: 0,
                 value: share.clone(),
@@ -414,7 +419,7 @@ impl Rehearse {
             if let (0, Some(known)) = (place, looked) {
                 return Some(*known);
             }
-            Some(stage.succeeds(self, scene, &ways[place], sample))
+            (!budget.is_spent()).then(|| stage.succeeds(self, scene, &ways[place], sample))
         });
         let is_ahead = if scene.is_new || scene.is_given_up {
             let margin = if scene.is_new { MARGIN } else { u64::MAX };
@@ -424,13 +429,14 @@ impl Rehearse {
             // Of many that were tried, some are ahead by chance: they must be so once more.
             tallies[0].is_behind(&tallies[leader]) && {
                 let mut again = |way: &Way| {
-                    let samples = AGAIN..AGAIN + ROUNDS[ROUNDS.len() - 1];
-                    samples
-                        .map(|sample| stage.succeeds(self, scene, way, sample))
-                        .collect()
+                    let mut samples = AGAIN..AGAIN + ROUNDS[ROUNDS.len() - 1];
+                    samples.try_fold(Vec::new(), |mut results, sample| {
+                        results.push(stage.succeeds(self, scene, way, sample));
+                        (!budget.is_spent()).then_some(results)
+                    })
                 };
-                let own: Vec<bool> = again(&ways[0]);
-                is_behind(&own, &again(&ways[leader]))
+                let both = again(&ways[0]).zip(again(&ways[leader]));
+                both.is_some_and(|(own, leader)| is_behind(&own, &leader))
             }
         };
         let way = if is_ahead { leader } else { 0 };

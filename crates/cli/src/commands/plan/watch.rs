@@ -83,14 +83,10 @@ impl Watch {
                     let _ = write!(line, ", metric {}", number::nearest(metric));
                 }
             }
-            let _ = match limit {
-                Some(limit) => write!(
-                    line,
-                    ", {} s left",
-                    (limit.saturating_sub(elapsed)).as_secs()
-                ),
-                None => write!(line, ", {} s", elapsed.as_secs()),
-            };
+            if let Some(limit) = limit {
+                let left = limit.saturating_sub(elapsed).as_secs();
+                let _ = write!(line, ", {left} s left");
+            }
             line
         });
     }
