@@ -56,10 +56,11 @@ impl Progression {
             if view(cell).holds(condition) != Ok(true) {
                 continue;
             }
-            let first = ((&self.time + &root.1) / grid).ceil() * grid;
+            // The zero is at most one step after its earliest time.
+            let first = ((&self.time + &root.0) / grid).ceil() * grid;
+            let steps = [0, 1, 2].map(|steps| &first + grid * Rational::from(steps));
             let exact = Some(&self.time + &root.0).filter(|_| root.0 == root.1);
-            let times = [Some(first.clone()), exact, Some(first + grid)];
-            if let Some(time) = times.into_iter().flatten().find(|time| holds_at(time)) {
+            if let Some(time) = steps.into_iter().chain(exact).find(&holds_at) {
                 return Some(time);
             }
         }
