@@ -159,27 +159,29 @@ fn comparison(rng: &mut ChaCha8Rng) -> String {
     }
 }
 
+/// An effect on a number.
+fn effect(rng: &mut ChaCha8Rng) -> String {
+    let fluent = pick(rng, &FLUENTS);
+    if rng.random_range(0..4) == 0 {
+        let change = pick(rng, &["increase", "decrease"]);
+        let rate = pick(rng, &["0.5", "1", "2"]);
+        return format!("({change} {fluent} (* #t {rate}))");
+    }
+    let change = pick(rng, &["increase", "decrease", "assign"]);
+    let amount = match rng.random_range(0..5) {
+        0 => pick(rng, &FLUENTS).to_owned(),
+        1 => "?duration".to_owned(),
+        _ => rng.random_range(0..6).to_string(),
+    };
+    let when = pick(rng, &["start", "end"]);
+    format!("(at {when} ({change} {fluent} {amount}))")
+}
+
 fn draft(rng: &mut ChaCha8Rng, number: usize, time: &mut f64) -> Draft {
     let mut effects = format!("(at end (done{number}))");
     for _ in 0..rng.random_range(0..3) {
-        let fluent = pick(rng, &FLUENTS);
-        let _ = match rng.random_range(0..4) {
-            0 => {
-                let change = pick(rng, &["increase", "decrease"]);
-                let rate = pick(rng, &["0.5", "1", "2"]);
-                write!(effects, " ({change} {fluent} (* #t {rate}))")
-            }
-            _ => {
-                let change = pick(rng, &["increase", "decrease", "assign"]);
-                let amount = match rng.random_range(0..5) {
-                    0 => pick(rng, &FLUENTS).to_owned(),
-                    1 => "?duration".to_owned(),
-                    _ => rng.random_range(0..6).to_string(),
-                };
-                let when = pick(rng, &["start", "end"]);
-                write!(effects, " (at {when} ({change} {fluent} {amount}))")
-            }
-        };
+        effects.push(' ');
+        effects += &effect(rng);
     }
     let length = rng.random_range(1..7);
     let fluent = pick(rng, &FLUENTS);
