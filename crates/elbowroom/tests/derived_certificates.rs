@@ -9,6 +9,8 @@ mod course;
 mod forgery;
 #[path = "derived_certificates/guards.rs"]
 mod guards;
+#[path = "derived_certificates/moments.rs"]
+mod moments;
 #[path = "derived_certificates/networks.rs"]
 mod networks;
 #[path = "derived_certificates/numbers.rs"]

@@ -13,6 +13,7 @@ mod motion;
 mod parts;
 mod polynomial;
 mod reading;
+mod start;
 mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,6 +28,7 @@ use elbowroom_num::{Interval, Rational};
 pub(crate) use goal::Outlook;
 pub use parts::{Guards, Parts, UnderwayParts};
 pub use reading::Unreadable;
+pub(crate) use start::duration_bounds;
 
 use crate::event::{Measured, Ticket};
 use motion::{Motion, Rate};

@@ -30,6 +30,8 @@ pub struct PartialOrderPlan {
     pub instances: Vec<Instance>,
     /// For each step of the plan that this was made of, its instance.
     pub instance_of_step: Vec<InstanceId>,
+    /// The planned duration of each instance; `None` for an instantaneous one, or without a plan.
+    pub planned: Vec<Option<Rational>>,
     /// [`Node::Zero`], then each instance's start and end, or instant, in order, then the timed
     /// initials in order of time: the nodes of the [`StnPlan`] of the same instances.
     pub nodes: Vec<Node>,
@@ -87,6 +89,7 @@ impl PartialOrderPlan {
         Self {
             links: links.collect(),
             instance_of_step: instances,
+            planned: vec![None; stn_plan.instances.len()],
             instances: stn_plan.instances,
             nodes: stn_plan.nodes,
         }
@@ -157,8 +160,13 @@ pub fn partial_order(task: &Task, plan: &TimeTriggeredPlan) -> PartialOrderPlan 
             }
         }
     }
+    let mut planned = vec![None; stn_plan.instances.len()];
+    for (instance, step) in instances.iter().zip(&plan.steps) {
+        planned[instance.index()].clone_from(&step.duration);
+    }
     PartialOrderPlan {
         instance_of_step: instances,
+        planned,
         instances: stn_plan.instances,
         nodes: stn_plan.nodes,
         links,

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_model::ground::FluentId;
+use elbowroom_model::ground::{Expression, FluentId};
 use elbowroom_model::{State, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId};
 
 use crate::belief::Belief;
 use crate::likelihoods::Likelihoods;
+use crate::model::Value;
 
 /// The state from which an order is searched for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,6 +60,14 @@ impl Circumstances {
             values: state.values.clone(),
             running: Vec::new(),
             recent: Vec::new(),
+        }
+    }
+
+    /// The value of a leaf of an expression.
+    pub(crate) fn value(&self, leaf: &Expression) -> Value {
+        match leaf {
+            Expression::Fluent(fluent) => self.values.get(fluent).into(),
+            _ => Value::Open,
         }
     }
 

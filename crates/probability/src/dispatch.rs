@@ -14,10 +14,12 @@ mod following;
 
 use std::ops::ControlFlow;
 
+use elbowroom_model::ground::Expression;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use crate::circumstances::Circumstances;
+use crate::model::evaluate;
 use crate::network::{Happenings, TooCoupled};
 use crate::search::{OrderSearch, Progress};
 use crate::total_order::{Slot, TotalOrderPlan};
@@ -163,14 +165,9 @@ impl LayerDispatch {
 /// Whether the goal holds of what is more likely than not.
 pub fn goal_holds(model: &crate::Model, circumstances: &Circumstances) -> bool {
     let truth = |fact| circumstances.belief.probability(fact) >= 0.5;
-    let value = |leaf: &elbowroom_model::ground::Expression| match leaf {
-        elbowroom_model::ground::Expression::Fluent(fluent) => {
-            circumstances.values.get(fluent).cloned()
-        }
-        _ => None,
-    };
+    let value = |leaf: &Expression| circumstances.value(leaf);
     let task = model.task();
-    crate::model::evaluate(task, task.goal(), &truth, &value).unwrap_or(false)
+    evaluate(task, task.goal(), &truth, &value).unwrap_or(false)
 }
 
 /// The position of the happening after the lattermost layer that fits, and when it may be.

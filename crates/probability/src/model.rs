@@ -17,7 +17,7 @@ use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
 
 use crate::likelihoods::{Flip, Likelihoods, Missing, Rate};
 
-pub(crate) use requirement::{Requirement, evaluate, visit_facts};
+pub(crate) use requirement::{Requirement, Value, evaluate, visit_facts};
 
 /// The semantics of failed effects and of spontaneous changes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -155,13 +155,10 @@ impl Layer {
     /// Whether the conditions on numbers and on several facts hold.
     pub(crate) fn conditions_hold(&self, model: &Model, circumstances: &Circumstances) -> bool {
         let is_likely = |fact: FactId| circumstances.belief.probability(fact) >= 0.5;
-        let value = |leaf: &Expression| match leaf {
-            Expression::Fluent(fluent) => circumstances.values.get(fluent).cloned(),
-            _ => None,
-        };
+        let value = |leaf: &Expression| circumstances.value(leaf);
         let task = model.task();
         self.conditions.iter().all(|condition| {
-            // A number that is not known now cannot speak against it.
+            // A duration that is not known cannot speak against it.
             evaluate(task, condition, &is_likely, &value).unwrap_or(true)
         })
     }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::FactId;
-use elbowroom_plan::{NodeId, PartialOrderPlan};
+use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
 use elbowroom_probability::dispatch::patient;
 use elbowroom_probability::likelihoods;
 use elbowroom_probability::search::Found;
@@ -434,4 +434,70 @@ fn effects_that_numbers_prevent_do_not_exclude_an_order() {
             .unwrap_or_else(|| panic!("no order with {effect}"));
         assert!((order.probability - 1.0).abs() < 1e-12, "{effect}");
     }
+}
+
+#[test]
+fn comparison_of_undefined_fluent_does_not_hold() {
+    let orders = |condition: &str| {
+        let domain = format!(
+            "(define (domain d) (:requirements :adl :durative-actions :numeric-fluents)
+               (:predicates (p) (q)) (:functions (n) (u))
+               (:durative-action act :parameters () :duration (= ?duration 2)
+                 :condition (at start {condition}) :effect (and (at end (q)) (increase (n) (* #t 1))))
+               (:durative-action next :parameters () :duration (= ?duration 1)
+                 :condition (at end {condition}) :effect (at end (p))))"
+        );
+        let problem = "(define (problem x) (:domain d) (:init (= (n) 5)) (:goal (and (p) (q))))";
+        let found = search(
+            shared::read_task(&domain, problem, "0: (act) [2]\n1: (next) [1]"),
+            &Likelihoods::certain(),
+        );
+        found.order.is_some()
+    };
+    for condition in [
+        "(> (u) 3)",
+        "(not (> (u) 3))",
+        "(> (n) (u))",
+        "(or (> (u) 3) (< (n) 2))",
+        "(and (> (n) 1) (not (and (> (n) 3) (> (u) 3))))",
+        "(> (/ 1 (- (n) (n))) 0)",
+    ] {
+        assert!(!orders(condition), "{condition}");
+    }
+    for condition in [
+        "(or (> (u) 3) (> (n) 2))",
+        "(not (and (> (u) 3) (< (n) 3)))",
+    ] {
+        assert!(orders(condition), "{condition}");
+    }
+}
+
+#[test]
+fn duration_bounds_decide_on_orders() {
+    // The drive takes as long as is left: three seconds, after the stop that takes two of five.
+    let domain = "(define (domain d) (:requirements :adl :durative-actions :numeric-fluents)
+         (:predicates (p) (q)) (:functions (left))
+         (:durative-action stop :parameters () :duration (= ?duration 1)
+           :effect (and (at end (p)) (at end (decrease (left) 2))))
+         (:durative-action drive :parameters () :duration (= ?duration (left)) :effect (at end (q))))";
+    let problem = "(define (problem x) (:domain d) (:init (= (left) 5)) (:goal (and (p) (q))))";
+    let best = |plan: &str| {
+        let (task, plan) = shared::read_task(domain, problem, plan);
+        let nodes = plan.nodes.clone();
+        let found = search((task, plan), &Likelihoods::certain());
+        let sequence = found.order.expect("an order").sequence;
+        let nodes = sequence.iter().map(|node| nodes[node.index()]);
+        nodes.collect::<Vec<_>>()
+    };
+    let [first, second] = [0, 1].map(InstanceId);
+    let one_by_one = [
+        Node::Start(first),
+        Node::End(first),
+        Node::Start(second),
+        Node::End(second),
+    ];
+    assert_eq!(best("0: (stop) [1]\n2: (drive) [3]"), one_by_one);
+    let order = best("0: (drive) [5]\n6: (stop) [1]");
+    let place = |node: Node| order.iter().position(|own| *own == node);
+    assert!(place(Node::Start(first)) < place(Node::End(second)));
 }

@@ -110,7 +110,7 @@ impl Analyst {
         plan: &TimeTriggeredPlan,
         need: Need,
     ) -> Result<Prepared, PrepareError> {
-        let mut deordered = deorder::deorder(task, &facts_only(plan))?;
+        let mut deordered = deorder::deorder(task, &facts_only(task, plan))?;
         let order = (need == Need::PartialOrder).then(|| partial_order(task, &as_timed(plan)));
         for (instance, step) in deordered.instances.iter().zip(&plan.steps) {
             deordered.plan.instances[instance.index()].action = step.action.clone();

@@ -1,14 +1,34 @@
 //! Actions as a dispatcher sees them that knows no numbers, or no durations but the planned ones.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use elbowroom_model::ground::{Action, Body, Change, Condition, Effect, Expression, SnapAction};
-use elbowroom_model::{Step, TimeTriggeredPlan};
+use elbowroom_model::ground::{
+    Action, Body, Change, Condition, Effect, Expression, FluentId, Guard, SnapAction,
+};
+use elbowroom_model::{Step, Task, TimeTriggeredPlan};
 
-/// The plan without conditions and effects on numbers: what `ROSPlan` orders happenings by.
-pub(super) fn facts_only(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
-    let steps = plan.steps.iter().map(|step| Step {
-        action: Arc::new(without_numbers(&step.action)),
+/// The plan without conditions on numbers, and without effects on numbers that decide neither durations nor facts: what
+/// `ROSPlan` orders happenings by.
+pub(super) fn facts_only(task: &Task, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
+    let actions = plan
+        .steps
+        .iter()
+        .map(|step| without_conditions(&step.action));
+    let mut actions: Vec<Action> = actions.collect();
+    let deciding = deciding(task, &actions);
+    for action in &mut actions {
+        match &mut action.body {
+            Body::Instantaneous(snap) => strip(snap, &deciding),
+            Body::Durative(body) => {
+                strip(Arc::make_mut(&mut body.start), &deciding);
+                strip(Arc::make_mut(&mut body.end), &deciding);
+                body.continuous.retain(|it| deciding.contains(&it.fluent));
+            }
+        }
+    }
+    let steps = plan.steps.iter().zip(actions).map(|(step, action)| Step {
+        action: Arc::new(action),
         ..step.clone()
     });
     TimeTriggeredPlan {
@@ -16,24 +36,90 @@ pub(super) fn facts_only(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
     }
 }
 
-fn without_numbers(action: &Action) -> Action {
+/// The fluents that decide durations and facts: durations, guards of effects on facts, and derived facts read them, or
+/// other such fluents are computed from them.
+fn deciding(task: &Task, actions: &[Action]) -> BTreeSet<FluentId> {
+    let mut deciding = BTreeSet::new();
+    loop {
+        let before = deciding.len();
+        for action in actions {
+            let mut read = BTreeSet::new();
+            let snap = |snap: &SnapAction, read: &mut BTreeSet<FluentId>| {
+                include(task, &snap.condition, read);
+                for effect in &snap.effects {
+                    if let Change::Update { fluent, value, .. } = &effect.change {
+                        if !deciding.contains(fluent) {
+                            continue;
+                        }
+                        value.visit_fluents(&mut |fluent| {
+                            read.insert(fluent);
+                        });
+                    }
+                    include_guard(task, &effect.guard, read);
+                }
+            };
+            match &action.body {
+                Body::Instantaneous(only) => snap(only, &mut read),
+                Body::Durative(body) => {
+                    snap(&body.start, &mut read);
+                    snap(&body.end, &mut read);
+                    include(task, &body.over_all, &mut read);
+                    let bounds = body.duration.iter().map(|it| &it.bound);
+                    let running = body.continuous.iter();
+                    let running = running.filter(|it| deciding.contains(&it.fluent));
+                    for effect in running.clone() {
+                        include_guard(task, &effect.guard, &mut read);
+                    }
+                    for number in bounds.chain(running.map(|it| &it.rate)) {
+                        number.visit_fluents(&mut |fluent| {
+                            read.insert(fluent);
+                        });
+                    }
+                }
+            }
+            deciding.extend(read);
+        }
+        if deciding.len() == before {
+            return deciding;
+        }
+    }
+}
+
+/// Adds the fluents that a condition reads, also through rules.
+fn include(task: &Task, condition: &Condition, read: &mut BTreeSet<FluentId>) {
+    task.visit_fluents_of(condition, &mut |fluent| {
+        read.insert(fluent);
+    });
+}
+
+fn include_guard(task: &Task, guard: &Guard, read: &mut BTreeSet<FluentId>) {
+    for condition in [&guard.at_start, &guard.over_all, &guard.now] {
+        include(task, condition, read);
+    }
+}
+
+/// The action with its comparisons taken for fulfilled.
+fn without_conditions(action: &Action) -> Action {
     let mut action = action.clone();
+    let without = |snap: &mut SnapAction| snap.condition = taken_as(&snap.condition, true);
     match &mut action.body {
-        Body::Instantaneous(snap) => strip(snap),
+        Body::Instantaneous(snap) => without(snap),
         Body::Durative(body) => {
-            strip(Arc::make_mut(&mut body.start));
-            strip(Arc::make_mut(&mut body.end));
+            without(Arc::make_mut(&mut body.start));
+            without(Arc::make_mut(&mut body.end));
             body.over_all = taken_as(&body.over_all, true);
-            body.continuous.clear();
         }
     }
     action
 }
 
-fn strip(snap: &mut SnapAction) {
-    snap.condition = taken_as(&snap.condition, true);
-    let is_number = |effect: &Effect| matches!(effect.change, Change::Update { .. });
-    snap.effects.retain(|effect| !is_number(effect));
+/// Drops effects on other fluents than these.
+fn strip(snap: &mut SnapAction, deciding: &BTreeSet<FluentId>) {
+    let is_kept = |effect: &Effect| match &effect.change {
+        Change::Update { fluent, .. } => deciding.contains(fluent),
+        Change::Add(_) | Change::Delete(_) => true,
+    };
+    snap.effects.retain(is_kept);
 }
 
 /// The condition with its comparisons taken for fulfilled; below a negation, for not fulfilled.

@@ -19,6 +19,7 @@ mod literal;
 mod lookahead;
 mod meanwhile;
 mod nothing_left;
+mod numbers;
 mod one_time;
 mod openings;
 mod others;

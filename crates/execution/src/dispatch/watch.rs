@@ -8,7 +8,7 @@ use elbowroom_stn::WindowEnd;
 use super::{Dispatch, explain, is_instantaneous};
 use crate::executor::{Decided, Decision, Moment, Order, StepId};
 use crate::horizon::Horizon;
-use crate::progression::{Outlook, Progression};
+use crate::progression::{Outlook, Progression, duration_bounds};
 use crate::reason::{About, Cause, Reason};
 
 /// An instance that may be under way, although nobody has said so.
@@ -274,16 +274,18 @@ fn broken(moment: &Moment<'_>) -> Option<Reason> {
     Some(reason.about(about).since(moment.now.clone()))
 }
 
-/// The condition of an action's start that does not hold.
+/// The condition of an action's start, or the bound on its duration, that does not hold.
 pub(crate) fn unmet(action: &Action, duration: &Rational, belief: &Progression) -> Option<Reason> {
     let condition = match &action.body {
         Body::Instantaneous(snap) => &snap.condition,
         Body::Durative(body) => &body.start.condition,
     };
-    if belief.holds(condition, Some(duration)) == Ok(true) {
+    let bounds = duration_bounds(action, duration);
+    let mut unmet = belief.unmet(condition, Some(duration));
+    unmet.extend(bounds.iter().flat_map(|it| belief.unmet(it, None)));
+    if unmet.is_empty() {
         return None;
     }
-    let unmet = belief.unmet(condition, Some(duration));
     let reason = Reason::new(Cause::Condition).of(&action.name);
     Some(reason.about(About::Conditions(in_words(belief, &unmet))))
 }

@@ -61,6 +61,11 @@ impl Motion {
         self.0.is_empty()
     }
 
+    /// Returns `true` if the fluent moves.
+    pub(super) fn moves(&self, fluent: FluentId) -> bool {
+        self.0.contains_key(&fluent)
+    }
+
     /// A fluent's value as a function of time; `now` is what it is where it does not move.
     pub(super) fn value(
         &self,

@@ -169,15 +169,15 @@ impl Progression {
 }
 
 /// The state in a part of the time until the next group.
-struct View<'a> {
-    state: &'a Progression,
-    motion: &'a Motion,
-    duration: &'a Rational,
-    cell: Cell,
+pub(super) struct View<'a> {
+    pub(super) state: &'a Progression,
+    pub(super) motion: &'a Motion,
+    pub(super) duration: &'a Rational,
+    pub(super) cell: Cell,
 }
 
 impl View<'_> {
-    fn holds(&self, condition: &Condition) -> Result<bool, Unreadable> {
+    pub(super) fn holds(&self, condition: &Condition) -> Result<bool, Unreadable> {
         match self.state.task.derivation() {
             Some(derivation) if derivation.is_read_by(condition) => {
                 let derived = derivation.derive(self);
@@ -188,7 +188,7 @@ impl View<'_> {
     }
 
     /// Where these are zero, comparisons that the condition reads may turn.
-    fn boundaries(&self, condition: &Condition) -> Vec<super::polynomial::Polynomial> {
+    pub(super) fn boundaries(&self, condition: &Condition) -> Vec<super::polynomial::Polynomial> {
         let mut found = Vec::new();
         let mut note = |left: &Expression, right: &Expression| {
             if let Ok(difference) = self.difference(left, right) {

@@ -5,9 +5,11 @@ use std::sync::Arc;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{
-    Action, Body, Change, Condition, DurativeBody, Effect, Expression, FactId, FluentId, SnapAction,
+    Action, Body, Change, Condition, DurationConstraint, DurativeBody, Effect, Expression, FactId,
+    FluentId, SnapAction,
 };
 use elbowroom_model::problem::UpdateOperator;
+use elbowroom_num::Rational;
 use elbowroom_plan::{Node, PartialOrderPlan};
 
 use super::requirement::{Requirement, is_derived, visit_facts};
@@ -62,6 +64,11 @@ pub(super) fn model(
         match (&instance.action.body, start, end) {
             (Body::Durative(body), Some(start), Some(end)) => {
                 let (mut first, mut second) = compiler.durative(&instance.action, body)?;
+                let bounds = compiler.bounds(body, plan.planned[id.index()].as_ref());
+                for (at_end, bound) in bounds {
+                    let event = if at_end { &mut second } else { &mut first };
+                    event.condition.numeric.push(bound);
+                }
                 let (least, greatest) = plan.duration(id);
                 if greatest.as_ref() == Some(&least) {
                     first.duration = Some(least.clone());
@@ -225,6 +232,29 @@ impl Compiler<'_> {
             end.continuous.push((fluent, rate));
         }
         Ok((start, end))
+    }
+
+    /// The bounds on a planned duration that read numbers which the plan changes, as conditions; each with whether it
+    /// counts at the end. The other bounds are in the plan's links.
+    fn bounds(&self, body: &DurativeBody, planned: Option<&Rational>) -> Vec<(bool, Condition)> {
+        // What remains of a running action has started.
+        let Some(planned) = planned.filter(|_| !body.is_under_way) else {
+            return Vec::new();
+        };
+        let changes = |bound: &Expression| {
+            let mut changes = false;
+            bound.visit_fluents(&mut |fluent| {
+                changes |= self.fluents.binary_search(&fluent).is_ok();
+            });
+            changes
+        };
+        let bounds = body.duration.iter().filter(|it| changes(&it.bound));
+        let condition = |it: &DurationConstraint| {
+            let planned = Expression::Constant(planned.clone());
+            let bound = Condition::Compare(it.comparison, planned, it.bound.clone());
+            (it.at_end, bound)
+        };
+        bounds.map(condition).collect()
     }
 
     /// What a failed end leaves behind. Facts that nothing in the model reads or writes are left out.

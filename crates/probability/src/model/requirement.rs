@@ -104,37 +104,131 @@ pub(crate) fn negations_inwards(condition: &Condition, is_positive: bool) -> Con
     }
 }
 
-/// Whether a condition holds, the truth of basic facts and the values of fluents being given.
+/// The value of a number.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Value {
+    /// There is none: the fluent was never assigned, or something is divided by zero.
+    Undefined,
+    /// It depends on times, and not only on the order of happenings.
+    Open,
+    /// It is this.
+    Known(Rational),
+}
+
+impl From<Option<&Rational>> for Value {
+    /// The value of a fluent in a state.
+    fn from(value: Option<&Rational>) -> Self {
+        value.map_or(Self::Undefined, |value| Self::Known(value.clone()))
+    }
+}
+
+impl Value {
+    /// The value of an expression, that of its leaves being given.
+    pub(crate) fn of(expression: &Expression, leaf: &dyn Fn(&Expression) -> Self) -> Self {
+        let mut is_open = false;
+        let value = expression.evaluate(&mut |part| match leaf(part) {
+            Self::Known(value) => Some(value),
+            other => {
+                is_open |= other == Self::Open;
+                None
+            }
+        });
+        match value {
+            Some(value) => Self::Known(value),
+            // The evaluation stops at the first leaf that is not known.
+            None if is_open && !reads_undefined(expression, leaf) => Self::Open,
+            None => Self::Undefined,
+        }
+    }
+}
+
+/// Returns `true` if the expression reads a fluent without a value.
+fn reads_undefined(expression: &Expression, leaf: &dyn Fn(&Expression) -> Value) -> bool {
+    let mut is_undefined = false;
+    expression.visit_fluents(&mut |fluent| {
+        is_undefined |= leaf(&Expression::Fluent(fluent)) == Value::Undefined;
+    });
+    is_undefined
+}
+
+/// Whether a condition holds, the truth of basic facts and the values of fluents being given. A comparison that reads a
+/// fluent without a value does not hold, and neither does its negation.
 ///
 /// # Errors
-/// When that rests on a number that is not known.
+/// When that rests on a number that depends on times.
 pub(crate) fn evaluate(
     task: &Task,
     condition: &Condition,
     truth: &dyn Fn(FactId) -> bool,
-    value: &dyn Fn(&Expression) -> Option<Rational>,
-) -> Result<bool, UnknownNumber> {
+    value: &dyn Fn(&Expression) -> Value,
+) -> Result<bool, TimeDependent> {
     let basic = Basic { truth, value };
-    match task.derivation() {
+    let read = |condition: &Condition| match task.derivation() {
         Some(derivation) if derivation.is_read_by(condition) => {
             let derived = derivation.derive(&basic);
             holds(condition, &derivation.on_top_of(&basic, &derived))
         }
         _ => holds(condition, &basic),
+    };
+    match read(condition) {
+        Ok(holds) => Ok(holds),
+        Err(_) => match read(&without_undefined(condition, true, value)) {
+            Ok(holds) => Ok(holds),
+            Err(Fault::TimeDependent) => Err(TimeDependent),
+            // A rule of a derived fact reads a fluent without a value.
+            Err(Fault::Undefined) => Ok(false),
+        },
     }
 }
 
-/// A condition rests on a number that is not known.
+/// The condition with comparisons that read fluents without a value in place of what makes it false.
+fn without_undefined(
+    condition: &Condition,
+    is_positive: bool,
+    value: &dyn Fn(&Expression) -> Value,
+) -> Condition {
+    let all = |parts: &[Condition]| {
+        let parts = parts.iter();
+        parts
+            .map(|part| without_undefined(part, is_positive, value))
+            .collect()
+    };
+    match condition {
+        Condition::Fact(fact) => Condition::Fact(*fact),
+        Condition::Compare(_, left, right) => {
+            let is_undefined = |side: &Expression| Value::of(side, value) == Value::Undefined;
+            match (is_undefined(left) || is_undefined(right), is_positive) {
+                (false, _) => condition.clone(),
+                (true, true) => Condition::FALSE,
+                (true, false) => Condition::TRUE,
+            }
+        }
+        Condition::Not(part) => {
+            Condition::Not(Box::new(without_undefined(part, !is_positive, value)))
+        }
+        Condition::And(parts) => Condition::And(all(parts)),
+        Condition::Or(parts) => Condition::Or(all(parts)),
+    }
+}
+
+/// A condition rests on a number that depends on times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct UnknownNumber;
+pub(crate) struct TimeDependent;
+
+/// The reason why a comparison is neither true nor false.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fault {
+    Undefined,
+    TimeDependent,
+}
 
 struct Basic<'a> {
     truth: &'a dyn Fn(FactId) -> bool,
-    value: &'a dyn Fn(&Expression) -> Option<Rational>,
+    value: &'a dyn Fn(&Expression) -> Value,
 }
 
-impl Moment<UnknownNumber> for Basic<'_> {
-    fn fact(&self, fact: FactId) -> Result<bool, UnknownNumber> {
+impl Moment<Fault> for Basic<'_> {
+    fn fact(&self, fact: FactId) -> Result<bool, Fault> {
         Ok((self.truth)(fact))
     }
 
@@ -143,11 +237,12 @@ impl Moment<UnknownNumber> for Basic<'_> {
         comparison: Comparison,
         left: &Expression,
         right: &Expression,
-    ) -> Result<bool, UnknownNumber> {
-        let value = |side: &Expression| side.evaluate(&mut |leaf| (self.value)(leaf));
+    ) -> Result<bool, Fault> {
+        let value = |side: &Expression| Value::of(side, self.value);
         match (value(left), value(right)) {
-            (Some(left), Some(right)) => Ok(comparison.holds(&left, &right)),
-            _ => Err(UnknownNumber),
+            (Value::Known(left), Value::Known(right)) => Ok(comparison.holds(&left, &right)),
+            (Value::Undefined, _) | (_, Value::Undefined) => Err(Fault::Undefined),
+            _ => Err(Fault::TimeDependent),
         }
     }
 }

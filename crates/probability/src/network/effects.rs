@@ -1,14 +1,13 @@
 //! What a happening does to facts and numbers.
 
 use elbowroom_model::ground::{Condition, Expression};
-use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::numbers::{Number, Numbers};
 use super::outcome::{Outcome, Pending};
 use super::{PrunedNetwork, TooCoupled, Undo};
-use crate::model::Event;
+use crate::model::{Event, Value};
 
 impl PrunedNetwork<'_> {
     /// The numbers after a happening.
@@ -24,13 +23,13 @@ impl PrunedNetwork<'_> {
                 None => Some(true),
                 Some(guard) => self.truth(guard),
             };
-            let leaf = &mut |leaf: &Expression| self.numbers.value(model, leaf, duration);
-            let amount = update.value.evaluate(leaf);
+            let leaf = |leaf: &Expression| self.numbers.value(model, leaf, duration);
+            let amount = Value::of(&update.value, &leaf);
             let present = present(&after, &self.numbers, update.fluent);
             let next = match certain {
                 Some(false) => continue,
                 Some(true) => Numbers::updated(&present, update.operator, amount),
-                None => Numbers::updated(&present, UNKNOWN, None),
+                None => Numbers::maybe_updated(&present),
             };
             put(&mut after, update.fluent, next);
         }
@@ -44,10 +43,10 @@ impl PrunedNetwork<'_> {
                 None => Numbers::begun(&present),
                 Some(id) => {
                     let lasted = self.lasts(id).or(event.duration.clone());
-                    let leaf = &mut |leaf: &Expression| self.numbers.value(model, leaf, duration);
-                    let amount = match (rate.evaluate(leaf), lasted) {
-                        (Some(rate), Some(lasted)) => Some(rate * lasted),
-                        _ => None,
+                    let leaf = |leaf: &Expression| self.numbers.value(model, leaf, duration);
+                    let amount = match (Value::of(rate, &leaf), lasted) {
+                        (Value::Known(rate), Some(lasted)) => Value::Known(rate * lasted),
+                        _ => Value::Open,
                     };
                     Numbers::stopped(&present, amount)
                 }
@@ -131,9 +130,6 @@ impl PrunedNetwork<'_> {
         changed.map_err(|count| self.too_coupled(node, count))
     }
 }
-
-/// An update after which a number is not known.
-const UNKNOWN: UpdateOperator = UpdateOperator::Assign;
 
 fn present(after: &[(usize, Number)], numbers: &Numbers, fluent: usize) -> Number {
     let found = after.iter().find(|(other, _)| *other == fluent);

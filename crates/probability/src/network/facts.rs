@@ -8,13 +8,12 @@ mod coupling;
 mod snapshot;
 
 use elbowroom_model::ground::{Condition, Expression, FactId};
-use elbowroom_num::Rational;
 
 use super::cluster::{Cluster, Kernel};
 use super::outcome::{Outcome, Pending, by_itself, kernel, later};
 use crate::belief::Belief;
 use crate::likelihoods::Rate;
-use crate::model::{Model, evaluate, visit_facts};
+use crate::model::{Model, Value, evaluate, visit_facts};
 
 pub(crate) use snapshot::Snapshot;
 
@@ -142,7 +141,7 @@ impl Facts {
         model: &Model,
         condition: &Condition,
         facts: &[usize],
-        value: &dyn Fn(&Expression) -> Option<Rational>,
+        value: &dyn Fn(&Expression) -> Value,
     ) -> Result<(f64, bool), usize> {
         let mut rests_on_time = false;
         let open = self.open(model, facts);
@@ -174,7 +173,7 @@ impl Facts {
         &mut self,
         model: &Model,
         condition: &Condition,
-        value: &dyn Fn(&Expression) -> Option<Rational>,
+        value: &dyn Fn(&Expression) -> Value,
     ) -> Option<bool> {
         let facts = read(model, condition);
         if self.open(model, &facts).is_empty() {
@@ -242,7 +241,7 @@ impl Facts {
         model: &Model,
         guarded: &[(Option<Condition>, Outcome)],
         pending: &Pending,
-        value: &dyn Fn(&Expression) -> Option<Rational>,
+        value: &dyn Fn(&Expression) -> Value,
     ) -> Result<(), usize> {
         let mut involved: Vec<usize> = Vec::new();
         for (guard, outcome) in guarded {

@@ -3,7 +3,7 @@
 use elbowroom_model::ground::{Condition, Expression, FactId};
 
 use super::NotSmall;
-use crate::model::{Event, Model, Requirement, Semantics, evaluate};
+use crate::model::{Event, Model, Requirement, Semantics, Value, evaluate};
 
 /// Whether the model is of a world without numbers and time.
 pub(super) fn check(model: &Model) -> Result<(), NotSmall> {
@@ -65,8 +65,8 @@ pub(super) fn holds(model: &Model, condition: &Condition, state: usize) -> bool 
     };
     // Numbers do not change here.
     let value = |leaf: &Expression| match leaf {
-        Expression::Fluent(fluent) => model.task().initial().values.get(fluent).cloned(),
-        _ => None,
+        Expression::Fluent(fluent) => model.task().initial().values.get(fluent).into(),
+        _ => Value::Open,
     };
     evaluate(model.task(), condition, &truth, &value).unwrap_or(false)
 }

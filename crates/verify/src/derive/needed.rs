@@ -208,8 +208,11 @@ impl Reader<'_> {
         let (What::End(ended), What::Start(started)) = (first.what, second.what) else {
             return false;
         };
+        // The end of an action without duration is no later than its own start, but need not be.
+        let are_two = ended != started;
         let [ended, started] = [ended, started].map(|step| &self.subject.steps[step].action);
-        first.time <= second.time
+        are_two
+            && first.time <= second.time
             && (ended.schema, &ended.arguments) == (started.schema, &started.arguments)
     }
 }

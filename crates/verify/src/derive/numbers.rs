@@ -265,13 +265,17 @@ impl Numbers<'_> {
     /// Returns the expressions in parameters that are not negative anywhere in a box inside the envelope, because
     /// otherwise this failure is possible.
     ///
-    /// The failure has to be a single inequality on parameters alone. For the values at which the expression is
-    /// least there is a schedule, or the box is not inside; in each the condition fails. A moment inside an action
-    /// is taken as close to a point as one likes, if in all these schedules it can be there.
+    /// The failure has to be a single inequality on parameters alone, or to be there at each moment of its place. For the
+    /// values at which the expression is least there is a schedule, or the box is not inside; in each the condition
+    /// fails. A moment inside an action is taken as close to a point as one likes, if in all these schedules it can be
+    /// there.
     ///
     /// # Errors
     /// When the network has no schedule.
     pub(super) fn rows(&self, failure: &Failure) -> Result<Vec<Linear>, Flaw> {
+        if let (Some(place), []) = (&failure.moment, &failure.inequalities[..]) {
+            return self.rows_without_moment(place);
+        }
         let [inequality] = &failure.inequalities[..] else {
             return Ok(Vec::new());
         };
@@ -299,14 +303,51 @@ impl Numbers<'_> {
         Ok(rows)
     }
 
+    /// Returns the expressions in parameters that are not negative if there is no moment at a place: a point that comes
+    /// before all its moments is not before a point that comes after them.
+    fn rows_without_moment(&self, place: &Place) -> Result<Vec<Linear>, Flaw> {
+        let earliest: Vec<usize> = place.before.iter().chain([&place.start]).copied().collect();
+        let latest: Vec<usize> = place.after.iter().chain([&place.end]).copied().collect();
+        let mut rows = Vec::new();
+        for &earlier in &earliest {
+            for &later in &latest {
+                let time = |point: usize| self.places.time(point);
+                let expression = time(earlier).minus(&time(later));
+                if !expression.times.is_empty() || expression.parameters.is_empty() {
+                    continue;
+                }
+                // Where these two are in this order, all others are.
+                let mut distances = Distances::new(self.certificate, &self.corner(&expression))?;
+                let mut are_others = true;
+                for &first in &earliest {
+                    for &last in &latest {
+                        let apart = distances.least(first, last)?;
+                        are_others = are_others
+                            && (apart.is_some_and(|apart| apart.is_positive())
+                                || (distances.is_before(first, earlier, &Rational::ZERO)?
+                                    && distances.is_before(later, last, &Rational::ZERO)?));
+                    }
+                }
+                if are_others {
+                    rows.push(expression);
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Returns the parameters of an expression at values that lower it, and the others at their nominal values.
+    fn corner(&self, expression: &Linear) -> Intervals {
+        Intervals::around_nominal(self.certificate, self.is_bound, |parameter| {
+            let factor = expression.parameters.get(&parameter)?;
+            Some(!factor.is_positive())
+        })
+    }
+
     /// Returns `true` if a moment just before or just after a point is always at the place. This is checked for
     /// schedules with the parameters of `expression` at values that lower it, and the others nominal.
     fn is_possible(&self, place: &Place, point: usize, expression: &Linear) -> Result<bool, Flaw> {
-        let corner = Intervals::around_nominal(self.certificate, self.is_bound, |parameter| {
-            let factor = expression.parameters.get(&parameter)?;
-            Some(!factor.is_positive())
-        });
-        let mut distances = Distances::new(self.certificate, &corner)?;
+        let mut distances = Distances::new(self.certificate, &self.corner(expression))?;
         for is_after in [false, true] {
             let mut is_there = true;
             for &earlier in place.before.iter().chain([&place.start]) {

@@ -1,5 +1,7 @@
 //! A plan being executed by its orders, or all that can be done by a table: [`Rest`].
 
+mod numbers;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -370,6 +372,13 @@ impl Rest {
                 choice = self.chooser.choose(&circumstances, &mut most);
             }
         }
+        // An order that counts on other numbers is dropped.
+        if let Ok(Choice::Next(next)) = &choice
+            && self.is_lacking_for_good(next, moment, &now)
+            && self.chooser.drop_order(next, false)
+        {
+            choice = self.chooser.choose(&circumstances, &mut most);
+        }
         match choice {
             Err(coupled) => {
                 replan(Reason::new(Cause::NoOrder).about(About::Said(coupled.to_string())))
@@ -378,7 +387,7 @@ impl Rest {
                 decision: Decision::GoalReached,
                 reason: Reason::new(Cause::GoalReached),
             },
-            Ok(Choice::Next(next)) => self.carry_on(&next, &now, (&state, &running)),
+            Ok(Choice::Next(next)) => self.carry_on(&next, moment, &now, (&state, &running)),
             Ok(Choice::Replan) if self.awaits_ends(&now) => {
                 // What is under way is ended before a plan is given up: a robot that is let go
                 // between two places is at neither. And it may change what can be done.
@@ -462,6 +471,7 @@ impl Rest {
     fn carry_on(
         &mut self,
         next: &NextHappening,
+        moment: &Moment<'_>,
         now: &Rational,
         before: (&State, &[InstanceId]),
     ) -> Decided {
@@ -500,6 +510,9 @@ impl Rest {
         });
         if let Some(separated) = separated.max() {
             return wait(Some(world(&separated)), About::NextStart);
+        }
+        if let Some(lack) = self.lack(next, moment, now) {
+            return self.await_numbers(&lack, next, moment, now);
         }
         let planned = Planned {
             earliest: Some(world(&next.slot.earliest)),

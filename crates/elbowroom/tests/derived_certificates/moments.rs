@@ -1,0 +1,52 @@
+//! Conditions over all that allow an action no moment.
+
+use elbowroom::verify::verify_answer_of;
+
+use crate::forgery::claim;
+use crate::{GUARANTEES, OBJECTIVES, answer, read};
+
+/// A domain in which `look` takes no time in the plan.
+fn domain(condition: &str) -> String {
+    format!(
+        "(define (domain d) (:requirements :adl :durative-actions :duration-inequalities :numeric-fluents)
+           (:predicates (seen) (lit) (open) (done)) (:functions (n))
+           (:durative-action look :parameters () :duration (and (>= ?duration 0) (<= ?duration 5))
+             :condition (over all {condition}) :effect (at end (seen)))
+           (:durative-action work :parameters () :duration (and (>= ?duration 1) (<= ?duration 5))
+             :effect (and (at start (lit)) (at end (done)))))"
+    )
+}
+
+const PROBLEM: &str =
+    "(define (problem p) (:domain d) (:init (open) (= (n) 1)) (:goal (and (seen) (done))))";
+
+const PLAN: &str = "0: (look) [0]\n1: (work) [2]";
+
+#[test]
+fn certificates_are_accepted_if_a_condition_over_all_limits_a_duration_to_zero() {
+    let mut accepted = 0;
+    for condition in ["(seen)", "(not (open))", "(>= (n) 3)"] {
+        let (task, plan) = read(&domain(condition), PROBLEM, PLAN);
+        // In another problem the same box is not the best one.
+        let (other_task, other_plan) = read(&domain("(open)"), PROBLEM, PLAN);
+        for guarantee in GUARANTEES {
+            for objective in OBJECTIVES {
+                let Some(own) = answer(&task, &plan, guarantee, objective) else {
+                    continue;
+                };
+                let text = own.to_string();
+                let what = format!("{condition}, {guarantee:?}, {objective:?}");
+                let verified = verify_answer_of(&text, &task, &plan);
+                let verified = verified.unwrap_or_else(|wrong| panic!("{what}: {wrong}"));
+                assert!(verified.assumes.is_empty(), "{what}");
+                accepted += 1;
+                let other = answer(&other_task, &other_plan, guarantee, objective);
+                if other.is_some_and(|other| claim(&other) != claim(&own)) {
+                    let verified = verify_answer_of(&text, &other_task, &other_plan);
+                    assert!(verified.is_err(), "{what}: accepted for another domain");
+                }
+            }
+        }
+    }
+    assert!(accepted >= 20, "{accepted}");
+}
