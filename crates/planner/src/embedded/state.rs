@@ -262,10 +262,11 @@ impl State {
     /// far.
     pub(crate) fn projection(&self) -> Projection {
         let open = self.open.iter().map(|open| open.node);
-        let open: Vec<NodeId> = open
+        let mut open: Vec<NodeId> = open
             .chain([self.last.node])
             .filter(|&node| node != SETTLED)
             .collect();
+        let windows = self.project_windows(&mut open);
         let rows = open.iter().map(|&node| {
             let distances = self.network.distances_from(node);
             let mut to_annotations: Vec<(u32, Ticks)> = self
@@ -286,7 +287,25 @@ impl State {
         });
         Projection {
             rows: rows.collect(),
+            windows,
         }
+    }
+
+    /// The windows of unsettled happenings, whose nodes become some of those that are looked at.
+    fn project_windows(&self, nodes: &mut Vec<NodeId>) -> Vec<(u32, Ticks, [usize; 2])> {
+        let mut all = self.network.within().to_vec();
+        let earliest = |node| self.network.earliest(node);
+        all.sort_by_key(|w| (w.list, w.tail, earliest(w.first), earliest(w.last)));
+        let mut place = |node: NodeId| {
+            nodes.iter().position(|&n| n == node).unwrap_or_else(|| {
+                nodes.push(node);
+                nodes.len() - 1
+            })
+        };
+        let windows = all.iter();
+        windows
+            .map(|w| (w.list, w.tail, [w.first, w.last].map(&mut place)))
+            .collect()
     }
 
     /// Whether everything settled was no later here, and what is not settled can be as early as
@@ -332,10 +351,13 @@ impl State {
 ///
 /// Later happenings only push these, and are only pushed by the annotations. So of two states that
 /// are discretely the same and whose settled pasts compare, the one with the smaller distances and
-/// the later latest times allows every schedule that the other allows.
+/// the later latest times allows every schedule that the other allows. A happening that may have to
+/// move to a later window is looked at as a start is, and both must have the same windows.
 #[derive(Clone, Debug)]
 pub(crate) struct Projection {
     rows: Vec<Row>,
+    /// Lists of intervals, what is left after them, and the rows of the first and last node.
+    windows: Vec<(u32, Ticks, [usize; 2])>,
 }
 
 /// The distances from one pending start.
@@ -355,7 +377,8 @@ impl Projection {
     /// Whether what can follow the other, in time, can follow this. With `is_timeless`, only
     /// distances matter, as nothing happens at a fixed time.
     pub(crate) fn is_no_later_than(&self, other: &Self, is_timeless: bool) -> bool {
-        self.rows.iter().zip(&other.rows).all(|(mine, theirs)| {
+        let mut rows = self.rows.iter().zip(&other.rows);
+        let is_no_later = |(mine, theirs): (&Row, &Row)| {
             (is_timeless || mine.earliest <= theirs.earliest)
                 && mine.latest >= theirs.latest
                 && at_most(&mine.to_open, &theirs.to_open)
@@ -365,7 +388,8 @@ impl Projection {
                         .binary_search_by_key(&annotation, |entry| entry.0)
                         .is_ok_and(|found| distance <= theirs.to_annotations[found].1)
                 })
-        })
+        };
+        self.windows == other.windows && rows.all(is_no_later)
     }
 
     /// An estimate of the memory it takes, in bytes.
@@ -373,7 +397,7 @@ impl Projection {
         let row = |row: &Row| {
             size_of::<Row>() + 8 * row.to_open.capacity() + 16 * row.to_annotations.capacity()
         };
-        self.rows.iter().map(row).sum()
+        self.rows.iter().map(row).sum::<usize>() + 32 * self.windows.capacity()
     }
 }
 
