@@ -94,6 +94,7 @@ impl<'a> Model<'a> {
         };
         model.find_blocks(ticker)?;
         model.place();
+        model.keep_windows()?;
         model.separate(ticker)?;
         model.keep_apart(ticker)?;
         model.note_changers();
