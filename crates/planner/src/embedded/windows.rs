@@ -37,11 +37,11 @@ impl Windows {
         u32::try_from(number).expect("fewer than 2^32 lists")
     }
 
-    /// Returns the first interval that ends no earlier than `last` and `tail` after it, and is no
-    /// shorter than `tail`; and whether it is the last such interval of the list.
-    pub(crate) fn fit(&self, list: u32, last: Ticks, tail: Ticks) -> Option<(Interval, bool)> {
+    /// Returns the first interval of a list that ends no earlier than `tail` after `time`, and is no
+    /// shorter than `tail`; and whether it is the last such interval.
+    pub(crate) fn fit(&self, list: u32, time: Ticks, tail: Ticks) -> Option<(Interval, bool)> {
         let list = &self.lists[list as usize];
-        let passed = list.partition_point(|&(_, end)| end - tail < last);
+        let passed = list.partition_point(|&(_, end)| end - tail < time);
         let mut fitting = list[passed..]
             .iter()
             .filter(|(begin, end)| *begin <= end - tail);

@@ -290,7 +290,7 @@ proptest! {
         let task = draft.task();
         let mut time = Rational::new(tenths, 10);
         if !is_on_grid {
-            time = time + Rational::from_f64_as_written(0.022_737_979_888_916_016).unwrap();
+            time += Rational::from_f64_as_written(0.022_737_979_888_916_016).unwrap();
         }
         let situation = situation_of(&draft, &task, &time);
         let answers = [true, false].map(|as_windows| {

@@ -148,8 +148,8 @@ pub(super) fn insert(
     is_unsettled: bool,
 ) -> Option<NodeId> {
     if !is_unsettled && place.after.is_empty() && settles {
-        if let Some(list) = snap.dates.windows {
-            place.earliest = state.network.in_window(list, place.earliest)?;
+        if let Some(windows) = snap.dates.windows {
+            place.earliest = state.network.in_window(windows, place.earliest)?;
         }
         if place.earliest > place.latest {
             return None;
@@ -168,9 +168,9 @@ pub(super) fn insert(
     for &annotation in &snap.marks {
         state.network.mark(annotation, node);
     }
-    if let Some(list) = snap.dates.windows {
+    if let Some(windows) = snap.dates.windows {
         let within = Within {
-            list,
+            windows,
             tail: 0,
             first: node,
             last: node,
@@ -188,11 +188,11 @@ pub(super) fn keep_within(
     [first, last]: [NodeId; 2],
     tail: Ticks,
 ) -> Option<()> {
-    let Some(list) = action.dates.windows else {
+    let Some(windows) = action.dates.windows else {
         return Some(());
     };
     let within = Within {
-        list,
+        windows,
         tail,
         first,
         last,

@@ -27,14 +27,15 @@ pub(crate) struct Dates {
     pub(crate) windows: Option<u32>,
 }
 
-/// Changes of a fact at fixed times, by time.
-pub(super) struct Changes {
+/// A fact that changes at fixed times only.
+pub(super) struct DatedFact {
     pub(super) fact: u32,
     pub(super) is_true_first: bool,
+    /// Its changes, by time.
     pub(super) changes: Vec<(Ticks, bool)>,
 }
 
-impl Changes {
+impl DatedFact {
     /// From when until when the literal holds.
     pub(super) fn spans(&self, truth: bool) -> Vec<Interval> {
         spans(self.is_true_first == truth, truth, &self.changes)
@@ -110,7 +111,7 @@ pub(super) fn nested_reads<'a>(
 /// Takes the conditions on these facts out of happenings and actions, and notes their windows.
 /// Returns the calendars that they are on.
 pub(super) fn take_out(
-    facts: &[Changes],
+    facts: &[DatedFact],
     epsilon: Ticks,
     actions: &mut [Action],
     snaps: &mut [Snap],
@@ -118,7 +119,7 @@ pub(super) fn take_out(
     let mut windows = Windows::default();
     let mut literals = BTreeSet::new();
     let mut take = |formula: &mut Formula, is_throughout: bool| {
-        let of = |literal: &Literal| facts.iter().find(|c| c.fact == literal.fact());
+        let of = |literal: &Literal| facts.iter().find(|dated| dated.fact == literal.fact());
         let taken: Vec<Literal> = formula
             .literals
             .iter()
@@ -131,11 +132,11 @@ pub(super) fn take_out(
         formula.literals.retain(|literal| of(literal).is_none());
         literals.extend(taken.iter().copied());
         let lists = taken.iter().filter_map(|literal| {
-            let changes = of(literal)?;
+            let dated = of(literal)?;
             Some(if is_throughout {
-                changes.spans(literal.truth())
+                dated.spans(literal.truth())
             } else {
-                changes.reading_times(literal.truth(), epsilon)
+                dated.reading_times(literal.truth(), epsilon)
             })
         });
         let list = lists.reduce(|left, right| intersection(&left, &right));
@@ -151,10 +152,10 @@ pub(super) fn take_out(
         action.dates = take(&mut action.over_all, true);
     }
     let calendars = literals.into_iter().filter_map(|literal| {
-        let changes = facts.iter().find(|c| c.fact == literal.fact())?;
+        let dated = facts.iter().find(|dated| dated.fact == literal.fact())?;
         Some(Calendar {
             literal,
-            spans: changes.spans(literal.truth()),
+            spans: dated.spans(literal.truth()),
         })
     });
     (calendars.collect(), windows)
@@ -164,8 +165,8 @@ pub(super) fn take_out(
 mod tests {
     use super::*;
 
-    fn changes() -> Changes {
-        Changes {
+    fn dated() -> DatedFact {
+        DatedFact {
             fact: 0,
             is_true_first: false,
             changes: vec![(10, true), (20, true), (30, false), (31, true)],
@@ -174,14 +175,14 @@ mod tests {
 
     #[test]
     fn literal_holds_between_its_changes() {
-        assert_eq!(changes().spans(true), [(10, 30), (31, NEVER)]);
-        assert_eq!(changes().spans(false), [(-NEVER, 10), (30, 31)]);
+        assert_eq!(dated().spans(true), [(10, 30), (31, NEVER)]);
+        assert_eq!(dated().spans(false), [(-NEVER, 10), (30, 31)]);
     }
 
     #[test]
     fn readers_keep_away_from_all_timed_initials_of_the_fact() {
-        let times = changes().reading_times(true, 1);
+        let times = dated().reading_times(true, 1);
         assert_eq!(times, [(11, 19), (21, 29), (32, NEVER)]);
-        assert_eq!(changes().reading_times(false, 1), [(-NEVER, 9)]);
+        assert_eq!(dated().reading_times(false, 1), [(-NEVER, 9)]);
     }
 }

@@ -192,7 +192,7 @@ proptest! {
                 let first = paired.unwrap_or(node);
                 within.push((list, first, node));
                 let (first, last) = (id(first), id(node));
-                result = network.keep_within(Within { list, tail: 0, first, last });
+                result = network.keep_within(Within { windows: list, tail: 0, first, last });
             }
             if result.is_err() {
                 break;

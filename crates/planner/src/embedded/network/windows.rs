@@ -6,7 +6,8 @@ use super::{Inconsistent, NEVER, Network, NodeId, SETTLED, Ticks};
 /// The nodes `first` and `last` lie in the same interval of a list, with `tail` left after `last`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Within {
-    pub(crate) list: u32,
+    /// The list of intervals.
+    pub(crate) windows: u32,
     pub(crate) tail: Ticks,
     pub(crate) first: NodeId,
     pub(crate) last: NodeId,
@@ -33,25 +34,27 @@ impl Network {
     /// Returns the interval in which the nodes lie at the earliest, and whether there is no later one.
     pub(super) fn interval_of(&self, within: Within) -> Option<(Interval, bool)> {
         let last = self.earliest(within.first).max(self.earliest(within.last));
-        self.windows.as_ref()?.fit(within.list, last, within.tail)
+        self.windows
+            .as_ref()?
+            .fit(within.windows, last, within.tail)
     }
 
     /// Returns the earliest time, not before `time`, within the intervals of a list.
-    pub(crate) fn in_window(&self, list: u32, time: Ticks) -> Option<Ticks> {
-        let (interval, _) = self.windows.as_ref()?.fit(list, time, 0)?;
+    pub(crate) fn in_window(&self, windows: u32, time: Ticks) -> Option<Ticks> {
+        let (interval, _) = self.windows.as_ref()?.fit(windows, time, 0)?;
         Some(time.max(interval.0))
     }
 
     /// Demands that the nodes lie in the same interval of the list, with `tail` left after the
     /// second one. For a start by itself, both are the same node.
     pub(crate) fn keep_within(&mut self, within: Within) -> Result<(), Inconsistent> {
-        let Within {
-            list, first, last, ..
-        } = within;
         // The constraint on both includes what was demanded of the start by itself.
-        self.within.retain(|known| {
-            (known.list, known.first, known.last) != (list, first, first) || first == last
-        });
+        if within.first != within.last {
+            self.within.retain(|known| {
+                (known.windows, known.first, known.last)
+                    != (within.windows, within.first, within.first)
+            });
+        }
         self.within.push(within);
         self.enter_windows()
     }

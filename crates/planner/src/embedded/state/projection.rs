@@ -35,7 +35,7 @@ struct Row {
 /// The rows of the nodes that lie in one interval of a list.
 #[derive(Clone, Copy, Debug)]
 struct Window {
-    list: u32,
+    windows: u32,
     tail: Ticks,
     first: usize,
     last: usize,
@@ -84,7 +84,7 @@ impl State {
     fn windows(&self, nodes: &mut Vec<NodeId>) -> Vec<Window> {
         let mut all = self.network.within().to_vec();
         let earliest = |node| self.network.earliest(node);
-        all.sort_by_key(|w| (w.list, w.tail, earliest(w.first), earliest(w.last)));
+        all.sort_by_key(|w| (w.windows, w.tail, earliest(w.first), earliest(w.last)));
         let mut row = |node: NodeId| {
             nodes.iter().position(|&n| n == node).unwrap_or_else(|| {
                 nodes.push(node);
@@ -92,7 +92,7 @@ impl State {
             })
         };
         let windows = all.iter().map(|within| Window {
-            list: within.list,
+            windows: within.windows,
             tail: within.tail,
             first: row(within.first),
             last: row(within.last),
@@ -133,7 +133,7 @@ impl Projection {
         for mine in self.windows.iter().rev() {
             let may_be = |row: usize, other: usize| rows[row] == NO_ROW || rows[row] == other;
             let found = theirs.find(|theirs| {
-                (theirs.list, theirs.tail) == (mine.list, mine.tail)
+                (theirs.windows, theirs.tail) == (mine.windows, mine.tail)
                     && (theirs.first == theirs.last) == (mine.first == mine.last)
                     && may_be(mine.first, theirs.first)
                     && may_be(mine.last, theirs.last)

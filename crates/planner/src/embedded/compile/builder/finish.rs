@@ -40,7 +40,7 @@ fn longest_distance(snaps: &[Snap]) -> Ticks {
     distances.map(|&(_, distance)| distance).max().unwrap_or(0)
 }
 
-impl<'a> Builder<'a> {
+impl Builder<'_> {
     /// All that is compiled, put together; `None` if it was told to stop.
     pub(super) fn finish(
         mut self,

@@ -44,14 +44,14 @@ impl Model<'_> {
     }
 
     /// Lets both happenings lie in one interval: before each gap, or after it.
-    fn keep_within(&mut self, zero: u32, list: &[Interval], (first, last): (u32, u32)) {
-        let (Some(begin), Some(end)) = (list.first(), list.last()) else {
+    fn keep_within(&mut self, zero: u32, intervals: &[Interval], (first, last): (u32, u32)) {
+        let (Some(begin), Some(end)) = (intervals.first(), intervals.last()) else {
             return;
         };
         let times = &mut self.solver.times;
         times.bound(first, begin.0, UNBOUNDED);
         times.bound(last, -UNBOUNDED, end.1);
-        for gap in list.windows(2) {
+        for gap in intervals.windows(2) {
             let before = Edge {
                 from: last,
                 to: zero,

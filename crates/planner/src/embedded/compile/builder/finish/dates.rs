@@ -6,7 +6,7 @@ use elbowroom_model::Situation;
 use elbowroom_model::ground::{Change, FactId};
 
 use super::super::super::Calendar;
-use super::super::super::calendars::{Changes, nested_reads, take_out};
+use super::super::super::calendars::{DatedFact, nested_reads, take_out};
 use super::super::super::interference::Access;
 use super::super::Builder;
 use super::Coming;
@@ -27,7 +27,7 @@ impl Builder<'_> {
     ) -> (Vec<Calendar>, Windows, bool) {
         let facts = self.calendar_facts(coming, others);
         let mut are_exact = true;
-        let mut changes: Vec<Changes> = Vec::new();
+        let mut dated: Vec<DatedFact> = Vec::new();
         for &fact in &facts {
             let Some(number) = self.symbols.known_fact(fact) else {
                 continue;
@@ -41,7 +41,7 @@ impl Builder<'_> {
                     own.push((time, is_added));
                 }
             }
-            changes.push(Changes {
+            dated.push(DatedFact {
                 fact: number,
                 is_true_first: situation.state.facts.contains(&fact),
                 changes: own,
@@ -58,7 +58,7 @@ impl Builder<'_> {
             .retain(|happening| !happening.changes.is_empty());
         coming.separations = self.separations_of(&coming.happenings);
         let (calendars, windows) =
-            take_out(&changes, self.epsilon, &mut self.actions, &mut self.snaps);
+            take_out(&dated, self.epsilon, &mut self.actions, &mut self.snaps);
         (calendars, windows, are_exact)
     }
 
