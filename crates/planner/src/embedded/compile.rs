@@ -43,7 +43,7 @@ pub(crate) use metric::Metric;
 pub use unsupported::Unsupported;
 
 use super::formula::{Formula, Numeric, Test};
-use super::time::{Scale, Ticks};
+use super::time::{NEVER, Scale, Ticks};
 use super::tuning::Tuning;
 use super::windows::Windows;
 
@@ -267,6 +267,18 @@ impl Compiled {
         } else {
             self.scale.units(tick)
         }
+    }
+
+    /// The latest end of a running action by the windows of its over-all condition, if they bound
+    /// it. Outside of them it can only end at once.
+    pub(crate) fn latest_end_in_window(&self, action: u32) -> Option<Ticks> {
+        let list = self.action(action).dates.windows?;
+        let intervals = self.windows.as_ref()?.list(list);
+        let current = intervals.iter().find(|(begin, _)| *begin <= self.now);
+        let is_on_grid = self.scale.exactly(&self.beginning.time).is_some();
+        let at_once = self.now + Ticks::from(!is_on_grid);
+        let end = current.map_or(at_once, |&(_, end)| end);
+        (end < NEVER).then_some(end)
     }
 
     /// The snap of that number.

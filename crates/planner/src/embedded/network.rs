@@ -434,12 +434,9 @@ impl Network {
     }
 
     /// The bounds of each node by itself: the time before which it cannot happen, whatever else
-    /// does, and the latest one. Of windows, those count in which the earliest times lie.
+    /// does, and the latest one.
     pub(crate) fn bounds(&self) -> impl Iterator<Item = (Ticks, Ticks)> + '_ {
-        let nodes = self.nodes.iter();
-        let mut bounds: Vec<_> = nodes.map(|node| (node.floor, node.latest)).collect();
-        self.narrow_to_windows(&mut bounds);
-        bounds.into_iter()
+        self.nodes.iter().map(|node| (node.floor, node.latest))
     }
 
     /// An estimate of the memory it takes, in bytes.

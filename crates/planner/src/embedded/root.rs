@@ -5,7 +5,6 @@ use super::expressions::Form;
 use super::network::Network;
 use super::state::{Open, State};
 use super::symbolic;
-use super::time::{NEVER, Ticks};
 
 /// The state of the situation, with what is under way.
 pub(crate) fn root(compiled: &Compiled) -> State {
@@ -16,7 +15,7 @@ pub(crate) fn root(compiled: &Compiled) -> State {
     for (number, running) in (0..).zip(&beginning.running) {
         let mut open = Open::under_way(number, running.start, running.least, running.most);
         open.duration.clone_from(&running.duration);
-        if let Some(latest) = latest_end(compiled, number) {
+        if let Some(latest) = compiled.latest_end_in_window(number) {
             open.most = open.most.min(latest - running.start);
         }
         state.open.push(open);
@@ -37,14 +36,4 @@ pub(crate) fn root(compiled: &Compiled) -> State {
         }
     }
     state
-}
-
-/// The latest end of a running action by the windows of its over-all condition, if they bound it.
-/// Outside of them it can only end at once.
-fn latest_end(compiled: &Compiled, action: u32) -> Option<Ticks> {
-    let list = compiled.action(action).dates.windows?;
-    let intervals = compiled.windows.as_ref()?.list(list);
-    let current = intervals.iter().find(|(begin, _)| *begin <= compiled.now);
-    let end = current.map_or(compiled.now, |&(_, end)| end);
-    (end < NEVER).then_some(end)
 }

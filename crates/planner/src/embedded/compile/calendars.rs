@@ -31,8 +31,8 @@ pub(crate) struct Dates {
 pub(super) struct DatedFact {
     pub(super) fact: u32,
     pub(super) is_true_first: bool,
-    /// Its changes, by time.
-    pub(super) changes: Vec<(Ticks, bool)>,
+    /// Its changes, by time, which is rounded down and up.
+    pub(super) changes: Vec<(Ticks, Ticks, bool)>,
 }
 
 impl DatedFact {
@@ -47,11 +47,11 @@ impl DatedFact {
         let mut times = Vec::new();
         let mut begin = -NEVER;
         let mut is_true = self.is_true_first;
-        for &(time, truth_after) in &self.changes {
-            if is_true == truth && begin <= time - epsilon {
-                times.push((begin, time - epsilon));
+        for &(down, up, truth_after) in &self.changes {
+            if is_true == truth && begin <= down - epsilon {
+                times.push((begin, down - epsilon));
             }
-            begin = time + epsilon;
+            begin = up + epsilon;
             is_true = truth_after;
         }
         if is_true == truth {
@@ -62,14 +62,19 @@ impl DatedFact {
 }
 
 /// From when until when a literal of that truth holds, whose fact changes so.
-pub(crate) fn spans(holds_first: bool, truth: bool, changes: &[(Ticks, bool)]) -> Vec<Interval> {
+/// The times of the changes are rounded down and up; the intervals to the inside.
+pub(crate) fn spans(
+    holds_first: bool,
+    truth: bool,
+    changes: &[(Ticks, Ticks, bool)],
+) -> Vec<Interval> {
     let mut spans = Vec::new();
     let mut since = holds_first.then_some(-NEVER);
-    for &(time, is_true) in changes {
+    for &(down, up, is_true) in changes {
         match (since, is_true == truth) {
-            (None, true) => since = Some(time),
+            (None, true) => since = Some(up),
             (Some(begin), false) => {
-                spans.push((begin, time));
+                spans.push((begin, down));
                 since = None;
             }
             _ => {}
@@ -169,7 +174,12 @@ mod tests {
         DatedFact {
             fact: 0,
             is_true_first: false,
-            changes: vec![(10, true), (20, true), (30, false), (31, true)],
+            changes: vec![
+                (10, 10, true),
+                (20, 20, true),
+                (30, 30, false),
+                (31, 31, true),
+            ],
         }
     }
 

@@ -87,18 +87,9 @@ impl Network {
         });
     }
 
-    /// Narrows the bounds of nodes to the windows in which their earliest times lie.
-    pub(super) fn narrow_to_windows(&self, bounds: &mut [(Ticks, Ticks)]) {
-        for &within in &self.within {
-            let Some(((begin, end), _)) = self.interval_of(within) else {
-                continue;
-            };
-            let first = &mut bounds[within.first as usize];
-            first.0 = first.0.max(begin);
-            if end < NEVER {
-                let last = &mut bounds[within.last as usize];
-                last.1 = last.1.min(end - within.tail);
-            }
-        }
+    /// The beginnings of the windows in which nodes lie at the earliest.
+    pub(crate) fn window_begins(&self) -> impl Iterator<Item = (NodeId, Ticks)> + '_ {
+        let within = self.within.iter();
+        within.filter_map(|&within| Some((within.first, self.interval_of(within)?.0.0)))
     }
 }

@@ -30,14 +30,12 @@ impl Model<'_> {
             let Some(list) = action.and_then(|action| action.dates.windows) else {
                 continue;
             };
-            let list = windows.list(list);
             if self.blocks[number].start.is_some() {
-                // Of what was running in the beginning, the window is the one of then.
-                let current = list.iter().find(|(begin, _)| *begin <= compiled.now);
-                let latest = current.map_or(compiled.now, |&(_, end)| end);
-                self.solver.times.bound(end, -UNBOUNDED, latest);
+                if let Some(latest) = compiled.latest_end_in_window(item.action) {
+                    self.solver.times.bound(end, -UNBOUNDED, latest);
+                }
             } else {
-                self.keep_within(zero, list, (first, end));
+                self.keep_within(zero, windows.list(list), (first, end));
             }
         }
         Some(())

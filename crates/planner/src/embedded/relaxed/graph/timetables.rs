@@ -73,11 +73,11 @@ impl Graph {
         for fact in (0..narrow(compiled.facts.len())).filter(|&f| !is_changed[f as usize]) {
             let touches =
                 |timed: &&Timed| timed.adds.contains(&fact) || timed.deletes.contains(&fact);
-            let changes: Vec<(Ticks, bool)> = compiled
+            let changes: Vec<(Ticks, Ticks, bool)> = compiled
                 .timed
                 .iter()
                 .filter(touches)
-                .map(|timed| (timed.time, timed.adds.contains(&fact)))
+                .map(|timed| (timed.time, timed.time, timed.adds.contains(&fact)))
                 .collect();
             if changes.is_empty() {
                 continue;

@@ -36,9 +36,9 @@ impl Builder<'_> {
             for happening in &coming.happenings {
                 let is_added = happening.changes.contains(&Change::Add(fact));
                 if is_added || happening.changes.contains(&Change::Delete(fact)) {
-                    let (time, is_exact) = scale.floor(&happening.time);
+                    let (down, is_exact) = scale.floor(&happening.time);
                     are_exact &= is_exact;
-                    own.push((time, is_added));
+                    own.push((down, scale.ceil(&happening.time).0, is_added));
                 }
             }
             dated.push(DatedFact {
