@@ -49,6 +49,7 @@ mod symmetry;
 mod testing;
 mod time;
 mod tuning;
+mod windows;
 
 use std::ops::ControlFlow;
 

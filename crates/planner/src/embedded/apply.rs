@@ -18,7 +18,7 @@ use super::symbolic;
 use super::time::{NEVER, Ticks};
 use conditions::Side;
 use durations::demand_duration;
-use places::{forget_past, insert, reach_foreseen_end, reach_timed, settle};
+use places::{forget_past, insert, keep_within, reach_foreseen_end, reach_timed, settle};
 
 /// A choice of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -169,8 +169,8 @@ impl<'a> Stepper<'a> {
         }
         let snap = self.compiled.snap(action.start);
         if action.end == NONE {
-            let place = self.place(state, snap);
-            let node = insert(state, self.settles(state), snap, &place, false)?;
+            let mut place = self.place(state, snap);
+            let node = insert(state, self.settles(state), snap, &mut place, false)?;
             self.note_last(state, node, &place)?;
             let moment = moment(state, || (Form::node(node), None));
             self.demand(state, &snap.condition, None, &moment)?;
@@ -185,7 +185,8 @@ impl<'a> Stepper<'a> {
             let time = self.compiled.timed[timed as usize].time;
             place.latest = place.latest.min(time - least);
         }
-        let node = insert(state, self.settles(state), snap, &place, true)?;
+        let node = insert(state, self.settles(state), snap, &mut place, true)?;
+        keep_within(state, action, [node, node], least)?;
         self.note_last(state, node, &place)?;
         let mut end = SETTLED;
         if state.symbolic.is_some() {
@@ -263,10 +264,11 @@ impl<'a> Stepper<'a> {
             if open.most < NEVER {
                 when.latest = when.latest.min(open.start + open.most);
             }
-            insert(state, self.settles(state), snap, &when, false)?
+            insert(state, self.settles(state), snap, &mut when, false)?
         } else {
             when.after.push((open.node, open.least));
-            let node = insert(state, self.settles(state), snap, &when, true)?;
+            let node = insert(state, self.settles(state), snap, &mut when, true)?;
+            keep_within(state, action, [open.node, node], 0)?;
             if open.most < NEVER {
                 state.network.add_edge(node, open.node, -open.most).ok()?;
             }

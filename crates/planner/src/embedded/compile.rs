@@ -10,6 +10,7 @@
 
 mod beginning;
 mod builder;
+mod calendars;
 mod completeness;
 mod compressibility;
 mod compression;
@@ -29,6 +30,7 @@ mod unsupported;
 mod without_duration;
 
 use std::borrow::Borrow;
+use std::sync::Arc;
 
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
@@ -36,12 +38,14 @@ use elbowroom_num::Rational;
 
 pub(crate) use beginning::Beginning;
 pub(crate) use builder::{Failure, Wanted, compile};
+pub(crate) use calendars::{Calendar, Dates, spans};
 pub(crate) use metric::Metric;
 pub use unsupported::Unsupported;
 
 use super::formula::{Formula, Numeric, Test};
-use super::time::{Scale, Ticks};
+use super::time::{NEVER, Scale, Ticks};
 use super::tuning::Tuning;
+use super::windows::Windows;
 
 /// No snap, action or the like.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -73,8 +77,12 @@ pub(crate) struct Compiled {
     pub(crate) fact_annotations: Vec<[u32; 2]>,
     /// The number of annotations.
     pub(crate) annotation_count: usize,
-    /// The timed initials to come, by time.
+    /// The timed initials to come, by time, but for those of calendars.
     pub(crate) timed: Vec<Timed>,
+    /// The literals that change at fixed times only, and restrict when things happen.
+    pub(crate) calendars: Vec<Calendar>,
+    /// The windows that conditions on calendars leave; `None` if there are none.
+    pub(crate) windows: Option<Arc<Windows>>,
     pub(crate) goal: Formula,
     /// The metric to minimize, if one other than the makespan was asked for.
     pub(crate) metric: Option<Metric>,
@@ -106,6 +114,8 @@ pub(crate) struct Compiled {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Snap {
     pub(crate) condition: Formula,
+    /// The conditions on calendars.
+    pub(crate) dates: Dates,
     pub(crate) adds: Vec<u32>,
     pub(crate) deletes: Vec<u32>,
     pub(crate) updates: Vec<Update>,
@@ -157,6 +167,8 @@ pub(crate) struct Action {
     /// [`NONE`] for an instantaneous action.
     pub(crate) end: u32,
     pub(crate) over_all: Formula,
+    /// The over-all conditions on calendars.
+    pub(crate) dates: Dates,
     /// The conditions that end effects read at the start.
     pub(crate) guards: Vec<Formula>,
     pub(crate) duration: Duration,
@@ -255,6 +267,18 @@ impl Compiled {
         } else {
             self.scale.units(tick)
         }
+    }
+
+    /// The latest end of a running action by the windows of its over-all condition, if they bound
+    /// it. Outside of them it can only end at once.
+    pub(crate) fn latest_end_in_window(&self, action: u32) -> Option<Ticks> {
+        let list = self.action(action).dates.windows?;
+        let intervals = self.windows.as_ref()?.list(list);
+        let current = intervals.iter().find(|(begin, _)| *begin <= self.now);
+        let is_on_grid = self.scale.exactly(&self.beginning.time).is_some();
+        let at_once = self.now + Ticks::from(!is_on_grid);
+        let end = current.map_or(at_once, |&(_, end)| end);
+        (end < NEVER).then_some(end)
     }
 
     /// The snap of that number.

@@ -245,6 +245,13 @@ fn exact_times(
         let node = usize::from(end.node);
         times[node] = end.after(floors[node], compiled);
     }
+    // Windows lie on the grid, rounded to the inside.
+    for (node, begin) in network.window_begins() {
+        if begin > compiled.now {
+            let time = &mut times[usize::from(node)];
+            *time = std::mem::take(time).max(scale.units(begin));
+        }
+    }
     let of_end = |from: NodeId, to: NodeId| {
         let found = exact
             .distances

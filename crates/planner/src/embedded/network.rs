@@ -8,8 +8,18 @@
 //! each node, and is consistent if no node is later than its latest time and no cycle pushes
 //! itself (Cesta & Oddi, "Gaining efficiency and flexibility in the simple temporal problem",
 //! TIME 1996, for the incremental test).
+//!
+//! Beside these, nodes may have to lie in [windows](super::windows). Lower bounds are propagated
+//! along the constraints first. A node that lies outside of its windows then moves to the next one,
+//! and so on until nothing moves.
+
+mod windows;
+
+use std::sync::Arc;
 
 use super::time::{NEVER, Ticks};
+use super::windows::Windows;
+pub(crate) use windows::Within;
 
 /// A happening of the network.
 pub(crate) type NodeId = u16;
@@ -30,6 +40,9 @@ pub(crate) struct Network {
     closed: usize,
     /// Annotations that unsettled happenings have set.
     pub(crate) marks: Vec<(u32, NodeId)>,
+    /// The windows that `within` refers to; `None` if the problem has none.
+    windows: Option<Arc<Windows>>,
+    within: Vec<Within>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +66,14 @@ struct Edge {
 pub(crate) struct Inconsistent;
 
 impl Network {
+    /// An empty network with these windows.
+    pub(crate) fn with_windows(windows: Option<Arc<Windows>>) -> Self {
+        Self {
+            windows,
+            ..Self::default()
+        }
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
@@ -116,9 +137,41 @@ impl Network {
         self.push(to, time, from)
     }
 
-    /// Moves a node to `time` or later, and all that this moves in turn. When it would move
-    /// `origin`, the new edge from there has closed a cycle that pushes itself.
+    /// Moves a node to `time` or later, and all that this moves in turn. When the edges alone would
+    /// move `origin`, the new edge from there has closed a cycle that pushes itself.
     fn push(&mut self, node: NodeId, time: Ticks, origin: NodeId) -> Result<(), Inconsistent> {
+        self.follow_edges(node, time, origin)?;
+        self.enter_windows()
+    }
+
+    /// For each node, whether some of the nodes `from` can push it.
+    pub(crate) fn reach(&self, from: impl Iterator<Item = NodeId>) -> Vec<bool> {
+        let mut waiting: Vec<NodeId> = from.collect();
+        let mut is_reached = vec![false; self.nodes.len()];
+        while let Some(node) = waiting.pop() {
+            if std::mem::replace(&mut is_reached[node as usize], true) {
+                continue;
+            }
+            let next = self.edges.iter().filter(|edge| edge.from == node);
+            waiting.extend(next.map(|edge| edge.to));
+            if (node as usize) < self.closed {
+                let row = (0..).zip(self.row(node));
+                waiting.extend(row.filter(|(_, d)| **d > -NEVER).map(|(to, _)| to));
+            }
+            // An end that leaves its window pushes the start.
+            let windows = self.within.iter().filter(|within| within.last == node);
+            waiting.extend(windows.map(|within| within.first));
+        }
+        is_reached
+    }
+
+    /// The same along the edges, whatever the windows.
+    fn follow_edges(
+        &mut self,
+        node: NodeId,
+        time: Ticks,
+        origin: NodeId,
+    ) -> Result<(), Inconsistent> {
         let mut waiting = vec![(node, time)];
         while let Some((node, time)) = waiting.pop() {
             let place = &mut self.nodes[node as usize];
@@ -183,7 +236,7 @@ impl Network {
         for &(annotation, node) in &self.marks {
             settle(annotation, self.nodes[node as usize].earliest);
         }
-        *self = Self::default();
+        *self = Self::with_windows(self.windows.take());
     }
 
     /// Keeps only what the nodes `open` can still push. Hands the annotations and times of what is
@@ -195,14 +248,8 @@ impl Network {
     ) -> Vec<NodeId> {
         debug_assert_eq!(self.closed, 0, "a matrix is projected");
         let mut names = vec![SETTLED; self.nodes.len()];
-        let mut waiting: Vec<NodeId> = open.collect();
-        let mut is_kept = vec![false; self.nodes.len()];
-        while let Some(node) = waiting.pop() {
-            if !std::mem::replace(&mut is_kept[node as usize], true) {
-                let next = self.edges.iter().filter(|edge| edge.from == node);
-                waiting.extend(next.map(|edge| edge.to));
-            }
-        }
+        self.forget_last_windows();
+        let is_kept = self.reach(open);
         let kept = names.iter_mut().zip(&is_kept).filter(|(_, kept)| **kept);
         for ((name, _), count) in kept.zip(0..) {
             *name = count;
@@ -225,6 +272,7 @@ impl Network {
             }
             is_kept
         });
+        self.rename_within(&names);
         let mut position = 0;
         self.nodes.retain(|_| {
             position += 1;
@@ -241,7 +289,7 @@ impl Network {
 
     /// Keeps only some nodes, with all distances that follow among them: what the network allows
     /// these nodes stays the same. Returns the new names of the nodes; none of the others may be
-    /// marked.
+    /// marked, or be pushed to another window.
     pub(crate) fn project(&mut self, kept: &[NodeId]) -> Vec<NodeId> {
         let all = self.all_distances();
         let count = self.nodes.len();
@@ -267,6 +315,7 @@ impl Network {
         for (_, node) in &mut self.marks {
             *node = names[*node as usize];
         }
+        self.rename_within(&names);
         names
     }
 
@@ -396,6 +445,7 @@ impl Network {
             + self.edges.capacity() * size_of::<Edge>()
             + self.matrix.capacity() * size_of::<Ticks>()
             + self.marks.capacity() * size_of::<(u32, NodeId)>()
+            + self.within.capacity() * size_of::<Within>()
     }
 }
 

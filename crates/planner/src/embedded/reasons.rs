@@ -39,6 +39,9 @@ impl Names {
                 .chain(&timed.deletes)
                 .for_each(|&fact| name(fact));
         }
+        for calendar in &compiled.calendars {
+            name(calendar.literal.fact());
+        }
         Self { facts }
     }
 

@@ -2,6 +2,7 @@
 
 use super::compile::Compiled;
 use super::expressions::Form;
+use super::network::Network;
 use super::state::{Open, State};
 use super::symbolic;
 
@@ -10,9 +11,13 @@ pub(crate) fn root(compiled: &Compiled) -> State {
     let beginning = &compiled.beginning;
     let mut state = State::new(compiled, &beginning.facts, beginning.values.clone());
     state.cost.clone_from(&beginning.cost);
+    state.network = Network::with_windows(compiled.windows.clone());
     for (number, running) in (0..).zip(&beginning.running) {
         let mut open = Open::under_way(number, running.start, running.least, running.most);
         open.duration.clone_from(&running.duration);
+        if let Some(latest) = compiled.latest_end_in_window(number) {
+            open.most = open.most.min(latest - running.start);
+        }
         state.open.push(open);
     }
     if compiled.is_symbolic {

@@ -158,6 +158,7 @@ impl<'a> Search<'a> {
             relaxed.weigh(step_costs);
         }
         let is_timeless = compiled.timed.is_empty()
+            && compiled.calendars.is_empty()
             && metric.is_none_or(MetricBound::is_timeless)
             && compiled
                 .beginning

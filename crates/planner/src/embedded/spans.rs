@@ -20,7 +20,7 @@ impl Spans {
     pub(crate) fn of(compiled: &Compiled, state: &State) -> Self {
         let now = state.last.earliest(&state.network).max(compiled.now);
         let newest = state.last.node;
-        let has_timed = (state.timed as usize) < compiled.timed.len();
+        let has_timed = (state.timed as usize) < compiled.timed.len() || compiled.windows.is_some();
         let network = &state.network;
         let is_closed = network.is_closed();
         let ends = state.open.iter().map(|open| {

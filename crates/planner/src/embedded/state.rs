@@ -1,6 +1,8 @@
 //! A state of the search: what holds after the happenings chosen so far, and what is known of
 //! their times.
 
+mod projection;
+
 use std::hash::{Hash, Hasher};
 
 use elbowroom_num::Rational;
@@ -11,6 +13,7 @@ use super::formula::set;
 use super::hash::Mixer;
 use super::network::{Network, NodeId, SETTLED};
 use super::time::{NEVER, Ticks};
+pub(crate) use projection::Projection;
 
 /// See the module.
 ///
@@ -258,37 +261,6 @@ impl State {
             && self.symbolic == other.symbolic
     }
 
-    /// The part of the unsettled past that matters: everything that later choices can push, and how
-    /// far.
-    pub(crate) fn projection(&self) -> Projection {
-        let open = self.open.iter().map(|open| open.node);
-        let open: Vec<NodeId> = open
-            .chain([self.last.node])
-            .filter(|&node| node != SETTLED)
-            .collect();
-        let rows = open.iter().map(|&node| {
-            let distances = self.network.distances_from(node);
-            let mut to_annotations: Vec<(u32, Ticks)> = self
-                .network
-                .marks
-                .iter()
-                .map(|&(annotation, node)| (annotation, distances[node as usize]))
-                .filter(|&(_, distance)| distance > -NEVER)
-                .collect();
-            to_annotations.sort_unstable_by_key(|&(annotation, distance)| (annotation, -distance));
-            to_annotations.dedup_by_key(|&mut (annotation, _)| annotation);
-            Row {
-                earliest: self.network.earliest(node),
-                latest: self.network.latest_given(&distances),
-                to_open: open.iter().map(|&o| distances[o as usize]).collect(),
-                to_annotations,
-            }
-        });
-        Projection {
-            rows: rows.collect(),
-        }
-    }
-
     /// Whether everything settled was no later here, and what is not settled can be as early as
     /// there. Both must be discretely the same.
     pub(crate) fn has_no_later_annotations_than(&self, other: &Self) -> bool {
@@ -325,55 +297,6 @@ impl State {
             + size_of::<Open>() * self.open.len()
             + self.network.size()
             + self.symbolic.as_ref().map_or(0, |symbolic| symbolic.size())
-    }
-}
-
-/// The network of a state, seen from what can still be pushed: the starts under way.
-///
-/// Later happenings only push these, and are only pushed by the annotations. So of two states that
-/// are discretely the same and whose settled pasts compare, the one with the smaller distances and
-/// the later latest times allows every schedule that the other allows.
-#[derive(Clone, Debug)]
-pub(crate) struct Projection {
-    rows: Vec<Row>,
-}
-
-/// The distances from one pending start.
-#[derive(Clone, Debug)]
-struct Row {
-    earliest: Ticks,
-    /// How late it can be.
-    latest: Ticks,
-    /// The least distances to the starts under way, and to what was chosen last where choices come
-    /// in the order of time.
-    to_open: Vec<Ticks>,
-    /// The least distances to the annotations, by annotation.
-    to_annotations: Vec<(u32, Ticks)>,
-}
-
-impl Projection {
-    /// Whether what can follow the other, in time, can follow this. With `is_timeless`, only
-    /// distances matter, as nothing happens at a fixed time.
-    pub(crate) fn is_no_later_than(&self, other: &Self, is_timeless: bool) -> bool {
-        self.rows.iter().zip(&other.rows).all(|(mine, theirs)| {
-            (is_timeless || mine.earliest <= theirs.earliest)
-                && mine.latest >= theirs.latest
-                && at_most(&mine.to_open, &theirs.to_open)
-                && mine.to_annotations.iter().all(|&(annotation, distance)| {
-                    theirs
-                        .to_annotations
-                        .binary_search_by_key(&annotation, |entry| entry.0)
-                        .is_ok_and(|found| distance <= theirs.to_annotations[found].1)
-                })
-        })
-    }
-
-    /// An estimate of the memory it takes, in bytes.
-    pub(crate) fn size(&self) -> usize {
-        let row = |row: &Row| {
-            size_of::<Row>() + 8 * row.to_open.capacity() + 16 * row.to_annotations.capacity()
-        };
-        self.rows.iter().map(row).sum()
     }
 }
 

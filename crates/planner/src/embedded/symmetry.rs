@@ -322,6 +322,7 @@ impl Images {
             })
             && (action.guards.is_empty() && other.guards.is_empty())
             && self.formula_is(compiled, &action.over_all, &other.over_all)
+            && action.dates.windows == other.dates.windows
             && [(action.start, other.start), (action.end, other.end)]
                 .iter()
                 .all(|&(a, b)| {
@@ -334,6 +335,7 @@ impl Images {
 
     fn snap_is(&self, compiled: &Compiled, snap: &Snap, other: &Snap) -> bool {
         self.formula_is(compiled, &snap.condition, &other.condition)
+            && snap.dates.windows == other.dates.windows
             && self.same_facts(&snap.adds, &other.adds)
             && self.same_facts(&snap.deletes, &other.deletes)
             && snap.conditional.is_empty()

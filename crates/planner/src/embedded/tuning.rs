@@ -12,6 +12,9 @@ use std::str::FromStr;
 pub enum Technique {
     /// Actions that cannot matter to the goal are left out.
     Relevance,
+    /// Facts that only timed initials change restrict the times of happenings, instead of being
+    /// changed by choices of the search.
+    Calendars,
     /// Of objects that can change places, one is tried.
     Symmetry,
     /// A preference for the steps of the relaxed plan (preferred operators).
@@ -54,6 +57,7 @@ impl Technique {
     /// All there are, with the names by which they are told.
     pub const ALL: &'static [(Self, &'static str)] = &[
         (Self::Relevance, "relevance"),
+        (Self::Calendars, "calendars"),
         (Self::Symmetry, "symmetry"),
         (Self::PreferredOperators, "preferred-operators"),
         (Self::DeadEnds, "dead-ends"),

@@ -7,6 +7,7 @@
     reason = "the tests put texts together, and know what is in them"
 )]
 
+mod calendars;
 mod cancellation;
 mod concurrency;
 mod course;

@@ -1,7 +1,7 @@
 //! The place of a happening in time.
 
-use super::super::compile::Snap;
-use super::super::network::{NodeId, SETTLED};
+use super::super::compile::{Action, Snap};
+use super::super::network::{NodeId, SETTLED, Within};
 use super::super::state::{Open, State};
 use super::super::time::{NEVER, Ticks};
 use super::super::tuning::Technique;
@@ -144,10 +144,13 @@ pub(super) fn insert(
     state: &mut State,
     settles: bool,
     snap: &Snap,
-    place: &Place,
+    place: &mut Place,
     is_unsettled: bool,
 ) -> Option<NodeId> {
     if !is_unsettled && place.after.is_empty() && settles {
+        if let Some(windows) = snap.dates.windows {
+            place.earliest = state.network.in_window(windows, place.earliest)?;
+        }
         if place.earliest > place.latest {
             return None;
         }
@@ -165,7 +168,36 @@ pub(super) fn insert(
     for &annotation in &snap.marks {
         state.network.mark(annotation, node);
     }
+    if let Some(windows) = snap.dates.windows {
+        let within = Within {
+            windows,
+            tail: 0,
+            first: node,
+            last: node,
+        };
+        state.network.keep_within(within).ok()?;
+    }
     Some(node)
+}
+
+/// Lets two happenings of an action lie in one window of its over-all condition, with `tail` left
+/// after the second one.
+pub(super) fn keep_within(
+    state: &mut State,
+    action: &Action,
+    [first, last]: [NodeId; 2],
+    tail: Ticks,
+) -> Option<()> {
+    let Some(windows) = action.dates.windows else {
+        return Some(());
+    };
+    let within = Within {
+        windows,
+        tail,
+        first,
+        last,
+    };
+    state.network.keep_within(within).ok()
 }
 
 /// Lets an action end whose end has been in the network since its start.
@@ -203,6 +235,15 @@ pub(super) fn forget_past(state: &mut State, longest_distance: Ticks) {
         }
     }
     let network = &mut state.network;
+    // What may have to move to a later window.
+    let is_reached = network.reach(kept.iter().copied());
+    for within in network.within() {
+        for node in [within.first, within.last] {
+            if is_reached[node as usize] && !kept.contains(&node) {
+                kept.push(node);
+            }
+        }
+    }
     let rename = |node: NodeId, names: &[NodeId]| match node {
         SETTLED => SETTLED,
         node => names[node as usize],

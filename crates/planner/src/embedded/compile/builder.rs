@@ -28,7 +28,7 @@ use super::times::has_fixed_numbers;
 use super::unfolded::unfolded;
 use super::unsupported::{Unsupported, check};
 use super::without_duration::{takes_no_time, without_duration};
-use super::{Action, Compiled, Compressibility, Duration, Flow, NONE, Snap};
+use super::{Action, Compiled, Compressibility, Dates, Duration, Flow, NONE, Snap};
 use crate::embedded::formula::Formula;
 use crate::embedded::time::{Scale, Ticks};
 use crate::embedded::tuning::Tuning;
@@ -327,6 +327,7 @@ impl<'a> Builder<'a> {
             start,
             end: NONE,
             over_all: Formula::default(),
+            dates: Dates::default(),
             guards: Vec::new(),
             duration: Duration {
                 least: Rational::ZERO,
@@ -404,6 +405,7 @@ impl<'a> Builder<'a> {
             start,
             end,
             over_all,
+            dates: Dates::default(),
             guards,
             duration,
             flows,

@@ -1,8 +1,11 @@
 //! Small networks, and what is kept of random ones.
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
 
-use super::{Inconsistent, NEVER, Network, NodeId};
+use super::{Inconsistent, NEVER, Network, NodeId, Within};
+use crate::embedded::windows::{Interval, Windows};
 
 #[test]
 fn a_late_end_pushes_its_start_and_what_follows_it() {
@@ -103,4 +106,122 @@ fn what_nothing_can_push_any_more_is_settled() {
     assert_eq!(settled, [(3, 5)]);
     assert_eq!(names[second as usize], 0);
     assert_eq!(network.marks, [(4, 0)]);
+}
+
+/// A node: what it comes after, what it comes no later than, and a list of intervals for it, or for
+/// an earlier node and it.
+type WindowedDraft = (
+    Vec<(usize, i64)>,
+    Option<(usize, i64)>,
+    Option<(bool, Vec<(i64, i64)>)>,
+);
+
+fn windowed_drafts() -> impl Strategy<Value = Vec<WindowedDraft>> {
+    let list = prop::collection::vec((2..9_i64, 0..7_i64), 1..4);
+    let draft = (
+        prop::collection::vec((0..4_usize, 0..9_i64), 0..3),
+        prop::option::weighted(0.4, (0..4_usize, 2..20_i64)),
+        prop::option::weighted(0.6, (any::<bool>(), list)),
+    );
+    prop::collection::vec(draft, 1..6)
+}
+
+/// The intervals with these gaps and lengths, one after the other.
+fn intervals(gaps: &[(i64, i64)]) -> Vec<Interval> {
+    let mut time = 0;
+    let intervals = gaps.iter().map(|&(gap, length)| {
+        let begin = time + gap;
+        time = begin + length;
+        (begin, time)
+    });
+    intervals.collect()
+}
+
+/// The least times under all edges `(from, to, distance)`, each node in its bounds.
+fn least_times(edges: &[(usize, usize, i64)], bounds: &[(i64, i64)]) -> Option<Vec<i64>> {
+    let mut times: Vec<i64> = bounds.iter().map(|bound| bound.0).collect();
+    for _ in 0..=times.len() {
+        let before = times.clone();
+        for &(from, to, distance) in edges {
+            times[to] = times[to].max(times[from] + distance);
+        }
+        if times == before {
+            let is_in_time = times
+                .iter()
+                .zip(bounds)
+                .all(|(time, bound)| *time <= bound.1);
+            return is_in_time.then_some(times);
+        }
+    }
+    None
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2_000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn windows_have_the_least_times_of_all_choices_of_intervals(drafts in windowed_drafts()) {
+        let mut windows = Windows::default();
+        let lists: Vec<Option<u32>> = drafts
+            .iter()
+            .map(|draft| Some(windows.number(intervals(&draft.2.as_ref()?.1))))
+            .collect();
+        let windows = Arc::new(windows);
+        let mut network = Network::with_windows(Some(Arc::clone(&windows)));
+        let mut edges: Vec<(usize, usize, i64)> = Vec::new();
+        let mut within: Vec<(u32, usize, usize)> = Vec::new();
+        let mut result = Ok(());
+        for (node, (draft, list)) in drafts.iter().zip(lists).enumerate() {
+            let id = |place: usize| NodeId::try_from(place).unwrap();
+            let earlier = |back: usize| node.checked_sub(1 + back);
+            let after: Vec<_> = draft.0.iter()
+                .filter_map(|&(back, distance)| Some((earlier(back)?, distance)))
+                .collect();
+            edges.extend(after.iter().map(|&(from, distance)| (from, node, distance)));
+            let after: Vec<_> = after.iter().map(|&(from, d)| (id(from), d)).collect();
+            let added = network.add_node(0, 100, &after);
+            prop_assert_eq!(added, Ok(id(node)));
+            if let Some((before, most)) = draft.1.and_then(|(b, most)| Some((earlier(b)?, most))) {
+                edges.push((node, before, -most));
+                result = network.add_edge(id(node), id(before), -most);
+            }
+            if let (Ok(()), Some(list), Some((is_pair, _))) = (result, list, &draft.2) {
+                let paired = earlier(0).filter(|&first| {
+                    *is_pair && edges.iter().any(|edge| (edge.0, edge.1) == (first, node))
+                });
+                let first = paired.unwrap_or(node);
+                within.push((list, first, node));
+                let (first, last) = (id(first), id(node));
+                result = network.keep_within(Within { windows: list, tail: 0, first, last });
+            }
+            if result.is_err() {
+                break;
+            }
+        }
+        let count = network.node_count();
+        let mut least: Option<Vec<i64>> = None;
+        let sizes: Vec<usize> = within.iter().map(|w| windows.list(w.0).len()).collect();
+        for choice in 0..sizes.iter().product::<usize>() {
+            let mut bounds = vec![(0, 100); count];
+            let mut rest = choice;
+            for (&(list, first, last), &size) in within.iter().zip(&sizes) {
+                let (begin, end) = windows.list(list)[rest % size];
+                rest /= size;
+                bounds[first].0 = bounds[first].0.max(begin);
+                bounds[last].1 = bounds[last].1.min(end);
+            }
+            if let Some(times) = least_times(&edges, &bounds) {
+                least = Some(match least {
+                    None => times,
+                    Some(least) => least.into_iter().zip(times).map(|(a, b)| a.min(b)).collect(),
+                });
+            }
+        }
+        let ours = result.ok().map(|()| {
+            (0..count)
+                .map(|node| network.earliest(NodeId::try_from(node).unwrap()))
+                .collect::<Vec<_>>()
+        });
+        prop_assert_eq!(ours, least);
+    }
 }

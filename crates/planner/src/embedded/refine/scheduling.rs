@@ -16,6 +16,7 @@ mod numbers;
 mod tests;
 mod times;
 mod turns;
+mod windows;
 
 use std::collections::BTreeSet;
 
@@ -231,7 +232,9 @@ impl<'a> Scheduling<'a> {
         let count = model.items.len();
         let mut before: Vec<Vec<(usize, Option<u32>)>> = vec![Vec::new(); count];
         for (literal, edge) in solver.all_edges() {
-            if solver.is_true(literal) {
+            // Windows are no order of happenings.
+            let is_pair = (edge.from.max(edge.to) as usize) < count;
+            if is_pair && solver.is_true(literal) {
                 before[edge.to as usize].push((edge.from as usize, Some(literal)));
             }
         }

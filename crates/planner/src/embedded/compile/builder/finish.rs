@@ -1,7 +1,10 @@
 //! The compiled problem, once all actions are numbered: annotations, timed initials, and what
 //! follows from looking at all actions together.
 
+mod dates;
+
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use elbowroom_model::ground::{self, Change as ModelChange, Condition};
 use elbowroom_model::reachability::Grounding;
@@ -19,13 +22,15 @@ use super::super::{Compiled, NONE, Rule, Snap, Timed, completeness, compression}
 use super::{Builder, Wanted, narrow};
 use crate::embedded::formula::Literal;
 use crate::embedded::time::{Scale, Ticks};
+use crate::embedded::tuning::Technique;
+use crate::embedded::windows::Windows;
 
 /// How many happenings get their annotations between two questions whether to go on.
 const SNAPS_PER_QUESTION: usize = 1024;
 
 /// The timed initials to come, each with the distances that it keeps.
-struct Coming<'a> {
-    happenings: Vec<&'a TimedHappening>,
+struct Coming {
+    happenings: Vec<TimedHappening>,
     separations: Vec<Separations>,
 }
 
@@ -35,7 +40,7 @@ fn longest_distance(snaps: &[Snap]) -> Ticks {
     distances.map(|&(_, distance)| distance).max().unwrap_or(0)
 }
 
-impl<'a> Builder<'a> {
+impl Builder<'_> {
     /// All that is compiled, put together; `None` if it was told to stop.
     pub(super) fn finish(
         mut self,
@@ -47,7 +52,16 @@ impl<'a> Builder<'a> {
         let situation = wanted.situation;
         let goal = self.symbols.formula(&grounding.goal);
         let (strata, derived) = self.rules(grounding);
-        let coming = self.coming(situation);
+        let is_symbolic = is_symbolic(&self.actions, situation);
+        let mut coming = self.coming(situation);
+        let (calendars, windows, calendars_are_exact) =
+            if !is_symbolic && wanted.tuning.uses(Technique::Calendars) {
+                let rules = strata.iter().flatten().map(|rule| &rule.body);
+                self.take_out_calendars(&mut coming, situation, rules.chain([&goal]), scale)
+            } else {
+                (Vec::new(), Windows::default(), true)
+            };
+        let windows = (!windows.is_empty()).then(|| Arc::new(windows));
         let annotations = Annotations::of(self.separations.iter().chain(&coming.separations));
         self.annotate(&annotations, &coming, goes_on)?;
         let (timed, timed_is_exact) = self.timed(&coming, &annotations, scale);
@@ -80,7 +94,6 @@ impl<'a> Builder<'a> {
             running,
         };
         let (now, now_is_exact) = scale.floor(&situation.time);
-        let is_symbolic = is_symbolic(&self.actions, situation);
         let parts = completeness::Parts {
             actions: &self.actions,
             snaps: &self.snaps,
@@ -114,6 +127,8 @@ impl<'a> Builder<'a> {
             actions: self.actions,
             annotation_count: annotations.count(),
             timed,
+            calendars,
+            windows,
             goal,
             metric,
             timed_until_goal,
@@ -122,6 +137,7 @@ impl<'a> Builder<'a> {
             beginning,
             is_exact: scale.exactly(&Rational::ONE).is_some()
                 && timed_is_exact
+                && calendars_are_exact
                 && now_is_exact
                 && running_is_exact
                 && (!is_symbolic || changes_have_values),
@@ -146,7 +162,7 @@ impl<'a> Builder<'a> {
     }
 
     /// The timed initials after the situation that matter to some happening, condition or number.
-    fn coming(&self, situation: &Situation) -> Coming<'a> {
+    fn coming(&self, situation: &Situation) -> Coming {
         let makes = self.separations.iter().flat_map(|s| &s.makes);
         let is_write = |access: &&Access| matches!(access, Access::Added(_) | Access::Deleted(_));
         let written: BTreeSet<Access> = makes.filter(is_write).copied().collect();
@@ -162,15 +178,20 @@ impl<'a> Builder<'a> {
         let timed = self.task.timed().iter();
         let happenings: Vec<_> = timed
             .filter(|timed| timed.time > situation.time && timed.changes.iter().any(matters))
+            .cloned()
             .collect();
+        Coming {
+            separations: self.separations_of(&happenings),
+            happenings,
+        }
+    }
+
+    fn separations_of(&self, happenings: &[TimedHappening]) -> Vec<Separations> {
         let separations = happenings.iter().map(|timed| {
             let footprint = Footprint::of_timed(timed);
             Separations::of(&footprint, &Shifts::default(), self.epsilon, &self.links)
         });
-        Coming {
-            separations: separations.collect(),
-            happenings,
-        }
+        separations.collect()
     }
 
     /// Gives the happenings their annotations, and notes which timed initials must come after them,
@@ -178,7 +199,7 @@ impl<'a> Builder<'a> {
     fn annotate(
         &mut self,
         annotations: &Annotations,
-        coming: &Coming<'_>,
+        coming: &Coming,
         goes_on: &mut dyn FnMut() -> bool,
     ) -> Option<()> {
         let waiting = TimedSeparations::of(&coming.separations);
@@ -219,7 +240,7 @@ impl<'a> Builder<'a> {
     /// The timed initials to come, and whether all their times lie on the grid.
     fn timed(
         &self,
-        coming: &Coming<'_>,
+        coming: &Coming,
         annotations: &Annotations,
         scale: Scale,
     ) -> (Vec<Timed>, bool) {
@@ -295,7 +316,7 @@ impl<'a> Builder<'a> {
     }
 
     /// See [`Compiled::timed_until_goal`].
-    fn timed_until_goal(&self, grounding: &Grounding, coming: &Coming<'_>) -> u32 {
+    fn timed_until_goal(&self, grounding: &Grounding, coming: &Coming) -> u32 {
         let mut goal = Separations::default();
         goal.need_from_now_on(self.task, &grounding.goal, &self.links);
         let is_read = |access: &Access| goal.after.iter().any(|(read, _)| read == access);

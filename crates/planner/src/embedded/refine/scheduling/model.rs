@@ -93,7 +93,7 @@ impl<'a> Model<'a> {
             size: 0,
         };
         model.find_blocks(ticker)?;
-        model.place();
+        model.place()?;
         model.separate(ticker)?;
         model.keep_apart(ticker)?;
         model.note_changers();
@@ -143,7 +143,7 @@ impl<'a> Model<'a> {
     }
 
     /// Gives each happening its window, and ends their distance from starts.
-    fn place(&mut self) {
+    fn place(&mut self) -> Option<()> {
         let compiled = self.compiled;
         let mut timed = 0;
         for item in &self.items {
@@ -156,6 +156,8 @@ impl<'a> Model<'a> {
             };
             self.solver.times.add(earliest, latest);
         }
+        // Bounds come before the edges that they are propagated along.
+        self.keep_windows()?;
         for block in &self.blocks {
             match (block.start, &block.nodes[..]) {
                 (None, &[from, to]) => {
@@ -176,6 +178,7 @@ impl<'a> Model<'a> {
             }
         }
         self.precede_the_rest(timed);
+        Some(())
     }
 
     /// What is before all timed initials that the plan does not come to.

@@ -25,6 +25,8 @@ struct Kinds {
     has_facts: bool,
     has_numbers: bool,
     has_timed: bool,
+    /// Conditions on a fact that only timed initials change.
+    has_calendar: bool,
     /// Conditions on numbers throughout.
     has_numbers_throughout: bool,
 }
@@ -92,8 +94,22 @@ fn random_task(random: &mut Random, kinds: Kinds) -> Task {
         )
         .expect("strings take all");
     }
+    if kinds.has_calendar {
+        predicates += " (c)";
+        let mut time = 0;
+        for change in 0..2 + random.below(5) {
+            time += 1 + random.below(5);
+            let literal = if change % 2 == 0 { "(c)" } else { "(not (c))" };
+            write!(init, " (at {time} {literal})").expect("strings take all");
+        }
+        write!(init, " (at {} (c))", time + 3).expect("strings take all");
+    }
     for action in 0..ACTIONS {
         let (mut conditions, mut effects) = (String::new(), String::new());
+        if kinds.has_calendar && random.once_in(2) {
+            let when = ["at start", "over all", "at end"][random.below(3)];
+            write!(conditions, " ({when} (c))").expect("strings take all");
+        }
         if kinds.has_facts {
             literals(random, "at start", 1, &mut conditions);
             literals(random, "over all", 1, &mut conditions);
@@ -279,6 +295,7 @@ const FACTS_ALONE: Kinds = Kinds {
     has_facts: true,
     has_numbers: false,
     has_timed: false,
+    has_calendar: false,
     has_numbers_throughout: false,
 };
 
@@ -296,6 +313,19 @@ fn no_order_with_timed_initials_is_better() {
     };
     let (compared, improved) = compare(kinds, 0..300);
     assert!(compared > 60 && improved > 20, "{compared} {improved}");
+}
+
+#[test]
+fn no_order_with_calendars_is_better() {
+    for has_timed in [false, true] {
+        let kinds = Kinds {
+            has_timed,
+            has_calendar: true,
+            ..FACTS_ALONE
+        };
+        let (compared, improved) = compare(kinds, 0..300);
+        assert!(compared > 60 && improved > 20, "{compared} {improved}");
+    }
 }
 
 #[test]

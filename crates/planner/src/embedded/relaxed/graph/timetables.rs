@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::super::compile::{Change, Compiled, NONE, Timed};
+use super::super::super::compile::{Change, Compiled, Dates, NONE, Snap, Timed, spans};
 use super::super::super::formula::{Formula, Literal};
 use super::super::super::time::{NEVER, Ticks};
 use super::actions::{Draft, least_ticks, most_ticks};
@@ -50,6 +50,9 @@ impl Graph {
     /// Finds the literals that only timed initials change.
     pub(super) fn add_timetables(&mut self, compiled: &Compiled) {
         self.timetable_of = vec![NONE; 2 * compiled.facts.len()];
+        for calendar in &compiled.calendars {
+            self.add_timetable(calendar.literal, calendar.spans.clone());
+        }
         if compiled.timed.is_empty() {
             return;
         }
@@ -70,29 +73,26 @@ impl Graph {
         for fact in (0..narrow(compiled.facts.len())).filter(|&f| !is_changed[f as usize]) {
             let touches =
                 |timed: &&Timed| timed.adds.contains(&fact) || timed.deletes.contains(&fact);
-            if !compiled.timed.iter().any(|timed| touches(&timed)) {
+            let changes: Vec<(Ticks, Ticks, bool)> = compiled
+                .timed
+                .iter()
+                .filter(touches)
+                .map(|timed| (timed.time, timed.time, timed.adds.contains(&fact)))
+                .collect();
+            if changes.is_empty() {
                 continue;
             }
-            for literal in [Literal::new(fact, true), Literal::new(fact, false)] {
-                let mut spans = Vec::new();
-                let holds = compiled.beginning.facts[fact as usize] == literal.truth();
-                let mut since = holds.then_some(-NEVER);
-                for timed in compiled.timed.iter().filter(touches) {
-                    let is_true = timed.adds.contains(&fact);
-                    match (since, is_true == literal.truth()) {
-                        (None, true) => since = Some(timed.time),
-                        (Some(begin), false) => {
-                            spans.push((begin, timed.time));
-                            since = None;
-                        }
-                        _ => {}
-                    }
-                }
-                spans.extend(since.map(|begin| (begin, NEVER)));
-                self.timetable_of[literal.index()] = narrow(self.timetable.len());
-                self.timetable.push(spans);
+            for truth in [true, false] {
+                let holds = compiled.beginning.facts[fact as usize] == truth;
+                let spans = spans(holds, truth, &changes);
+                self.add_timetable(Literal::new(fact, truth), spans);
             }
         }
+    }
+
+    fn add_timetable(&mut self, literal: Literal, spans: Vec<(Ticks, Ticks)>) {
+        self.timetable_of[literal.index()] = narrow(self.timetable.len());
+        self.timetable.push(spans);
     }
 
     /// The windows in which the operator can begin.
@@ -104,8 +104,8 @@ impl Graph {
         let epsilon = compiled.epsilon;
         let least = least_ticks(compiled, draft.action);
         let most = most_ticks(compiled, draft.action);
-        let mut add = |formula: &Formula, lead: Ticks, tail: Ticks| {
-            for literal in &formula.literals {
+        let mut add = |(formula, dates): (&Formula, &Dates), lead: Ticks, tail: Ticks| {
+            for literal in formula.literals.iter().chain(&dates.literals) {
                 let timetable = self.timetable_of[literal.index()];
                 if timetable != NONE {
                     self.windows.push(Window {
@@ -116,14 +116,20 @@ impl Graph {
                 }
             }
         };
-        add(&draft.snaps[0].condition, epsilon, epsilon);
+        add(read_by(draft.snaps[0]), epsilon, epsilon);
         if !matches!(draft.kind, Kind::End(_)) {
-            add(&draft.action.over_all, 0, least);
-            if draft.action.end != NONE {
-                let end = &compiled.snap(draft.action.end).condition;
+            let action = draft.action;
+            add((&action.over_all, &action.dates), 0, least);
+            if action.end != NONE {
+                let end = read_by(compiled.snap(action.end));
                 add(end, (epsilon - most).max(-NEVER), least + epsilon);
             }
         }
         begin..self.windows.len()
     }
+}
+
+/// What a happening reads.
+fn read_by(snap: &Snap) -> (&Formula, &Dates) {
+    (&snap.condition, &snap.dates)
 }

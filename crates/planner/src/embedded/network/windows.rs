@@ -1,0 +1,95 @@
+//! Windows that nodes of the network must lie in.
+
+use super::super::windows::Interval;
+use super::{Inconsistent, NEVER, Network, NodeId, SETTLED, Ticks};
+
+/// The nodes `first` and `last` lie in the same interval of a list, with `tail` left after `last`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Within {
+    /// The list of intervals.
+    pub(crate) windows: u32,
+    pub(crate) tail: Ticks,
+    pub(crate) first: NodeId,
+    pub(crate) last: NodeId,
+}
+
+impl Network {
+    /// Moves nodes to their next windows until all lie in one. Each move is to a later interval, so
+    /// this ends.
+    pub(super) fn enter_windows(&mut self) -> Result<(), Inconsistent> {
+        let mut place = 0;
+        while place < self.within.len() {
+            let within = self.within[place];
+            let (interval, _) = self.interval_of(within).ok_or(Inconsistent)?;
+            place += 1;
+            if self.earliest(within.first) < interval.0 {
+                self.follow_edges(within.first, interval.0, SETTLED)?;
+                // That may have moved others out of their windows.
+                place = 0;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the interval in which the nodes lie at the earliest, and whether there is no later one.
+    pub(super) fn interval_of(&self, within: Within) -> Option<(Interval, bool)> {
+        let last = self.earliest(within.first).max(self.earliest(within.last));
+        self.windows
+            .as_ref()?
+            .fit(within.windows, last, within.tail)
+    }
+
+    /// Returns the earliest time, not before `time`, within the intervals of a list.
+    pub(crate) fn in_window(&self, windows: u32, time: Ticks) -> Option<Ticks> {
+        let (interval, _) = self.windows.as_ref()?.fit(windows, time, 0)?;
+        Some(time.max(interval.0))
+    }
+
+    /// Demands that the nodes lie in the same interval of the list, with `tail` left after the
+    /// second one. For a start by itself, both are the same node.
+    pub(crate) fn keep_within(&mut self, within: Within) -> Result<(), Inconsistent> {
+        // The constraint on both includes what was demanded of the start by itself.
+        if within.first != within.last {
+            self.within.retain(|known| {
+                (known.windows, known.first, known.last)
+                    != (within.windows, within.first, within.first)
+            });
+        }
+        self.within.push(within);
+        self.enter_windows()
+    }
+
+    /// The constraints by windows.
+    pub(crate) fn within(&self) -> &[Within] {
+        &self.within
+    }
+
+    /// Turns windows without a later interval into latest times.
+    pub(super) fn forget_last_windows(&mut self) {
+        for place in (0..self.within.len()).rev() {
+            let within = self.within[place];
+            if let Some(((_, end), true)) = self.interval_of(within) {
+                if end < NEVER {
+                    let latest = &mut self.nodes[within.last as usize].latest;
+                    *latest = (*latest).min(end - within.tail);
+                }
+                self.within.swap_remove(place);
+            }
+        }
+    }
+
+    /// Keeps the windows of nodes that have a new name.
+    pub(super) fn rename_within(&mut self, names: &[NodeId]) {
+        self.within.retain_mut(|within| {
+            within.first = names[within.first as usize];
+            within.last = names[within.last as usize];
+            within.first != SETTLED && within.last != SETTLED
+        });
+    }
+
+    /// The beginnings of the windows in which nodes lie at the earliest.
+    pub(crate) fn window_begins(&self) -> impl Iterator<Item = (NodeId, Ticks)> + '_ {
+        let within = self.within.iter();
+        within.filter_map(|&within| Some((within.first, self.interval_of(within)?.0.0)))
+    }
+}
