@@ -14,7 +14,7 @@ pub(crate) struct Interrupt(Stop);
 impl Interrupt {
     /// From now on, the first Ctrl-C (SIGINT, SIGTERM or SIGHUP) asks to stop, and the second ends
     /// the program. A process has one handler of signals, so this is the same flag whenever it is
-    /// asked for. The computations of this thread end early, too.
+    /// asked for. Computations of this thread end early as well.
     pub(crate) fn listen() -> Self {
         static LISTENED: OnceLock<Interrupt> = OnceLock::new();
         let listened = LISTENED.get_or_init(|| {

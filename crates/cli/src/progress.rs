@@ -82,7 +82,7 @@ fn spinner() -> ProgressBar {
     let style = ProgressStyle::with_template("{spinner} {elapsed}: {wide_msg}")
         .expect("a template without mistakes");
     let line = ProgressBar::new_spinner().with_style(style);
-    // It turns also while nothing new is told.
+    // The spinner turns even if no new message comes.
     line.enable_steady_tick(TURN);
     line
 }

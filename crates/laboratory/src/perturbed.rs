@@ -409,7 +409,7 @@ impl<'e> Setting<'e> {
                     &mut sound
                 };
             let made = trial(&mut game, world, &mut *executor);
-            // What was interrupted says nothing about the executor.
+            // An interrupted trial does not count.
             if work::is_stopped() {
                 break;
             }

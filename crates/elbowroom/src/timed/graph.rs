@@ -75,7 +75,7 @@ pub(super) trait Expansion {
     fn last(&self, state: &State) -> f64;
 }
 
-/// How far an expansion may go.
+/// Limits of an expansion.
 pub(super) struct Limits<'l> {
     /// The number of nodes of a cell.
     pub(super) nodes: usize,
@@ -92,7 +92,7 @@ impl Limits<'static> {
 }
 
 impl Limits<'_> {
-    /// Whether one more node may be made.
+    /// Checks that one more node can be added.
     ///
     /// # Errors
     /// Otherwise, with the reason.
@@ -111,8 +111,8 @@ impl Limits<'_> {
 /// The average number of ways of a node at most, once there are as many nodes as there may be.
 const WAYS: usize = 16;
 
-/// What can come of one state at most: each action under way may end or not, in each way, so that their number grows
-/// exponentially.
+/// The limit on the combinations of what may happen to one state in a cell. It is needed because each running action
+/// may end or not, so their number grows exponentially.
 pub(super) const MOST_WAYS: usize = 1 << 16;
 
 /// Work that is counted for each node and each of its ways, in units of [`elbowroom_num::work`].

@@ -15,7 +15,7 @@ use crate::words::{counted, tame};
 /// The limit on running actions that are named.
 const MOST_NAMED: usize = 3;
 
-/// Keeps a record, and shows the time, what is under way, and when a plan is made.
+/// Passes entries on to a recorder, and shows the time, the running actions and whether a plan is being made.
 pub(super) struct Live<'a> {
     inner: &'a mut dyn Recorder,
     line: Progress,

@@ -426,7 +426,7 @@ impl RunSpec {
             .with_rehearsal(rehearsal))
     }
 
-    /// What moves are worth in the world of `model`; `None` if that cannot be found out within the planning budget.
+    /// The table of moves of `policy` for the world of `model`; `None` if it cannot be finished within the planning budget.
     fn outlook(
         &self,
         task: &Arc<Task>,
