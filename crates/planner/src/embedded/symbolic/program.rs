@@ -91,9 +91,19 @@ pub(super) struct Limit<'a> {
 }
 
 impl Limit<'_> {
+    /// How what is spent besides `constant`, plus the number returned, compares with zero.
+    pub(super) fn as_demand(&self, constant: &Rational) -> (Rational, Comparison) {
+        let comparison = if self.bound.may_equal {
+            Comparison::AtMost
+        } else {
+            Comparison::Less
+        };
+        (constant - &self.bound.value, comparison)
+    }
+
     pub(super) fn allows(&self, spent: &Rational) -> bool {
-        let bound = &self.bound.value;
-        spent < bound || self.bound.may_equal && spent == bound
+        let (difference, comparison) = self.as_demand(spent);
+        comparison.holds(&difference, &Rational::ZERO)
     }
 }
 
@@ -120,7 +130,7 @@ pub(crate) fn is_possible(
     let is_projected = compiled.tuning.uses(Technique::Projection)
         && compiled.scale.units(compiled.now) == compiled.beginning.time;
     if !is_projected {
-        return is_solvable(state, compiled, limit.as_ref());
+        return has_solution(&state.network, &symbolic.demands, compiled, limit.as_ref());
     }
     let times = projected::times(&state.network, symbolic, compiled, limit.as_ref());
     if let Some(symbolic) = &mut state.symbolic
@@ -132,23 +142,20 @@ pub(crate) fn is_possible(
     false
 }
 
-/// The same by a linear program of all happenings.
-fn is_solvable(state: &State, compiled: &Compiled, limit: Option<&Limit<'_>>) -> bool {
-    let Some(symbolic) = &state.symbolic else {
-        return true;
-    };
-    if limit.is_none() && are_met_at_the_earliest(&state.network, &symbolic.demands, compiled) {
+/// Whether a linear program of all happenings has a solution.
+pub(super) fn has_solution(
+    network: &Network,
+    demands: &[(Form, Comparison)],
+    compiled: &Compiled,
+    limit: Option<&Limit<'_>>,
+) -> bool {
+    if limit.is_none() && are_met_at_the_earliest(network, demands, compiled) {
         return true;
     }
-    let (mut program, times, end) = program(&state.network, &symbolic.demands, compiled, None);
+    let (mut program, times, end) = program(network, demands, compiled, None);
     if let Some(limit) = limit {
         let row = objective_row(&limit.spent, &limit.time, &times, end);
-        let difference = &limit.spent.constant - &limit.bound.value;
-        let comparison = if limit.bound.may_equal {
-            Comparison::AtMost
-        } else {
-            Comparison::Less
-        };
+        let (difference, comparison) = limit.as_demand(&limit.spent.constant);
         assert_comparison(&mut program, &row, difference, comparison);
     }
     program.check().is_ok()
@@ -268,7 +275,7 @@ fn window(
 
 /// The linear program, the variables of its nodes, and one that is not before any of them. `exact`: what
 /// is known exactly, where times are asked for that a plan can have.
-fn program(
+pub(super) fn program(
     network: &Network,
     demands: &[(Form, Comparison)],
     compiled: &Compiled,

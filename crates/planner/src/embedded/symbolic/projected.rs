@@ -251,13 +251,7 @@ impl Projected {
         };
         for (form, comparison) in demands {
             let (row, constant) = row_of(form);
-            if row.is_empty() {
-                if !comparison.holds(&constant, &Rational::ZERO) {
-                    return None;
-                }
-                continue;
-            }
-            assert_comparison(&mut program, &row, constant, *comparison);
+            assert_row(&mut program, &row, constant, *comparison)?;
         }
         if let Some(limit) = limit {
             let (mut row, constant) = row_of(&limit.spent);
@@ -271,19 +265,8 @@ impl Projected {
                 }
                 row.push((end, limit.time.clone()));
             }
-            let difference = constant - &limit.bound.value;
-            let comparison = if limit.bound.may_equal {
-                Comparison::AtMost
-            } else {
-                Comparison::Less
-            };
-            if row.is_empty() {
-                if !comparison.holds(&difference, &Rational::ZERO) {
-                    return None;
-                }
-            } else {
-                assert_comparison(&mut program, &row, difference, comparison);
-            }
+            let (difference, comparison) = limit.as_demand(&constant);
+            assert_row(&mut program, &row, difference, comparison)?;
         }
         program.check().ok()?;
         let model = program.model();
@@ -293,3 +276,20 @@ impl Projected {
         Some(times.collect())
     }
 }
+
+/// Asserts `row + constant comparison 0`; `None` if that has no variable, and is false.
+fn assert_row(
+    program: &mut Simplex,
+    row: &[(VariableId, Rational)],
+    constant: Rational,
+    comparison: Comparison,
+) -> Option<()> {
+    if row.is_empty() {
+        return comparison.holds(&constant, &Rational::ZERO).then_some(());
+    }
+    assert_comparison(program, row, constant, comparison);
+    Some(())
+}
+
+#[cfg(test)]
+mod tests;
