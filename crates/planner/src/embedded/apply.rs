@@ -106,6 +106,10 @@ impl<'a> Stepper<'a> {
         }
         let mut next = state.clone();
         self.advance(&mut next, step)?;
+        if next.symbolic.is_some() {
+            // The network keeps all happenings, and a vector that grows doubles its memory.
+            next.network.shrink();
+        }
         Some(next)
     }
 

@@ -6,7 +6,7 @@
 //! (the minimal network is decomposable: Dechter, Meiri & Pearl, AIJ 49, 1991), so that the linear program
 //! is as large as the number of choices that are really open.
 //!
-//! Before that, three kinds of times are tried, for which no linear program is needed: the earliest ones, and
+//! Before that, two kinds of times are tried, for which no linear program is needed: the earliest ones, and
 //! those of the state before, the new happenings at their earliest.
 
 use elbowroom_model::problem::Comparison;
