@@ -106,6 +106,10 @@ impl<'a> Stepper<'a> {
         }
         let mut next = state.clone();
         self.advance(&mut next, step)?;
+        if next.symbolic.is_some() {
+            // The network keeps all happenings, and a vector that grows doubles its memory.
+            next.network.shrink();
+        }
         Some(next)
     }
 
@@ -133,7 +137,7 @@ impl<'a> Stepper<'a> {
 
     /// Whether there are times that meet what has been demanded of them. Where a plan is extracted,
     /// nobody asks: the search has seen each of these states, and times for the last one do for all.
-    fn has_times(&self, state: &State) -> bool {
+    fn has_times(&self, state: &mut State) -> bool {
         let metric = self.compiled.metric.as_ref();
         let limit = metric.zip(self.limit.as_ref());
         self.log.is_some() || symbolic::is_possible(state, self.compiled, limit)

@@ -22,12 +22,21 @@ pub(crate) struct Course {
 }
 
 /// The numbers of a state that depend on times, and what has been demanded of them.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Symbolic {
     /// By fluent; those have no value in `State::values`.
     pub(crate) courses: Vec<(u32, Course)>,
     /// `form comparison 0`.
     pub(crate) demands: Vec<(Form, Comparison)>,
+    /// Times of the happenings that the demands were about when they were met last: where to begin. They
+    /// say nothing about the state.
+    pub(crate) times: Vec<(NodeId, Rational)>,
+}
+
+impl PartialEq for Symbolic {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.courses, &self.demands) == (&other.courses, &other.demands)
+    }
 }
 
 /// The moment of evaluation: the time, and the duration of the evaluating action.
@@ -94,6 +103,25 @@ impl Symbolic {
         self.course(fluent).is_some()
     }
 
+    /// Demands `form comparison 0`. Of two demands that differ in the constant, the stronger one is kept.
+    pub(crate) fn demand(&mut self, form: Form, comparison: Comparison) {
+        for (known, other) in &mut self.demands {
+            if known.terms != form.terms {
+                continue;
+            }
+            let constants = (&known.constant, &form.constant);
+            if implies((*other, constants.0), (comparison, constants.1)) {
+                return;
+            }
+            if implies((comparison, constants.1), (*other, constants.0)) {
+                known.constant = form.constant;
+                *other = comparison;
+                return;
+            }
+        }
+        self.demands.push((form, comparison));
+    }
+
     /// Whether there is anything to solve.
     pub(crate) fn has_demands(&self) -> bool {
         !self.demands.is_empty()
@@ -104,6 +132,21 @@ impl Symbolic {
         let term = size_of::<(NodeId, Rational)>();
         let forms = self.courses.iter().map(|(_, course)| &course.base);
         let forms = forms.chain(self.demands.iter().map(|(form, _)| form));
-        forms.map(|form| 80 + term * form.terms.capacity()).sum()
+        let forms: usize = forms.map(|form| 80 + term * form.terms.capacity()).sum();
+        forms + term * self.times.capacity()
+    }
+}
+
+/// Whether a comparison of a sum with zero implies another one, given their constants.
+fn implies(known: (Comparison, &Rational), other: (Comparison, &Rational)) -> bool {
+    use Comparison::{AtLeast, AtMost, Greater, Less};
+    let (least, most) = (known.1, other.1);
+    match (known.0, other.0) {
+        (same, comparison) if same == comparison && least == most => true,
+        (AtLeast | Greater, AtLeast) | (Greater, Greater) => least <= most,
+        (AtLeast, Greater) => least < most,
+        (AtMost | Less, AtMost) | (Less, Less) => least >= most,
+        (AtMost, Less) => least > most,
+        _ => false,
     }
 }

@@ -439,6 +439,13 @@ impl Network {
         self.nodes.iter().map(|node| (node.floor, node.latest))
     }
 
+    /// Gives back memory that was reserved for growth, which a stored network does not need.
+    pub(crate) fn shrink(&mut self) {
+        self.nodes.shrink_to_fit();
+        self.edges.shrink_to_fit();
+        self.marks.shrink_to_fit();
+    }
+
     /// An estimate of the memory it takes, in bytes.
     pub(crate) fn size(&self) -> usize {
         self.nodes.capacity() * size_of::<Node>()

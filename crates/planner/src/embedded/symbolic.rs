@@ -8,6 +8,7 @@
 //! still matter.
 
 mod program;
+mod projected;
 
 use elbowroom_model::problem::{Comparison, UpdateOperator};
 use elbowroom_num::Rational;
@@ -63,10 +64,7 @@ pub(crate) fn demand(state: &mut State, form: Form, comparison: Comparison) -> O
         return comparison.holds(constant, &Rational::ZERO).then_some(());
     }
     let symbolic = state.symbolic.as_mut()?;
-    let demand = (form, comparison);
-    if !symbolic.demands.contains(&demand) {
-        symbolic.demands.push(demand);
-    }
+    symbolic.demand(form, comparison);
     Some(())
 }
 
@@ -107,7 +105,7 @@ fn demand_choice(
             let is_conditional = attempt.symbolic != state.symbolic;
             *has_chosen |= is_conditional;
             let is_last = number + 1 == choice.len();
-            if is_conditional && !is_last && !is_possible(&attempt, compiled, None) {
+            if is_conditional && !is_last && !is_possible(&mut attempt, compiled, None) {
                 continue;
             }
             *state = attempt;

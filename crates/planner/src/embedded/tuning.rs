@@ -15,6 +15,9 @@ pub enum Technique {
     /// Facts that only timed initials change restrict the times of happenings, instead of being
     /// changed by choices of the search.
     Calendars,
+    /// Where numbers depend on times, the linear program of a state is about the happenings only that its
+    /// demands are about, and begins at times that were found for the state before.
+    Projection,
     /// Of objects that can change places, one is tried.
     Symmetry,
     /// A preference for the steps of the relaxed plan (preferred operators).
@@ -58,6 +61,7 @@ impl Technique {
     pub const ALL: &'static [(Self, &'static str)] = &[
         (Self::Relevance, "relevance"),
         (Self::Calendars, "calendars"),
+        (Self::Projection, "projection"),
         (Self::Symmetry, "symmetry"),
         (Self::PreferredOperators, "preferred-operators"),
         (Self::DeadEnds, "dead-ends"),

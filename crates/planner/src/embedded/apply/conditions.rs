@@ -39,11 +39,11 @@ impl Stepper<'_> {
             let mut attempt = state.clone();
             self.demand(&mut attempt, goal, None, &Moment::default())?;
             let is_possible = if alternatives.len() > 1 {
-                symbolic::is_possible(&attempt, self.compiled, None)
+                symbolic::is_possible(&mut attempt, self.compiled, None)
             } else {
                 true
             };
-            if !is_possible || !self.has_times(&attempt) {
+            if !is_possible || !self.has_times(&mut attempt) {
                 return None;
             }
             *state = attempt;

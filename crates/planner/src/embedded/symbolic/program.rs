@@ -14,6 +14,8 @@ use super::super::formula::Numeric;
 use super::super::network::{Network, NodeId};
 use super::super::state::State;
 use super::super::time::{NEVER, Ticks};
+use super::super::tuning::Technique;
+use super::projected;
 
 /// What is known exactly of the nodes of a network, which has it in ticks.
 #[derive(Debug, Default)]
@@ -79,37 +81,82 @@ pub(crate) fn exact_distance(
     }
 }
 
+/// What may be spent of the metric, where that depends on times.
+pub(super) struct Limit<'a> {
+    /// What has been spent, without the time.
+    pub(super) spent: Form,
+    /// What each unit of time counts, from the beginning to the end of the plan.
+    pub(super) time: Rational,
+    pub(super) bound: &'a MetricBound,
+}
+
+impl Limit<'_> {
+    /// How what is spent besides `constant`, plus the number returned, compares with zero.
+    pub(super) fn as_demand(&self, constant: &Rational) -> (Rational, Comparison) {
+        let comparison = if self.bound.may_equal {
+            Comparison::AtMost
+        } else {
+            Comparison::Less
+        };
+        (constant - &self.bound.value, comparison)
+    }
+
+    pub(super) fn allows(&self, spent: &Rational) -> bool {
+        let (difference, comparison) = self.as_demand(spent);
+        comparison.holds(&difference, &Rational::ZERO)
+    }
+}
+
 /// Whether there are times that meet all demands and the network, and leave what has been spent
-/// within the limit.
+/// within the limit. Notes such times in the state.
 pub(crate) fn is_possible(
-    state: &State,
+    state: &mut State,
     compiled: &Compiled,
     limit: Option<(&Metric, &MetricBound)>,
 ) -> bool {
     let Some(symbolic) = &state.symbolic else {
         return true;
     };
-    let limit = limit.filter(|(metric, _)| metric.only_grows);
-    let is_limited = limit.is_some() && !symbolic.courses.is_empty();
-    if !symbolic.has_demands() && !is_limited {
+    let limit = limit
+        .filter(|(metric, _)| metric.only_grows && !symbolic.courses.is_empty())
+        .and_then(|(metric, bound)| {
+            let (spent, time) = objective(state, metric)?;
+            Some(Limit { spent, time, bound })
+        });
+    if !symbolic.has_demands() && limit.is_none() {
         return true;
     }
-    if !is_limited && are_met_at_the_earliest(&state.network, &symbolic.demands, compiled) {
-        return true;
+    // Off the grid, what can happen at once happens later than the network knows.
+    let is_projected = compiled.tuning.uses(Technique::Projection)
+        && compiled.scale.units(compiled.now) == compiled.beginning.time;
+    if !is_projected {
+        return has_solution(&state.network, &symbolic.demands, compiled, limit.as_ref());
     }
-    let (mut program, times, end) = program(&state.network, &symbolic.demands, compiled, None);
-    if is_limited
-        && let Some((metric, limit)) = limit
-        && let Some((row, constant)) = objective(state, metric, &times, end)
+    let times = projected::times(&state.network, symbolic, compiled, limit.as_ref());
+    if let Some(symbolic) = &mut state.symbolic
+        && let Some(times) = times
     {
-        let left = &limit.value - &constant;
-        let row = program.define(&row);
-        let bound = if limit.may_equal {
-            Delta::from(left)
-        } else {
-            Delta::just_below(left)
-        };
-        program.assert_upper(row, bound, 0);
+        symbolic.times = times;
+        return true;
+    }
+    false
+}
+
+/// Whether a linear program of all happenings has a solution.
+pub(super) fn has_solution(
+    network: &Network,
+    demands: &[(Form, Comparison)],
+    compiled: &Compiled,
+    limit: Option<&Limit<'_>>,
+) -> bool {
+    if limit.is_none() && are_met_at_the_earliest(network, demands, compiled) {
+        return true;
+    }
+    let (mut program, times, end) = program(network, demands, compiled, None);
+    if let Some(limit) = limit {
+        let row = objective_row(&limit.spent, &limit.time, &times, end);
+        let (difference, comparison) = limit.as_demand(&limit.spent.constant);
+        assert_comparison(&mut program, &row, difference, comparison);
     }
     program.check().is_ok()
 }
@@ -144,8 +191,9 @@ pub(crate) fn solve(state: &State, compiled: &Compiled, exact: &Exact) -> Option
     let objective = compiled
         .metric
         .as_ref()
-        .and_then(|metric| objective(state, metric, &times, end));
-    if let Some((row, _)) = objective {
+        .and_then(|metric| objective(state, metric));
+    if let Some((spent, time)) = objective {
+        let row = objective_row(&spent, &time, &times, end);
         let least = program.minimize(&row).ok()?;
         // Where it has no minimum, as far as these happenings go, the makespan alone decides.
         if let Optimum::Value(least) = least {
@@ -165,14 +213,9 @@ pub(crate) fn solve(state: &State, compiled: &Compiled, exact: &Exact) -> Option
     symbolic.demands.iter().all(is_met).then_some(times)
 }
 
-/// The metric, as far as it has been spent: a row of the program, and a constant. `None` if times
+/// The metric, as far as it has been spent, and what each unit of time counts. `None` if times
 /// have no bearing on it, or it is not linear in them.
-fn objective(
-    state: &State,
-    metric: &Metric,
-    times: &[VariableId],
-    end: VariableId,
-) -> Option<(Vec<(VariableId, Rational)>, Rational)> {
+fn objective(state: &State, metric: &Metric) -> Option<(Form, Rational)> {
     let symbolic = state.symbolic.as_ref()?;
     let Numeric::Linear(values) = &metric.values else {
         return None;
@@ -188,16 +231,27 @@ fn objective(
             sum = sum.plus(weight, &course.base);
         }
     }
-    let mut row: Vec<(VariableId, Rational)> = sum
-        .terms
-        .into_iter()
-        .map(|(node, coefficient)| (times[usize::from(node)], coefficient))
-        .collect();
     // The end is not before the last happening, but need not be at it.
-    if metric.time.is_positive() {
-        row.push((end, metric.time.clone()));
+    let time = metric.time.is_positive().then(|| metric.time.clone());
+    let time = time.unwrap_or_default();
+    (!sum.terms.is_empty() || time.is_positive()).then_some((sum, time))
+}
+
+/// The same as a row of the program, without the constant.
+fn objective_row(
+    spent: &Form,
+    time: &Rational,
+    times: &[VariableId],
+    end: VariableId,
+) -> Vec<(VariableId, Rational)> {
+    let terms = spent.terms.iter();
+    let mut row: Vec<(VariableId, Rational)> = terms
+        .map(|(node, coefficient)| (times[usize::from(*node)], coefficient.clone()))
+        .collect();
+    if time.is_positive() {
+        row.push((end, time.clone()));
     }
-    (!row.is_empty()).then_some((row, sum.constant))
+    row
 }
 
 /// The times between which a node lies, by its bounds in the network.
@@ -221,7 +275,7 @@ fn window(
 
 /// The linear program, the variables of its nodes, and one that is not before any of them. `exact`: what
 /// is known exactly, where times are asked for that a plan can have.
-fn program(
+pub(super) fn program(
     network: &Network,
     demands: &[(Form, Comparison)],
     compiled: &Compiled,
@@ -266,18 +320,28 @@ fn program(
             .iter()
             .map(|(node, coefficient)| (times[usize::from(*node)], coefficient.clone()))
             .collect();
-        let row = program.define(&row);
-        let bound = -&form.constant;
-        match comparison {
-            Comparison::Less => program.assert_upper(row, Delta::just_below(bound), 0),
-            Comparison::AtMost => program.assert_upper(row, Delta::from(bound), 0),
-            Comparison::Equal => {
-                program.assert_upper(row, Delta::from(bound.clone()), 0);
-                program.assert_lower(row, Delta::from(bound), 0);
-            }
-            Comparison::AtLeast => program.assert_lower(row, Delta::from(bound), 0),
-            Comparison::Greater => program.assert_lower(row, Delta::just_above(bound), 0),
-        }
+        assert_comparison(&mut program, &row, form.constant.clone(), *comparison);
     }
     (program, times, end)
+}
+
+/// Asserts `row + constant comparison 0`.
+pub(super) fn assert_comparison(
+    program: &mut Simplex,
+    row: &[(VariableId, Rational)],
+    constant: Rational,
+    comparison: Comparison,
+) {
+    let row = program.define(row);
+    let bound = -constant;
+    match comparison {
+        Comparison::Less => program.assert_upper(row, Delta::just_below(bound), 0),
+        Comparison::AtMost => program.assert_upper(row, Delta::from(bound), 0),
+        Comparison::Equal => {
+            program.assert_upper(row, Delta::from(bound.clone()), 0);
+            program.assert_lower(row, Delta::from(bound), 0);
+        }
+        Comparison::AtLeast => program.assert_lower(row, Delta::from(bound), 0),
+        Comparison::Greater => program.assert_lower(row, Delta::just_above(bound), 0),
+    }
 }
