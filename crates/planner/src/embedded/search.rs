@@ -83,6 +83,8 @@ pub(crate) struct Search<'a> {
     price: u64,
     /// What all turns took, in turns of states without an unsettled past.
     labour: u64,
+    /// How many successors were made to see how new they are.
+    weighed: u64,
     /// What the turns since the last better estimate count for.
     idle: u64,
     /// The number of successors that had their turn.
@@ -126,6 +128,9 @@ enum DeadEnd {
 }
 
 const ROOT: u32 = u32::MAX;
+
+/// Number of lookups for which a successor counts that is made to see how new it is: some microseconds.
+const SUCCESSOR_LOOKUPS: u64 = 1_500;
 
 /// The result of one expansion step of the search.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -195,6 +200,7 @@ impl<'a> Search<'a> {
             has_lost: strategy.is_chronological,
             price: 1,
             labour: 0,
+            weighed: 0,
             idle: 0,
             drawn: 0,
             expanded: 0,
@@ -290,9 +296,11 @@ impl<'a> Search<'a> {
             && self.idle < self.compiled.tuning.patience
     }
 
-    /// How many pairs the stronger bound has looked up.
+    /// What it does beside turns and estimates, in lookups of the stronger bound; words of facts seen before, and
+    /// successors that are made to see how new they are, count for some.
     pub(crate) fn lookups(&self) -> u64 {
-        self.dead_ends.lookups()
+        let words = self.novelty.as_ref().map_or(0, Novelty::words);
+        self.dead_ends.lookups() + words + SUCCESSOR_LOOKUPS * self.weighed
     }
 
     /// Looks at one more state.

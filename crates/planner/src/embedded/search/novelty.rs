@@ -18,9 +18,10 @@ use super::super::state::State;
 #[derive(Debug)]
 pub(super) struct Novelty {
     looks_at_pairs: bool,
-    /// For each worth, a bit for each fact, then one for each pair.
+    /// For each worth, a bit for each fact; then for each fact a bit for each fact up to it, in words of its own.
     seen: Map<(u32, u32), Vec<u64>>,
-    holding: Vec<usize>,
+    /// How many words of these have been looked at.
+    words: u64,
     /// The effects of relaxed plans, of states in which a goal was reached.
     relaxed_plans: Vec<Vec<Literal>>,
 }
@@ -52,7 +53,7 @@ impl Novelty {
         Self {
             looks_at_pairs: compiled.facts.len() <= compiled.tuning.most_facts_for_novel_pairs,
             seen: Map::default(),
-            holding: Vec::new(),
+            words: 0,
             relaxed_plans: Vec::new(),
         }
     }
@@ -108,49 +109,79 @@ impl Novelty {
         state: &State,
         worth: (u32, u32),
     ) -> (i64, usize) {
-        let count = compiled.facts.len();
-        self.holding.clear();
-        for fact in 0..count {
-            if state.facts[fact / 64] >> (fact % 64) & 1 == 1 {
-                self.holding.push(fact);
-            }
-        }
         if self.seen.len() >= compiled.tuning.most_worths && !self.seen.contains_key(&worth) {
             return (3, 0);
         }
+        let singles = state.facts.len();
         let pairs = if self.looks_at_pairs {
-            count * (count + 1) / 2
+            row(compiled.facts.len())
         } else {
             0
         };
-        let size = (count + pairs).div_ceil(64);
+        let size = singles + pairs;
         let mut memory = 0;
         let seen = self.seen.entry(worth).or_insert_with(|| {
             memory = 8 * size;
             vec![0; size]
         });
-        let mut is_new = |bit: usize| {
-            let (word, mask) = (&mut seen[bit / 64], 1 << (bit % 64));
-            let is_new = *word & mask == 0;
-            *word |= mask;
-            is_new
-        };
-        let mut novelty = 3;
-        for (place, &fact) in self.holding.iter().enumerate() {
-            if is_new(fact) {
-                novelty = 1;
-            }
-            if self.looks_at_pairs {
-                let row = count + fact * (fact + 1) / 2;
-                for &other in &self.holding[..place] {
-                    if is_new(row + other) {
-                        novelty = novelty.min(2);
-                    }
-                }
-            }
-        }
+        let (novelty, words) = newness(seen, &state.facts, self.looks_at_pairs);
+        self.words += words;
         (novelty, memory)
     }
+
+    /// How many words of what was seen before have been looked at.
+    pub(super) fn words(&self) -> u64 {
+        self.words
+    }
+}
+
+/// Adds facts to those seen, in the layout of [`Novelty::seen`]: 1 if a fact is new, 2 if only a pair is, 3 otherwise; and
+/// how many words were looked at.
+fn newness(seen: &mut [u64], facts: &[u64], looks_at_pairs: bool) -> (i64, u64) {
+    let (seen_facts, seen_pairs) = seen.split_at_mut(facts.len());
+    let mut words = facts.len();
+    let mut novelty = if remember(seen_facts, facts) { 1 } else { 3 };
+    if looks_at_pairs {
+        for fact in bits(facts) {
+            let others = &mut seen_pairs[row(fact)..row(fact + 1)];
+            words += others.len();
+            if remember(others, facts) {
+                novelty = novelty.min(2);
+            }
+        }
+    }
+    (novelty, words as u64)
+}
+
+/// How many words the facts before this one have for their pairs.
+///
+/// A fact has one word for each 64 facts up to it. In its last word a pair may stand for a second time, which is seen or
+/// new whenever it is so in the other place.
+fn row(fact: usize) -> usize {
+    let (whole, rest) = (fact / 64, fact % 64);
+    64 * (whole * (whole + 1) / 2) + rest * (whole + 1)
+}
+
+/// The places of the bits that are set.
+fn bits(words: &[u64]) -> impl Iterator<Item = usize> + '_ {
+    words.iter().enumerate().flat_map(|(place, &word)| {
+        let mut left = word;
+        std::iter::from_fn(move || {
+            let bit = (left != 0).then(|| left.trailing_zeros() as usize)?;
+            left &= left - 1;
+            Some(64 * place + bit)
+        })
+    })
+}
+
+/// Adds facts to those seen; whether one is new. `seen` may have fewer words.
+fn remember(seen: &mut [u64], facts: &[u64]) -> bool {
+    let mut is_new = false;
+    for (seen, facts) in seen.iter_mut().zip(facts) {
+        is_new |= facts & !*seen != 0;
+        *seen |= facts;
+    }
+    is_new
 }
 
 /// How many conjuncts of the goal do not hold.
@@ -169,4 +200,68 @@ pub(super) fn goals_left(compiled: &Compiled, state: &State) -> u32 {
     });
     let left = literals.count() + tests.count() + choices.count();
     u32::try_from(left).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    /// Sets of facts and of pairs, as the definition has them.
+    #[derive(Default)]
+    struct Twin {
+        facts: BTreeSet<usize>,
+        pairs: BTreeSet<(usize, usize)>,
+    }
+
+    impl Twin {
+        fn newness(&mut self, facts: &BTreeSet<usize>) -> i64 {
+            let mut novelty = 3;
+            for &one in facts {
+                for &other in facts.range(one + 1..) {
+                    if self.pairs.insert((one, other)) {
+                        novelty = 2;
+                    }
+                }
+            }
+            for &fact in facts {
+                if self.facts.insert(fact) {
+                    novelty = 1;
+                }
+            }
+            novelty
+        }
+    }
+
+    #[test]
+    fn newness_is_that_of_sets_of_facts_and_pairs() {
+        let mut counts = [0; 3];
+        for count in [1, 5, 63, 64, 65, 150, 200] {
+            let singles = usize::div_ceil(count, 64);
+            let mut seen = vec![0; singles + row(count)];
+            let mut twin = Twin::default();
+            let mut random = 1_u64;
+            for _ in 0..300 {
+                let mut facts = BTreeSet::new();
+                let mut words = vec![0_u64; singles];
+                for _ in 0..6 {
+                    random = random
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    let fact = usize::try_from(random >> 33).expect("31 bits") % count;
+                    facts.insert(fact);
+                    words[fact / 64] |= 1 << (fact % 64);
+                }
+                let expected = twin.newness(&facts);
+                assert_eq!(
+                    newness(&mut seen, &words, true).0,
+                    expected,
+                    "{count}: {facts:?}"
+                );
+                counts[usize::try_from(expected - 1).expect("1 to 3")] += 1;
+            }
+        }
+        assert!(counts.iter().all(|count| *count > 50), "{counts:?}");
+    }
 }

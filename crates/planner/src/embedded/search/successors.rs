@@ -58,6 +58,7 @@ impl Search<'_> {
         let before = before.and_then(|parent| parent.progress.as_deref());
         let progress = novelty.progress(&node.state, node.left, before, &estimate.subgoals);
         self.memory += progress.size();
+        self.weighed += estimate.applicable.len() as u64;
         for &step in &estimate.applicable {
             let Some((_, next)) = self.make(number, step) else {
                 continue;
