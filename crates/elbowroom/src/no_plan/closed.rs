@@ -24,6 +24,9 @@ const MOST_UNDER_WAY: usize = 6;
 /// Work that the expansion of a state, and each state that it makes, counts: see [`Effort`].
 const WORK_OF_A_STATE: u64 = 500;
 
+/// The same for each process whose condition is tested in an expansion, in the search for the set and when it is verified.
+const WORK_OF_A_PROCESS: u64 = 5;
+
 /// Why there is no closed set.
 pub(super) enum Failure {
     Unknown(String),
@@ -138,13 +141,14 @@ fn states(
         Ok(())
     };
     add(closure.initial(), &mut nodes, &mut open)?;
+    let tests = WORK_OF_A_PROCESS * closure.process_count() as u64;
     while let Some(next) = open.pop_front() {
         let Some(node) = nodes[next].clone() else {
             continue;
         };
         let after = closure.successors(&node);
         let after = after.map_err(|flaw| Failure::Unknown(flaw.to_string()))?;
-        let work = WORK_OF_A_STATE * (1 + after.len() as u64);
+        let work = WORK_OF_A_STATE * (1 + after.len() as u64) + tests;
         effort.spend(work).map_err(|Spent| Failure::Stopped)?;
         for node in after {
             add(node, &mut nodes, &mut open)?;

@@ -200,6 +200,11 @@ impl<'a> Closure<'a> {
         Ok(found)
     }
 
+    /// Number of ground actions and happenings that [`Closure::successors`] looks at in each state.
+    pub fn process_count(&self) -> usize {
+        self.processes.len()
+    }
+
     fn start(&self, node: &Node, number: usize, found: &mut Vec<Node>) -> Result<(), NoPlanFlaw> {
         let process = &self.processes[number];
         let view = View {
