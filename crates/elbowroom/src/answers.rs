@@ -67,6 +67,9 @@ pub enum RequestError {
     /// It cannot be told how likely the durations of the plan stay inside a box.
     #[error(transparent)]
     Chance(#[from] ChanceError),
+    /// The time-outs name an action that the problem does not have.
+    #[error("{0}")]
+    Timeout(String),
     /// Something in the problem, which this names, is not supported.
     #[error("{0}")]
     Unsupported(String),

@@ -11,10 +11,10 @@ use elbowroom::answers::learn::{
 use elbowroom::answers::run::{RunRequest, simulate};
 use elbowroom::envelope::Guarantee;
 use elbowroom::execute::{NamedText, RunSpec};
-use elbowroom::execution::run::Verdict as Ended;
+use elbowroom::execution::run::{TimeoutRule, Verdict as Ended};
 use elbowroom::learning::records::{Outcome, Record, of_trace};
 use elbowroom::model::{Task, TimeTriggeredPlan};
-use elbowroom::num::End;
+use elbowroom::num::{End, Rational};
 use elbowroom::pddl::{read_plan, read_problem};
 use elbowroom::report::trace::{Stored, TraceWriter};
 use elbowroom::sim::WorldModel;
@@ -125,6 +125,19 @@ fn the_world_behind_traces_is_found_again() {
         // What is written can be read.
         let source = Source::new("learnt.toml", answer.world.clone());
         WorldModel::read(source, task.problem()).expect("a world file");
+        // No drive of the logs, and hardly another one, reaches its time-out.
+        let timeouts = answer.timeouts.as_deref().expect("durations were learnt");
+        let timeouts: TimeoutRule = timeouts.parse().expect("a rule");
+        let limit = |action: &str, planned: i64| {
+            let limit = timeouts.of(action, &Rational::from(planned));
+            limit.expect("all time out").to_f64()
+        };
+        // About twice the mean and four or five standard deviations.
+        let drive = limit("(drive rover depot shelf)", 100);
+        assert!((300.0..700.0).contains(&drive), "{count}: {drive}");
+        let unlock = limit("(unlock office)", 6);
+        assert!((26.0..40.0).contains(&unlock), "{count}: {unlock}");
+        assert!(limit("(fly rover)", 1) > 599.0, "the default");
         // The answer is data.
         let json = serde_json::to_string(&answer).expect("texts and numbers");
         let read: LearnAnswer = serde_json::from_str(&json).expect("an answer");

@@ -359,7 +359,7 @@ impl<'a> Run<'a> {
         for order in orders {
             let ticket = self.account.open(&order, &self.now);
             let planned = order.duration.clone().unwrap_or_default();
-            let timeout = self.settings.timeout.of(&planned);
+            let timeout = self.settings.timeout.of(&order.action.name, &planned);
             let command = Command::Start {
                 ticket,
                 action: order.action,

@@ -81,8 +81,9 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) time_limit: Option<Rational>,
     /// Time-out of each action, which the plan's promise names: `none`, a number of seconds, or `10x,600`,
-    /// the default: 10 times the planned duration, at least 600. --contains refuses a box beyond it
-    #[arg(long, value_name = "none|S|Fx,S", value_parser = timeout, allow_negative_numbers = true)]
+    /// the default: 10 times the planned duration, at least 600; and others for some actions:
+    /// `10x,600; drive=40; (pick a)=3x,5`. --contains refuses a box beyond it
+    #[arg(long, value_name = "RULE", value_parser = timeout, allow_negative_numbers = true)]
     pub(crate) timeout: Option<TimeoutRule>,
     /// Test whether this box is inside the envelope: `"dur_0=[7/4,12] (drive a b)=12 all=±10%"`;
     /// parameters that are not named keep their nominal value

@@ -145,9 +145,10 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "MB", default_value = "1000", value_parser = clap::value_parser!(u64).range(1..1_000_000))]
     pub(crate) planner_memory: Option<u64>,
     /// Time-out of each action, from its start or its last progress: `none`, a number of seconds, or
-    /// `10x,600`, the default: 10 times the planned duration, at least 600. An action that
+    /// `10x,600`, the default: 10 times the planned duration, at least 600; and others for some actions:
+    /// `10x,600; drive=40; (pick a)=3x,5`. `learn` prints those that follow from logs. An action that
     /// reaches it is cancelled, after a warning
-    #[arg(long, value_name = "none|S|Fx,S", value_parser = timeout, default_value_t)]
+    #[arg(long, value_name = "RULE", value_parser = timeout, default_value_t)]
     #[arg(hide_default_value = true, allow_negative_numbers = true)]
     pub(crate) timeout: TimeoutRule,
     /// Number of new plans that may be made

@@ -133,6 +133,11 @@ fn text(request: &LearnRequest, answer: &LearnAnswer, look: Look) -> String {
     for action in &answer.actions {
         remarks(&mut text, action, look);
     }
+    if let Some(timeouts) = &answer.timeouts {
+        let line = format!("Time-outs for `envelope`, `run` and `serve`: --timeout \"{timeouts}\"");
+        text.push('\n');
+        push_paragraph(&mut text, &line, look.width);
+    }
     if let Some(inside) = &answer.inside {
         conformal(&mut text, inside, look);
     }

@@ -221,7 +221,7 @@ impl<'a> Worlds<'a> {
                         self.envelope.interval(*parameter),
                         &self.prepared.plan.parameter(*parameter).nominal,
                         kind,
-                        timeout,
+                        timeout.of(name, &self.prepared.plan.parameter(*parameter).nominal),
                         rng,
                     ),
                     None => self.nominal(*id),
@@ -254,10 +254,9 @@ fn drawn(
     interval: &Interval,
     nominal: &Rational,
     kind: Kind,
-    timeout: &TimeoutRule,
+    timeout: Option<Rational>,
     rng: &mut ChaCha8Rng,
 ) -> Rational {
-    let timeout = timeout.of(nominal);
     let thousandth = Rational::new(1, 1000);
     let lower = match &interval.lower {
         End::Closed(value) => value.clone(),

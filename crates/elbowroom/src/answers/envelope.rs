@@ -44,7 +44,7 @@ pub use foresight::Foresight;
 pub(crate) use grow::grow;
 pub use inequalities::{Inequalities, NetworkRow, RequirementRow};
 pub use timeline::Timeline;
-pub(crate) use timeouts::PlannedBeyond;
+pub(crate) use timeouts::{PlannedBeyond, unknown_action};
 pub(crate) use told::quantities;
 pub use worth::{Relax, Worth};
 
@@ -258,6 +258,9 @@ pub fn envelope(
     request: &EnvelopeRequest,
     watcher: &mut dyn Watcher,
 ) -> Result<EnvelopeOutcome, RequestError> {
+    if let Some(mistake) = unknown_action(&request.timeout, request.task.problem()) {
+        return Err(RequestError::Timeout(mistake));
+    }
     let opened = if request.method() == Method::Best {
         opened(request)
     } else {

@@ -3,6 +3,7 @@
 mod changes;
 mod courses;
 mod inside;
+mod timeouts;
 
 use elbowroom_learning::fit::Fit;
 use elbowroom_learning::learn::{self, Durations, Group, Learnt};
@@ -107,6 +108,10 @@ pub struct LearnAnswer {
     pub changes: Vec<ChangesLearnt>,
     /// All of it as a world file.
     pub world: String,
+    /// The [time-outs](elbowroom_execution::run::TimeoutRule) that follow from the durations: twice the longest of 10,000
+    /// that are drawn from the distribution of an action, and of all that ended in the logs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timeouts: Option<String>,
     /// Intervals for the next run, if they were asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inside: Option<ConformalBox>,
@@ -272,6 +277,7 @@ pub fn learn(
         actions: learnt.iter().map(ActionLearnt::of).collect(),
         changes: told,
         world: world::write(&learnt, &changes, request.settings.resolution),
+        timeouts: timeouts::of(&learnt).map(|rule| rule.to_string()),
         inside,
     })
 }

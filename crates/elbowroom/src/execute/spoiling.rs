@@ -58,7 +58,8 @@ impl Spoiling {
         let all = (0..plan.instances.len()).map(InstanceId::from);
         let latest = all.filter_map(|id| {
             let planned = time(plan.end(id)) - time(plan.start(id));
-            Some((network_node(plan.end(id)), timeout.of(&planned)?))
+            let action = &plan.instance(id).action.name;
+            Some((network_node(plan.end(id)), timeout.of(action, &planned)?))
         });
         let latest = latest.collect();
         let mut happened = vec![None; plan.nodes.len()];

@@ -407,8 +407,9 @@ impl Known {
                     least: allowed.map(|interval| LowerEnd(interval.lower.clone())),
                     most: allowed.map(|interval| UpperEnd(interval.upper.clone())),
                     timeout: match parameter.kind {
-                        ParameterKind::Duration(_) => {
-                            self.timeout.of(&parameter.nominal).map(Exact)
+                        ParameterKind::Duration(instance) => {
+                            let action = &mission.plan.plan.instance(instance).action.name;
+                            self.timeout.of(action, &parameter.nominal).map(Exact)
                         }
                         _ => None,
                     },

@@ -237,8 +237,58 @@ fn plan_that_takes_longer_than_a_time_out_has_no_envelope_and_no_run() {
 }
 
 #[test]
+fn an_action_with_a_rule_of_its_own_times_out_by_that() {
+    for (timeout, limit) in [
+        ("10x,600; first=30; second=7", "30"),
+        ("none;(FIRST)=40; first=30", "40"),
+        ("first=4x,1", "8"),
+    ] {
+        let scene = scene(timeout);
+        for executor in ["guarded", "live"] {
+            let (report, _) = run(&scene, executor, limit);
+            assert_eq!(
+                report.verdict,
+                Verdict::GoalReached,
+                "{executor}: {timeout}"
+            );
+            let (report, noted) = run(&scene, executor, "1000");
+            assert_ne!(
+                report.verdict,
+                Verdict::GoalReached,
+                "{executor}: {timeout}"
+            );
+            let cancelled = noted.cancelled.lock().expect("no panic");
+            let first = cancelled.first().expect("it is cancelled");
+            assert_eq!(
+                *first,
+                number(limit) + number("0.001"),
+                "{executor}: {timeout}"
+            );
+        }
+    }
+}
+
+#[test]
+fn rule_for_an_unknown_action_is_refused() {
+    for (timeout, unknown) in [("third=5", "third"), ("(first a)=5", "(first a)")] {
+        let scene = scene(timeout);
+        let request = EnvelopeRequest::new(&scene.task, scene.plan.clone());
+        let request = request.with_settings(&scene.flow);
+        let refused = envelope(&request, &mut Unwatched).expect_err(timeout);
+        assert!(refused.to_string().contains(unknown), "{refused}");
+    }
+}
+
+#[test]
 fn rule_is_read_as_it_is_written() {
-    for text in ["none", "600", "10x,600", "5/2x,1/2", "0x,3"] {
+    for text in [
+        "none",
+        "600",
+        "10x,600",
+        "5/2x,1/3",
+        "0x,3",
+        "drive=none; (pick a b)=2.5x,1",
+    ] {
         let rule: TimeoutRule = text.parse().expect("a rule");
         assert_eq!(rule.to_string().parse(), Ok(rule), "{text}");
     }
@@ -253,6 +303,14 @@ fn rule_is_read_as_it_is_written() {
         "10x,600,3",
         "None",
         "inf",
+        "5; drive",
+        "drive=",
+        "=5",
+        "drive=5; drive=6",
+        "drive a=5",
+        "(drive a=5",
+        "()=5",
+        "drive=5;",
     ] {
         let error = text.parse::<TimeoutRule>().expect_err(text);
         assert!(error.to_string().contains("a time-out"), "{error}");

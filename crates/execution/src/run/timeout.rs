@@ -1,5 +1,6 @@
 //! Time-outs of actions: the rule, the warning before a time-out, and the cancellation at it.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -26,8 +27,13 @@ const STOPPING_AFTER_TIMEOUT: i64 = 10;
 ///
 /// let rule: TimeoutRule = "10x,600".parse()?;
 /// assert_eq!(rule, TimeoutRule::default());
-/// assert_eq!(rule.of(&Rational::from(90)), Some(Rational::from(900)));
-/// assert_eq!(rule.of(&Rational::from(5)), Some(Rational::from(600)));
+/// assert_eq!(rule.of("(drive a b)", &Rational::from(90)), Some(Rational::from(900)));
+/// assert_eq!(rule.of("(drive a b)", &Rational::from(5)), Some(Rational::from(600)));
+///
+/// let rule: TimeoutRule = "10x,600; drive=40; (drive b a)=none".parse()?;
+/// assert_eq!(rule.of("(drive a b)", &Rational::from(5)), Some(Rational::from(40)));
+/// assert_eq!(rule.of("(drive b a)", &Rational::from(5)), None);
+/// assert_eq!(rule.of("(pick a)", &Rational::from(5)), Some(Rational::from(600)));
 /// # Ok::<(), elbowroom_execution::run::UnknownSetting>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,6 +47,14 @@ pub enum TimeoutRule {
         factor: Rational,
         /// Shortest time-out; positive.
         at_least: Rational,
+    },
+    /// Rules of their own for some actions.
+    ByAction {
+        /// The rule of each named action: a ground action, `(drive a b)`, or all of one name, `drive`. That of the ground
+        /// action comes first. No rule in here is `ByAction` itself.
+        actions: BTreeMap<String, TimeoutRule>,
+        /// The rule of the others.
+        others: Box<TimeoutRule>,
     },
 }
 
@@ -57,12 +71,25 @@ impl Default for TimeoutRule {
 impl TimeoutRule {
     const OFF: &str = "none";
 
-    /// Returns the time-out of an action with this planned duration, or `None` if time-outs are off.
-    pub fn of(&self, planned: &Rational) -> Option<Rational> {
+    /// Returns the time-out of an action, `(drive a b)`, with this planned duration, or `None` if it never times out.
+    pub fn of(&self, action: &str, planned: &Rational) -> Option<Rational> {
         match self {
             Self::Off => None,
             Self::After { factor, at_least } => Some((planned * factor).max(at_least.clone())),
+            Self::ByAction { actions, others } => {
+                let own = actions.get(action).or_else(|| actions.get(name_of(action)));
+                own.unwrap_or(others).of(action, planned)
+            }
         }
+    }
+
+    /// Returns the names of actions for which it has rules of their own.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        let actions = match self {
+            Self::ByAction { actions, .. } => Some(actions),
+            Self::Off | Self::After { .. } => None,
+        };
+        actions.into_iter().flatten().map(|(name, _)| name.as_str())
     }
 
     /// Returns the rule in words: `10 times the planned duration, at least 600`.
@@ -74,28 +101,20 @@ impl TimeoutRule {
                 let (factor, at_least) = (factor.to_decimal(3), at_least.to_decimal(3));
                 format!("{factor} times the planned duration, at least {at_least}")
             }
+            Self::ByAction { actions, others } => {
+                let own = actions.iter();
+                let own = own.map(|(name, rule)| format!("{name}: {}", rule.in_words()));
+                let all: Vec<String> = std::iter::once(others.in_words()).chain(own).collect();
+                all.join("; ")
+            }
         }
     }
-}
 
-impl fmt::Display for TimeoutRule {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Off => f.write_str(Self::OFF),
-            Self::After { factor, at_least } if factor.is_zero() => at_least.fmt(f),
-            Self::After { factor, at_least } => write!(f, "{factor}x,{at_least}"),
-        }
-    }
-}
-
-impl FromStr for TimeoutRule {
-    type Err = UnknownSetting;
-
-    /// Reads `none`, a positive number of seconds, or `10x,600`.
-    fn from_str(text: &str) -> Result<Self, UnknownSetting> {
+    /// Reads a rule for all actions alike.
+    fn read_one(text: &str) -> Option<Self> {
         let number = |text: &str| text.trim().parse::<Rational>().ok();
-        let rule = match text.split_once("x,") {
-            _ if text == Self::OFF => Some(Self::Off),
+        let rule = match text.trim().split_once("x,") {
+            _ if text.trim() == Self::OFF => Some(Self::Off),
             None => number(text).map(|at_least| Self::After {
                 factor: Rational::ZERO,
                 at_least,
@@ -105,14 +124,93 @@ impl FromStr for TimeoutRule {
                 numbers.map(|(factor, at_least)| Self::After { factor, at_least })
             }
         };
-        let is_sensible = |rule: &Self| match rule {
-            Self::Off => true,
+        rule.filter(|rule| match rule {
             Self::After { factor, at_least } => !factor.is_negative() && at_least.is_positive(),
+            _ => true,
+        })
+    }
+
+    /// Reads rules of actions, behind that of the others.
+    fn read(text: &str) -> Option<Self> {
+        let mut parts = text.split(';').peekable();
+        let others = match parts.next_if(|first| !first.contains('=')) {
+            Some(first) => Self::read_one(first)?,
+            None => Self::default(),
         };
-        rule.filter(is_sensible).ok_or_else(|| UnknownSetting {
+        if parts.peek().is_none() {
+            return Some(others);
+        }
+        let mut actions = BTreeMap::new();
+        for part in parts {
+            let (name, rule) = part.split_once('=')?;
+            let name = name.trim().to_ascii_lowercase();
+            let words: Vec<&str> = name.split_whitespace().collect();
+            let is_name = match (name.strip_prefix('('), words.as_slice()) {
+                (Some(ground), _) => ground.ends_with(')') && name_of(&name) != ")",
+                (None, words) => words.len() == 1,
+            };
+            let is_new = actions
+                .insert(words.join(" "), Self::read_one(rule)?)
+                .is_none();
+            if !is_name || !is_new {
+                return None;
+            }
+        }
+        Some(Self::ByAction {
+            actions,
+            others: Box::new(others),
+        })
+    }
+}
+
+/// The name in a ground action: `drive` in `(drive a b)`.
+fn name_of(action: &str) -> &str {
+    let inner = action.strip_prefix('(').unwrap_or(action);
+    let name = inner.split_whitespace().next().unwrap_or(inner);
+    name.strip_suffix(')')
+        .filter(|name| !name.is_empty())
+        .unwrap_or(name)
+}
+
+/// A number as a decimal, or as a fraction where that would round it.
+fn written(number: &Rational) -> String {
+    let decimal = number.to_decimal(6);
+    if decimal.parse::<Rational>().as_ref() == Ok(number) {
+        decimal
+    } else {
+        number.to_string()
+    }
+}
+
+impl fmt::Display for TimeoutRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Off => f.write_str(Self::OFF),
+            Self::After { factor, at_least } if factor.is_zero() => f.write_str(&written(at_least)),
+            Self::After { factor, at_least } => {
+                write!(f, "{}x,{}", written(factor), written(at_least))
+            }
+            Self::ByAction { actions, others } => {
+                others.fmt(f)?;
+                for (name, rule) in actions {
+                    write!(f, "; {name}={rule}")?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+impl FromStr for TimeoutRule {
+    type Err = UnknownSetting;
+
+    /// Reads `none`, a positive number of seconds, or `10x,600`; and behind that rules of actions, `; drive=40`.
+    fn from_str(text: &str) -> Result<Self, UnknownSetting> {
+        Self::read(text).ok_or_else(|| UnknownSetting {
             text: text.to_owned(),
             expected: "a time-out: `none`, a positive number of seconds, or `10x,600` for 10 \
-                       times the planned duration, but at least 600 seconds",
+                       times the planned duration, but at least 600 seconds; actions of their own \
+                       behind it: `10x,600; drive=40; (pick a)=3x,5`",
         })
     }
 }
@@ -144,7 +242,7 @@ impl Run<'_> {
                 });
             }
             let planned = entry.planned.clone().unwrap_or_default();
-            let timeout = self.settings.timeout.of(&planned)?;
+            let timeout = self.settings.timeout.of(&entry.action.name, &planned)?;
             let began = entry.started.as_ref().unwrap_or(&entry.ordered);
             let progress = entry.progress.as_ref().map_or(began, |(time, _)| time);
             let until = began.max(progress) + &timeout;

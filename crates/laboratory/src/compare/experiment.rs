@@ -203,6 +203,7 @@ impl Experiment {
             TimeoutRule::After { factor, at_least } => {
                 json!([factor.to_string(), at_least.to_string()])
             }
+            rule @ TimeoutRule::ByAction { .. } => json!([rule.to_string()]),
         };
         let identity = json!([
             domain,

@@ -2,6 +2,7 @@
 //! cancelled.
 
 use elbowroom_execution::run::TimeoutRule;
+use elbowroom_model::problem::Problem;
 use elbowroom_num::{End, Rational};
 use elbowroom_plan::{Bound, DecoupledEnvelope, ParameterId, ParametrizedPlan};
 
@@ -13,10 +14,39 @@ use crate::answers::Exact;
 /// no duration, or if time-outs are off.
 pub(super) fn timeouts(plan: &ParametrizedPlan, rule: &TimeoutRule) -> Vec<Option<Rational>> {
     let mut timeouts = vec![None; plan.parameters.len()];
-    for (_, id) in plan.open_durations() {
-        timeouts[id.index()] = rule.of(&plan.parameter(id).nominal);
+    for (instance, id) in plan.open_durations() {
+        let action = &plan.plan.instance(instance).action.name;
+        timeouts[id.index()] = rule.of(action, &plan.parameter(id).nominal);
     }
     timeouts
+}
+
+/// Returns the mistake, for users, if a rule is about an action that the problem does not have.
+pub(crate) fn unknown_action(rule: &TimeoutRule, problem: &Problem) -> Option<String> {
+    let is_known = |name: &str| {
+        let inner = name
+            .strip_prefix('(')
+            .and_then(|name| name.strip_suffix(')'));
+        let mut words = inner.unwrap_or(name).split_whitespace();
+        let schema = words.next();
+        let schema = problem
+            .schemas
+            .iter()
+            .find(|it| Some(it.name.as_str()) == schema);
+        let objects: Vec<&str> = words.collect();
+        schema.is_some_and(|schema| {
+            inner.is_none()
+                || objects.len() == schema.parameters.len()
+                    && objects
+                        .iter()
+                        .all(|object| problem.object(object).is_some())
+        })
+    };
+    let unknown = rule.names().find(|name| !is_known(name))?;
+    Some(format!(
+        "the time-outs name `{unknown}`, which is no action of this problem; write `drive=40`, or \
+         `(drive a b)=40` for one with its objects"
+    ))
 }
 
 /// An action that is planned to take longer than its time-out.
@@ -41,9 +71,11 @@ impl PlannedBeyond {
         });
         let told = plan.told.iter().map(|(id, planned)| (*id, planned));
         set.chain(told).find_map(|(id, planned)| {
-            let timeout = rule.of(planned).filter(|timeout| planned > timeout)?;
+            let action = &plan.plan.instance(id).action.name;
+            let timeout = rule.of(action, planned);
+            let timeout = timeout.filter(|timeout| planned > timeout)?;
             Some(Self {
-                action: plan.plan.instance(id).action.name.clone(),
+                action: action.clone(),
                 planned: planned.clone(),
                 timeout,
             })

@@ -130,11 +130,12 @@ impl Subject<'_> {
         let told = self.plan.told.iter();
         told.map(|(id, duration)| {
             let instance = self.plan.plan.instance(*id);
+            let timeout = self.request.timeout.of(&instance.action.name, duration);
             Chosen {
                 instance: instance.label.clone(),
                 action: instance.action.name.clone(),
                 duration: Exact(duration.clone()),
-                timeout: self.request.timeout.of(duration).map(Exact),
+                timeout: timeout.map(Exact),
             }
         })
         .collect()

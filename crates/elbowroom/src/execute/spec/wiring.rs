@@ -17,6 +17,7 @@ use elbowroom_sim::{Paced, SimWorld, WorldModel};
 use elbowroom_text::Diagnostics;
 
 use super::{EMBEDDED, NOBODY, RunSpec};
+use crate::answers::envelope::unknown_action;
 use crate::execute::{
     ActionSets, Analyst, Chooser, Choosing, Embedded, Execution, External, FirstPlan, Known,
     Likeliest, Rehearse, Replanning, Rollouts, SharedRehearse, Spoiling, planning_work,
@@ -45,6 +46,9 @@ pub enum SpecError {
         "plans cannot be carried out here: executors do not heed {0} yet, which the domain has"
     )]
     Unheeded(&'static str),
+    /// The time-outs name an action that the problem does not have.
+    #[error("{0}")]
+    Timeout(String),
     /// The executor compares plans in the world that a world file describes, and there is none.
     #[error("`{0}` must know how the world behaves")]
     NeedsWorld(ExecutorSpec),
@@ -398,6 +402,9 @@ impl RunSpec {
         self.check()?;
         if let Some(feature) = task.only_judged() {
             return Err(SpecError::Unheeded(feature));
+        }
+        if let Some(mistake) = unknown_action(&self.timeout, task.problem()) {
+            return Err(SpecError::Timeout(mistake));
         }
         let model = self.model(task.problem()).map_err(SpecError::World)?;
         let envelopes = self.envelopes_in(model.as_ref());

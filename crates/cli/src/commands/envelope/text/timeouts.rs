@@ -9,6 +9,7 @@ use elbowroom::num::Rational;
 
 use crate::number;
 use crate::table::{self, Row};
+use crate::words::counted;
 
 /// The promise, in words.
 pub(super) fn meaning(parameters: &[Room], rows: &[Row]) -> String {
@@ -85,8 +86,8 @@ pub(super) fn line(rule: &TimeoutRule, parameters: &[Room], chosen: &[Chosen]) -
     }
     if groups.len() > MOST_LISTED {
         listed.push(format!(
-            "{} others (--json lists them)",
-            groups.len() - MOST_LISTED
+            "{} (--json lists them)",
+            counted(groups.len() - MOST_LISTED, "other time-out")
         ));
     }
     Some(format!(
