@@ -8,6 +8,7 @@ use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{Guarantee, Oracle, Settings as SearchSettings, irr};
 use elbowroom_execution::{Forms, Need, PrepareError, Prepared, Preparer, Region};
 use elbowroom_model::ground::Action;
+use elbowroom_model::validate::Verdict;
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::deorder::{self, Deordered};
@@ -15,8 +16,9 @@ use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
 use elbowroom_plan::partial_order::partial_order;
 use elbowroom_plan::{
     Bound, BoxEnd, Constraint, DecoupledEnvelope, Node, NodeId, ParameterId, ParametrizedPlan,
-    Reason, Schedule, Side, StnPlan, Valuation,
+    Reason, Schedule, Side, StnPlan, Valuation, network_node,
 };
+use elbowroom_stn::ConsistentNetwork;
 
 use super::facts_only::{as_timed, facts_only};
 use super::vary::is_about_an_absent_action;
@@ -222,7 +224,7 @@ const FIRST_STEP: i64 = 16;
 /// The boxes looked at for that, for each value.
 const MOST_CHECKS: usize = 64;
 
-/// The exact envelope, asked point by point.
+/// The exact envelope, asked point by point. Of plans that are beyond exact analysis, the validator judges the earliest times.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WholeRegion;
 
@@ -238,6 +240,22 @@ impl WholeRegion {
             parameter.nominal = value.clone();
         }
         Oracle::new(task, &Arc::new(plan), Guarantee::Weak)
+    }
+
+    /// Judges the plan at its earliest times, with these values. Where the validator cannot decide, nothing speaks against
+    /// the plan.
+    ///
+    /// # Errors
+    /// Why it does not work.
+    fn judged(task: &Task, plan: &ParametrizedPlan, values: &Valuation) -> Result<(), String> {
+        let network = ConsistentNetwork::try_from(plan.plan.network(values));
+        let network = network.map_err(|_| "no times satisfy the plan's constraints".to_owned())?;
+        let schedule = network.earliest_schedule(network_node(NodeId::ZERO));
+        let fixed = plan.plan.at(values).scheduled(&schedule.into());
+        match flow::judge(task, &fixed) {
+            Verdict::Invalid(violation) => Err(violation.to_string()),
+            _ => Ok(()),
+        }
     }
 
     /// The plan, with each range cut down to what lies between 0 and twice each value.
@@ -295,15 +313,14 @@ impl Region for WholeRegion {
             // What facts need is in the network, whatever the durations; the executor has it.
             return None;
         }
-        let mut oracle = match Self::oracle_at(task, plan, values) {
-            Ok(oracle) => oracle,
-            Err(refusal) => return Some(refusal.to_string()),
+        let Ok(mut oracle) = Self::oracle_at(task, plan, values) else {
+            return Self::judged(task, plan, values).err();
         };
         let envelope = DecoupledEnvelope::point(values);
-        let objection = match oracle.objection(&envelope) {
-            Ok(objection) => objection?,
-            Err(refusal) => return Some(refusal.to_string()),
+        let Ok(objection) = oracle.objection(&envelope) else {
+            return Self::judged(task, plan, values).err();
         };
+        let objection = objection?;
         let explainer = crate::Explainer::new(task, oracle.plan());
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }
@@ -319,14 +336,19 @@ impl Region for WholeRegion {
             return Ok(DecoupledEnvelope::point(values));
         }
         let plan = Self::nearby(plan, values);
-        let mut oracle = Self::oracle_at(task, &plan, values).map_err(|why| why.to_string())?;
+        let judged =
+            || Self::judged(task, &plan, values).map(|()| DecoupledEnvelope::point(values));
+        let Ok(mut oracle) = Self::oracle_at(task, &plan, values) else {
+            return judged();
+        };
         let settings = SearchSettings {
             relative: Some(Rational::new(1, 2 * FIRST_STEP)),
             most_checks: Some(MOST_CHECKS * plan.parameters.len()),
             ..SearchSettings::default()
         };
-        let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(()));
-        let run = run.map_err(|why| why.to_string())?;
+        let Ok(run) = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(())) else {
+            return judged();
+        };
         let known = run.envelope.map_err(|objection| {
             let explainer = crate::Explainer::new(task, oracle.plan());
             let point = DecoupledEnvelope::point(values);
@@ -347,7 +369,11 @@ impl Region for WholeRegion {
             return Box::new(|_| true);
         }
         let Ok(mut oracle) = Self::oracle_at(task, plan, values) else {
-            return Box::new(|_| false);
+            let mut tried = values.clone();
+            return Box::new(move |value| {
+                tried[parameter].clone_from(value);
+                Self::judged(task, plan, &tried).is_ok()
+            });
         };
         let end = BoxEnd {
             parameter,
