@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import IO, Any
@@ -153,13 +154,16 @@ class ElbowroomPlanner(
     ) -> PlanGenerationResult:
         if heuristic is not None:
             warnings.warn("elbowroom has its own heuristic; the one given is not used", stacklevel=3)
-        return self._result(problem, timeout, first=True)
+        # Without a limit the first plan is enough; with one, the time is there to be used.
+        timeout = self._limit(timeout)
+        return self._result(problem, timeout, first=timeout is None)
 
     def _get_solutions(
         self, problem: Any, timeout: float | None = None, output_stream: IO[str] | None = None
     ) -> Iterator[PlanGenerationResult]:
-        """The first plan; then, if there is time, the best until the time limit."""
+        """The first plan; then, if there is time, the best until the time limit, which counts for both."""
         timeout = self._limit(timeout)
+        begun = time.monotonic()
         first = self._result(problem, timeout, first=True)
         is_solved = first.status in (
             PlanGenerationResultStatus.SOLVED_SATISFICING,
@@ -171,7 +175,10 @@ class ElbowroomPlanner(
         yield PlanGenerationResult(
             PlanGenerationResultStatus.INTERMEDIATE, first.plan, self.name, first.metrics
         )
-        yield self._result(problem, timeout, first=False)
+        left = timeout - (time.monotonic() - begun)
+        best = self._result(problem, left, first=False) if left > 0 else first
+        # What is left may be too short to find a plan again.
+        yield best if best.plan is not None else first
 
     def _limit(self, timeout: float | None) -> float | None:
         """The shorter of the two time limits."""
@@ -180,10 +187,13 @@ class ElbowroomPlanner(
     def _result(self, problem: Any, timeout: float | None, first: bool) -> PlanGenerationResult:
         status = PlanGenerationResultStatus
         timeout = self._limit(timeout)
+        begun = time.monotonic()
         try:
             translated = Translation(problem)
+            # The translation counts, too.
+            left = None if timeout is None else max(timeout - (time.monotonic() - begun), 0.001)
             found = translated.problem.plan(
-                time_limit=timeout,
+                time_limit=left,
                 first=first,
                 self_overlap=bool(problem.self_overlapping),
                 **self._options,
