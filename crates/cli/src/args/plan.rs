@@ -70,6 +70,7 @@ pub(crate) struct PlanArgs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PlanObjectiveChoice {
     /// The room that it leaves
+    #[value(alias = "slack")]
     Room,
     /// How often it works in a world
     Probability,
