@@ -62,7 +62,7 @@ def test_plans_are_judged_as_the_case_says(name: str, case: Any, plan: Any, expe
 def test_a_case_is_solved_and_the_plan_is_valid(name: str) -> None:
     case = CASES[name]
     with OneshotPlanner(name="elbowroom") as planner:
-        result = planner.solve(case.problem, timeout=2)
+        result = planner.solve(case.problem)
     if not case.solvable:
         assert result.status in (Status.UNSOLVABLE_PROVEN, Status.UNSOLVABLE_INCOMPLETELY)
         return
