@@ -48,7 +48,7 @@ impl Plans {
             };
             let clock = Clock {
                 begun,
-                limit: limit.map(|limit| limit - GRACE.min(limit / 10)),
+                limit: limit.map(|limit| limit.saturating_sub(GRACE.min(limit / 10))),
             };
             let search = ImprovingPlans::search(&request, Box::new(clock));
             Ok(Self {
