@@ -68,6 +68,14 @@ impl Progress {
             Shown::Appended(lines) => lines.set_message(message()),
         }
     }
+
+    /// Writes a line that stays, above the one that is overwritten.
+    pub(crate) fn tell(&self, text: &str) {
+        match &self.shown {
+            Some(Shown::Overwritten(line)) => line.println(text),
+            Some(Shown::Appended(_)) | None => output::tell(text),
+        }
+    }
 }
 
 impl Drop for Progress {

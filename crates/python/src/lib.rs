@@ -34,6 +34,7 @@ mod campaign;
 mod command;
 mod odds;
 mod planner;
+mod plans;
 mod recorder;
 mod run;
 mod stepper;
@@ -53,6 +54,8 @@ mod native {
     use crate::command::command;
     #[pymodule_export]
     use crate::odds::odds;
+    #[pymodule_export]
+    use crate::plans::Plans;
     #[pymodule_export]
     use crate::run::{executors, run};
     #[pymodule_export]

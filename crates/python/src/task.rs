@@ -371,7 +371,7 @@ fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Trouble> {
 }
 
 /// As many threads as there are processors.
-const EVERY_PROCESSOR: usize = 0;
+pub(crate) const EVERY_PROCESSOR: usize = 0;
 
 /// How many threads the embedded planner may use for one plan: `jobs`, or as many as usual.
 pub(crate) fn threads(

@@ -272,3 +272,40 @@ def test_pictures_have_a_lane_for_each_row(problem: elbowroom.Problem, plan: Pat
     # A bar for each action, and a band behind it.
     assert len(gantt.patches) == 10
     assert len(problem.run(plan).plot().patches) == 5
+
+
+def errand() -> elbowroom.Problem:
+    return elbowroom.read(CASES / "errand" / "domain.pddl", CASES / "errand" / "problem.pddl")
+
+
+def test_plans_come_as_they_are_found_each_better_than_the_one_before() -> None:
+    problem = errand()
+    plans = problem.plans(jobs=1)
+    found = list(plans)
+    metrics = [plan.metric for plan in found]
+    assert len(found) > 1
+    assert all(one > other for one, other in zip(metrics, metrics[1:], strict=False))
+    assert all(problem.check(plan) for plan in found)
+    assert isinstance(plans.answer, elbowroom.Plan)
+    assert plans.answer.steps == found[-1].steps
+    assert plans.answer.stop == "exhausted"
+    assert list(plans) == []
+    # The answer is that of a search that nobody listens to.
+    assert str(plans.answer) == str(problem.plan(first=False, jobs=1))
+
+
+def test_search_for_plans_can_be_left() -> None:
+    plans = errand().plans()
+    for plan in plans:
+        assert plan.steps
+        break
+    plans.close()
+
+
+def test_search_for_plans_without_time_says_so() -> None:
+    plans = errand().plans(time_limit=0)
+    assert list(plans) == []
+    assert not plans.answer
+    assert plans.answer.document["stop"] == "time limit"
+    with pytest.raises(ValueError, match="time limit of -1"):
+        errand().plans(time_limit=-1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from fractions import Fraction
 from typing import Any
@@ -17,7 +18,12 @@ from unified_planning.engines import PlanGenerationResultStatus as Status  # noq
 from unified_planning.engines import ValidationResultStatus  # noqa: E402
 from unified_planning.model import Problem  # noqa: E402
 from unified_planning.plans import PlanKind  # noqa: E402
-from unified_planning.shortcuts import OneshotPlanner, PlanValidator, Replanner  # noqa: E402
+from unified_planning.shortcuts import (  # noqa: E402
+    AnytimePlanner,
+    OneshotPlanner,
+    PlanValidator,
+    Replanner,
+)
 from unified_planning.test.examples import get_example_problems  # noqa: E402
 
 up.shortcuts.get_environment().credits_stream = None
@@ -62,7 +68,7 @@ def test_plans_are_judged_as_the_case_says(name: str, case: Any, plan: Any, expe
 def test_a_case_is_solved_and_the_plan_is_valid(name: str) -> None:
     case = CASES[name]
     with OneshotPlanner(name="elbowroom") as planner:
-        result = planner.solve(case.problem, timeout=20)
+        result = planner.solve(case.problem)
     if not case.solvable:
         assert result.status in (Status.UNSOLVABLE_PROVEN, Status.UNSOLVABLE_INCOMPLETELY)
         return
@@ -238,3 +244,56 @@ def test_the_goal_is_protected_until_after_all_timed_effects() -> None:
         start, _, duration = plan.timed_actions[0]
         assert start + duration > 10
     assert case is None or case.problem.timed_effects
+
+
+def shifts() -> Problem:
+    """Jobs of many lengths on two machines: the first plan that is found is hardly the shortest."""
+    problem = Problem("shifts")
+    machine, job = up.shortcuts.UserType("machine"), up.shortcuts.UserType("job")
+    is_free = problem.add_fluent("free", default_initial_value=True, m=machine)
+    is_done = problem.add_fluent("done", default_initial_value=False, j=job)
+    length = problem.add_fluent("length", up.shortcuts.IntType(), default_initial_value=1, j=job)
+    work = up.shortcuts.DurativeAction("work", m=machine, j=job)
+    start, end = up.shortcuts.StartTiming(), up.shortcuts.EndTiming()
+    work.set_fixed_duration(length(work.j))
+    work.add_condition(start, is_free(work.m))
+    work.add_effect(start, is_free(work.m), False)
+    work.add_effect(end, is_free(work.m), True)
+    work.add_effect(end, is_done(work.j), True)
+    problem.add_action(work)
+    problem.add_objects([up.shortcuts.Object(f"m{i}", machine) for i in range(2)])
+    for number, minutes in enumerate((7, 3, 9, 4, 11, 5)):
+        one = problem.add_object(f"j{number}", job)
+        problem.set_initial_value(length(one), minutes)
+        problem.add_goal(is_done(one))
+    return problem
+
+
+def test_anytime_planner_yields_each_better_plan_and_at_the_end_the_best_again() -> None:
+    problem = shifts()
+    with AnytimePlanner(name="elbowroom") as planner:
+        *better, last = planner.get_solutions(problem, timeout=2)
+    assert {it.status for it in better} == {Status.INTERMEDIATE}
+    assert last.status == Status.SOLVED_SATISFICING
+    assert last.plan == better[-1].plan
+    ends = [Fraction(it.metrics["makespan"]) for it in better]
+    assert all(one > other for one, other in itertools.pairwise(ends)), ends
+    for result in better:
+        with PlanValidator(name="elbowroom-val") as validator:
+            assert validator.validate(problem, result.plan).status == ValidationResultStatus.VALID
+
+
+def test_anytime_planner_can_be_left_at_any_plan() -> None:
+    with AnytimePlanner(name="elbowroom") as planner:
+        solutions = planner.get_solutions(shifts())
+        assert next(solutions).status == Status.INTERMEDIATE
+        solutions.close()
+
+
+def test_anytime_planner_says_why_there_is_no_plan() -> None:
+    problem = shifts()
+    problem.set_initial_value(problem.fluent("free")(problem.object("m0")), False)
+    problem.set_initial_value(problem.fluent("free")(problem.object("m1")), False)
+    with AnytimePlanner(name="elbowroom") as planner:
+        (result,) = planner.get_solutions(problem)
+    assert result.status == Status.UNSOLVABLE_PROVEN

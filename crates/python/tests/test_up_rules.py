@@ -47,7 +47,7 @@ up.shortcuts.get_environment().credits_stream = None
 def solved(problem: Any, **params: Any) -> Any:
     assert elbowroom.up.ElbowroomPlanner.supports(problem.kind)
     with OneshotPlanner(name="elbowroom", params=params) as planner:
-        return planner.solve(problem, timeout=20)
+        return planner.solve(problem)
 
 
 def verdicts(problem: Any, plan: Any) -> tuple[bool, bool]:

@@ -1,6 +1,7 @@
 //! Is there a plan?
 
 mod external;
+mod improving;
 mod objective;
 mod refuted;
 
@@ -19,6 +20,7 @@ use crate::plan_text;
 
 pub use crate::no_plan::no_plan_certificate_from;
 pub use external::{PlannerFailure, plan_with};
+pub use improving::{BetterPlan, ImprovingPlans, ImprovingPlansRequest, NextPlan};
 pub use objective::{
     BestPlanRequest, PlanAim, PlanChoice, PlanObjective, PlanWorth, UnknownPlanObjective, best_plan,
 };
@@ -400,6 +402,7 @@ impl Course<'_> {
         }
         let found = progress.plan.as_ref();
         self.tell(&PlanProgress {
+            plan: found.map(|found| &found.plan),
             makespan: found.map(|found| &found.makespan),
             metric: found.and_then(|found| found.metric.as_ref()),
             worth: None,

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
+use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 use elbowroom_report::validation::Invalid;
@@ -74,6 +75,9 @@ pub struct EnvelopeProgress<'a> {
 /// Progress of a planner.
 #[derive(Clone, Debug)]
 pub struct PlanProgress<'a> {
+    /// The plan, if this is about a new one: about the task of the request, or a copy of it with a
+    /// table of its own.
+    pub plan: Option<&'a TimeTriggeredPlan>,
     /// The end time of the last action, if this is about a new plan.
     pub makespan: Option<&'a Rational>,
     /// The value of the problem's metric, if this is about a new plan and it has one.

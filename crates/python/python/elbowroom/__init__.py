@@ -46,6 +46,7 @@ from ._errors import (
 )
 from ._execution import Cancel, Look, Over, Start, Stepped, Wait
 from ._odds import ActionShare, FactShare, Happening, Loss, Odds, Sampled
+from ._plans import Plans
 from ._problem import Problem, read
 from ._tables import Progress
 from ._world import Action, AsyncWorld, Observation, World, ended, fact, started, value
@@ -114,6 +115,7 @@ __all__ = [
     "Over",
     "Plan",
     "PlannerError",
+    "Plans",
     "Problem",
     "Progress",
     "ReadError",

@@ -43,6 +43,12 @@ class Plan(Table):
         self.document: dict[str, Any] = document
         """The answer of the planner; empty for a plan from elsewhere."""
 
+    @classmethod
+    def of(cls, document: dict[str, Any]) -> Plan:
+        """The plan in the answer of a planner."""
+        steps = [Step(it["start"], it["action"], it["duration"]) for it in document["steps"]]
+        return cls(document["plan"], steps, document)
+
     @property
     def makespan(self) -> Fraction:
         """When the last action ends."""

@@ -28,6 +28,19 @@ class Task:
     ) -> tuple[str, str | None, bool]: ...
 
 @final
+class Plans:
+    def __new__(
+        cls,
+        problem: Task,
+        time_limit: float | None,
+        memory: int | None,
+        jobs: int | None,
+        self_overlap: bool,
+    ) -> Plans: ...
+    def next(self) -> tuple[str, bool] | None: ...
+    def stop(self) -> None: ...
+
+@final
 class Stepper:
     def __new__(
         cls,

@@ -15,6 +15,7 @@ from ._errors import Diagnostic, InterruptedWarning, RequestError, WorldError, d
 from ._execution import Stepped, drive, run_options
 from ._numbers import Number, document, text, timeout_text
 from ._odds import Odds
+from ._plans import Plans
 from ._tables import ProgressCallback, listener
 from ._world import Adapter, AsyncWorld, World
 
@@ -209,8 +210,40 @@ class Problem:
         _warn(is_interrupted, found["answer"] == "plan")
         if found["answer"] != "plan":
             return NoPlan(found)
-        steps = [Step(it["start"], it["action"], it["duration"]) for it in found["steps"]]
-        return Plan(found["plan"], steps, found)
+        return Plan.of(found)
+
+    def plans(
+        self,
+        *,
+        time_limit: float | None = None,
+        memory: int | None = None,
+        jobs: int | None = None,
+        self_overlap: bool = False,
+    ) -> Plans:
+        """Looks for plans with the embedded planner, and gives each better one as soon as it is found.
+
+        The search goes on in a thread of its own between them. It ends at the time limit, when nothing is left
+        to search, or when nobody refers to what is returned any more, as after ``break``. With one thread, the
+        plans are the same each time, but for how many come within the limit.
+
+        Args:
+            time_limit: in seconds, from this call on, whatever is done between the plans.
+            memory: about how many bytes the search may use.
+            jobs: how many threads the planner may use; by default, and with 0, one for each processor.
+            self_overlap: whether a ground action may overlap itself.
+
+        Raises:
+            UnsupportedError: from the loop, if the problem needs what the embedded planner does not support.
+
+        >>> plans = problem.plans(time_limit=10)
+        >>> for plan in plans:
+        ...     print(plan.makespan)
+        30003/1000
+        >>> plans.answer.stop
+        'exhausted'
+        """
+        native = _native.Plans(self._native, _seconds(time_limit), memory, jobs, self_overlap)
+        return Plans(native)
 
     def stn(self, plan: AnyPlan) -> Stn:
         """A plan with only the orders and bounds that it needs, as a simple temporal network.

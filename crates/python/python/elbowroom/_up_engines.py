@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import IO, Any
@@ -30,7 +31,7 @@ from unified_planning.exceptions import UPUsageError
 from unified_planning.model import ProblemKind
 from unified_planning.plans import PlanKind, STNPlan
 
-from ._answers import NoPlan
+from ._answers import NoPlan, Plan
 from ._errors import ReadError, UnsupportedError
 from ._up_apart import apart
 from ._up_stn import stn_plan, stn_text
@@ -153,48 +154,75 @@ class ElbowroomPlanner(
     ) -> PlanGenerationResult:
         if heuristic is not None:
             warnings.warn("elbowroom has its own heuristic; the one given is not used", stacklevel=3)
-        return self._result(problem, timeout, first=True)
+        # Without a limit the first plan is enough; with one, the time is there to be used.
+        timeout = self._limit(timeout)
+        return self._result(problem, timeout, first=timeout is None)
 
     def _get_solutions(
         self, problem: Any, timeout: float | None = None, output_stream: IO[str] | None = None
     ) -> Iterator[PlanGenerationResult]:
-        """The first plan; then, if there is time, the best until the time limit."""
-        timeout = self._limit(timeout)
-        first = self._result(problem, timeout, first=True)
-        is_solved = first.status in (
-            PlanGenerationResultStatus.SOLVED_SATISFICING,
-            PlanGenerationResultStatus.SOLVED_OPTIMALLY,
-        )
-        if not is_solved or timeout is None:
-            yield first
+        """Each better plan as soon as it is found and, at the end, the best one again, within the time limit."""
+        begun = time.monotonic()
+        try:
+            translated = Translation(problem)
+            plans = translated.problem.plans(
+                time_limit=_left(self._limit(timeout), begun),
+                self_overlap=bool(problem.self_overlapping),
+                **self._options,
+            )
+        except (UnsupportedError, ReadError) as error:
+            yield self._unsupported(error)
             return
-        yield PlanGenerationResult(
-            PlanGenerationResultStatus.INTERMEDIATE, first.plan, self.name, first.metrics
-        )
-        yield self._result(problem, timeout, first=False)
+        last: PlanGenerationResult | None = None
+        try:
+            for found in plans:
+                result = self._with_plan(translated, found)
+                if result.plan is not None:
+                    yield PlanGenerationResult(
+                        PlanGenerationResultStatus.INTERMEDIATE, result.plan, self.name, result.metrics
+                    )
+                if last is None or result.plan is not None:
+                    last = result
+        except UnsupportedError as error:
+            yield self._unsupported(error)
+            return
+        finally:
+            # Also where the caller wants no more.
+            plans.close()
+        if last is not None:
+            yield last
+        elif isinstance(plans.answer, NoPlan):
+            yield self._without_plan(translated, plans.answer)
 
     def _limit(self, timeout: float | None) -> float | None:
         """The shorter of the two time limits."""
         return min((it for it in (timeout, self._time_limit) if it is not None), default=None)
 
     def _result(self, problem: Any, timeout: float | None, first: bool) -> PlanGenerationResult:
-        status = PlanGenerationResultStatus
-        timeout = self._limit(timeout)
+        begun = time.monotonic()
         try:
             translated = Translation(problem)
             found = translated.problem.plan(
-                time_limit=timeout,
+                time_limit=_left(self._limit(timeout), begun),
                 first=first,
                 self_overlap=bool(problem.self_overlapping),
                 **self._options,
             )
         except (UnsupportedError, ReadError) as error:
-            message = LogMessage(LogLevel.ERROR, str(error))
-            return PlanGenerationResult(
-                status.UNSUPPORTED_PROBLEM, None, self.name, log_messages=[message]
-            )
+            return self._unsupported(error)
         if isinstance(found, NoPlan):
             return self._without_plan(translated, found)
+        return self._with_plan(translated, found)
+
+    def _unsupported(self, error: Exception) -> PlanGenerationResult:
+        message = LogMessage(LogLevel.ERROR, str(error))
+        return PlanGenerationResult(
+            PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, None, self.name, log_messages=[message]
+        )
+
+    def _with_plan(self, translated: Translation, found: Plan) -> PlanGenerationResult:
+        """The result where a plan was found, if it keeps unified-planning's rules."""
+        status = PlanGenerationResultStatus
         steps = apart(translated, found.steps)
         if steps is None:
             text = (
@@ -363,6 +391,11 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
             return ValidationResult(ValidationResultStatus.VALID, self.name, [])
         message = LogMessage(LogLevel.INFO, found.why_not or found.answer)
         return ValidationResult(ValidationResultStatus.INVALID, self.name, [message])
+
+
+def _left(timeout: float | None, begun: float) -> float | None:
+    """What is left of a time limit after the translation, which counts, too."""
+    return None if timeout is None else max(timeout - (time.monotonic() - begun), 0.001)
 
 
 def _refuse_unknown(unknown: dict[str, Any], engine: str, known: Sequence[str]) -> None:

@@ -1,6 +1,6 @@
 //! How a search is getting on, and when it has to stop.
 
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -22,6 +22,8 @@ pub(super) struct Watch {
     limit: Option<Duration>,
     memory: Option<MemoryLimit>,
     best: Option<Worth>,
+    /// Whether each better plan is told of: where there is time to look for some.
+    tells_plans: bool,
 }
 
 /// Makespan and metric of the last plan.
@@ -44,6 +46,7 @@ impl Watch {
                 .memory
                 .map(|megabytes| MemoryLimit::of(megabytes << 20)),
             best: None,
+            tells_plans: limit.is_some() && !arguments.first,
         }
     }
 
@@ -74,14 +77,7 @@ impl Watch {
             };
             line.push_str(&counted(progress.plans, "plan"));
             if let Some(best) = best {
-                let makespan = number::nearest(&best.makespan);
-                let _ = write!(line, ", the last ends at {makespan}");
-                if let Some(worth) = &best.objective {
-                    let _ = write!(line, ", worth {worth}");
-                }
-                if let Some(metric) = &best.metric {
-                    let _ = write!(line, ", metric {}", number::nearest(metric));
-                }
+                let _ = write!(line, ", the last with {best}");
             }
             if let Some(limit) = limit {
                 let left = limit.saturating_sub(elapsed).as_secs();
@@ -89,6 +85,19 @@ impl Watch {
             }
             line
         });
+    }
+}
+
+impl fmt::Display for Worth {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "makespan {}", number::nearest(&self.makespan))?;
+        if let Some(metric) = &self.metric {
+            write!(f, ", metric {}", number::nearest(metric))?;
+        }
+        if let Some(worth) = &self.objective {
+            write!(f, ", worth {worth}")?;
+        }
+        Ok(())
     }
 }
 
@@ -111,14 +120,21 @@ impl Watcher for Watch {
             return;
         };
         if let Some(makespan) = progress.makespan {
-            self.best = Some(Worth {
+            let best = Worth {
                 makespan: makespan.clone(),
                 metric: progress
                     .metric
                     .filter(|metric| *metric != makespan)
                     .cloned(),
                 objective: progress.worth.map(str::to_owned),
-            });
+            };
+            if self.tells_plans {
+                let seconds = self.stopwatch.elapsed().as_secs_f64();
+                let plans = progress.plans;
+                self.line
+                    .tell(&format!("plan {plans} after {seconds:.2} s: {best}"));
+            }
+            self.best = Some(best);
         }
         self.show(progress);
     }

@@ -85,6 +85,7 @@ impl Course<'_> {
     fn hear(&mut self, event: &Event<'_>, first_plan_only: bool) -> ControlFlow<()> {
         match event {
             Event::Running { memory, .. } => self.tell(&PlanProgress {
+                plan: None,
                 makespan: None,
                 metric: None,
                 worth: None,
@@ -95,6 +96,7 @@ impl Course<'_> {
             Event::Plan { found, .. } => {
                 self.plans += 1;
                 let flow = self.tell(&PlanProgress {
+                    plan: Some(&found.plan),
                     makespan: Some(&found.makespan),
                     metric: found.metric.as_ref(),
                     worth: None,

@@ -264,7 +264,7 @@ fn compared(
         shortest.get_or_insert_with(|| (judged.value.worth(), judged.makespan.clone()));
         if best.as_ref().is_none_or(|best| judged.is_better_than(best)) {
             let worth = judged.value.worth().to_string();
-            course.goes_on(0, Some((&judged.makespan, &worth)));
+            course.goes_on(0, Some((&judged, &worth)));
             best = Some(judged);
         }
     }
@@ -289,11 +289,12 @@ fn metric(task: &Task, plan: &TimeTriggeredPlan) -> Option<Rational> {
 }
 
 impl Course<'_> {
-    /// Tells how far the search has come, with the end and the worth of a new best plan, and says
+    /// Tells how far the search has come, with a new best plan and its worth, and says
     /// whether to go on.
-    fn goes_on(&mut self, states: u64, new: Option<(&Rational, &str)>) -> bool {
+    fn goes_on(&mut self, states: u64, new: Option<(&Judged, &str)>) -> bool {
         let progress = PlanProgress {
-            makespan: new.map(|(makespan, _)| makespan),
+            plan: new.map(|(judged, _)| &judged.candidate.plan),
+            makespan: new.map(|(judged, _)| &judged.makespan),
             metric: None,
             worth: new.map(|(_, worth)| worth),
             plans: self.plans,

@@ -1,0 +1,219 @@
+//! Plans as they are found, each better than the one before.
+
+use std::io;
+use std::ops::ControlFlow;
+use std::panic::resume_unwind;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
+
+use elbowroom_model::{Task, TimeTriggeredPlan};
+
+use super::{PlanFinding, PlanOutcome, PlanRequest, plan};
+use crate::answers::{Event, Halt, RequestError, Watcher};
+use crate::execute::renumbered;
+
+/// As much as the main thread has.
+const STACK: usize = 64 << 20;
+
+/// Asks the embedded planner for plans as it finds them.
+#[derive(Clone, Copy, Debug)]
+pub struct ImprovingPlansRequest<'a> {
+    /// The problem.
+    pub task: &'a Arc<Task>,
+    /// See [`PlanRequest::most_memory`].
+    pub most_memory: Option<u64>,
+    /// See [`PlanRequest::self_overlap`].
+    pub self_overlap: bool,
+    /// See [`PlanRequest::threads`].
+    pub threads: usize,
+}
+
+/// A plan that is better than all before it: by the problem's metric, or, without one, by makespan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BetterPlan {
+    /// The plan.
+    pub plan: TimeTriggeredPlan,
+    /// The same as a document: [`PlanFinding::Plan`].
+    pub finding: PlanFinding,
+}
+
+/// What comes next of a search.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NextPlan {
+    /// A better plan.
+    Better(BetterPlan),
+    /// There are no more: see [`ImprovingPlans::answer`].
+    Ended,
+    /// Nothing yet.
+    Later,
+}
+
+/// What the thread of a search sends.
+enum News {
+    Better(BetterPlan),
+    Ended(Box<Result<PlanOutcome, RequestError>>),
+}
+
+/// A search in a thread of its own, and an iterator of the plans that it finds.
+///
+/// It goes on between calls. When this is dropped, it is told to stop and ends at its next step.
+#[derive(Debug)]
+pub struct ImprovingPlans {
+    /// What the plans are about; the search names facts in a table of its own.
+    task: Arc<Task>,
+    news: Receiver<News>,
+    is_to_stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    answer: Option<Box<Result<PlanOutcome, RequestError>>>,
+}
+
+impl ImprovingPlans {
+    /// Starts the search. It ends when nothing is left to search, or when `watcher` wants no more.
+    ///
+    /// # Errors
+    /// When there is no thread to spare.
+    pub fn search(
+        request: &ImprovingPlansRequest<'_>,
+        watcher: Box<dyn Watcher + Send>,
+    ) -> io::Result<Self> {
+        let own = request.task.with_own_table();
+        let (sender, news) = channel();
+        let is_to_stop = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&is_to_stop);
+        let ImprovingPlansRequest {
+            most_memory,
+            self_overlap,
+            threads,
+            ..
+        } = *request;
+        let thread = Builder::new().stack_size(STACK).spawn(move || {
+            let mut relay = Relay {
+                inner: watcher,
+                task: &own,
+                is_to_stop: flag,
+                sender: sender.clone(),
+            };
+            let mut request = PlanRequest {
+                task: &own,
+                first_plan_only: false,
+                most_memory,
+                self_overlap,
+                threads,
+            };
+            let answer = plan(&mut request, &mut relay);
+            // Nobody may listen any longer.
+            let _ = sender.send(News::Ended(Box::new(answer)));
+        })?;
+        Ok(Self {
+            task: Arc::clone(request.task),
+            news,
+            is_to_stop,
+            thread: Some(thread),
+            answer: None,
+        })
+    }
+
+    /// The next plan, or the end of the search, if it comes within this time.
+    ///
+    /// # Panics
+    /// When the search has panicked, with the same message.
+    pub fn next_within(&mut self, patience: Duration) -> NextPlan {
+        if self.answer.is_some() {
+            return NextPlan::Ended;
+        }
+        match self.news.recv_timeout(patience) {
+            Ok(News::Better(BetterPlan { plan, finding })) => NextPlan::Better(BetterPlan {
+                plan: self.translated(&plan),
+                finding,
+            }),
+            Ok(News::Ended(mut answer)) => {
+                if let Ok(PlanOutcome { plan, .. }) = &mut *answer {
+                    *plan = plan.take().map(|plan| self.translated(&plan));
+                }
+                self.answer = Some(answer);
+                NextPlan::Ended
+            }
+            Err(RecvTimeoutError::Timeout) => NextPlan::Later,
+            // A thread that is gone without an answer has panicked.
+            Err(RecvTimeoutError::Disconnected) => match self.thread.take().map(JoinHandle::join) {
+                Some(Err(panic)) => resume_unwind(panic),
+                _ => panic!("the search has panicked"),
+            },
+        }
+    }
+
+    /// A plan of the search, with the numbers that its facts have here.
+    fn translated(&self, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
+        renumbered(&self.task, plan).expect("the search has the same actions")
+    }
+
+    /// Tells the search to stop: it ends at its next step, with the best plan so far.
+    pub fn stop(&self) {
+        self.is_to_stop.store(true, Ordering::Relaxed);
+    }
+
+    /// The answer, with the last plan again, once there are no more.
+    pub fn answer(&self) -> Option<&Result<PlanOutcome, RequestError>> {
+        self.answer.as_deref()
+    }
+}
+
+impl Iterator for ImprovingPlans {
+    type Item = BetterPlan;
+
+    /// Waits for the next plan.
+    fn next(&mut self) -> Option<BetterPlan> {
+        loop {
+            match self.next_within(Duration::MAX) {
+                NextPlan::Better(better) => return Some(better),
+                NextPlan::Ended => return None,
+                NextPlan::Later => {}
+            }
+        }
+    }
+}
+
+impl Drop for ImprovingPlans {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+/// Sends each plan on, and stops when nobody wants more.
+struct Relay<'a> {
+    inner: Box<dyn Watcher + Send>,
+    task: &'a Task,
+    is_to_stop: Arc<AtomicBool>,
+    sender: Sender<News>,
+}
+
+impl Watcher for Relay<'_> {
+    fn elapsed(&mut self) -> Duration {
+        self.inner.elapsed()
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        if self.is_to_stop.load(Ordering::Relaxed) {
+            return ControlFlow::Break(Halt::Cancelled);
+        }
+        self.inner.flow()
+    }
+
+    fn notice(&mut self, event: &Event<'_>) {
+        if let Event::Plan(progress) = event
+            && let (Some(plan), Some(makespan)) = (progress.plan, progress.makespan)
+        {
+            let (makespan, metric) = (makespan.clone(), progress.metric.cloned());
+            let better = BetterPlan {
+                plan: plan.clone(),
+                finding: PlanFinding::of(self.task, plan, makespan, metric, None),
+            };
+            // Nobody may listen any longer.
+            let _ = self.sender.send(News::Better(better));
+        }
+        self.inner.notice(event);
+    }
+}

@@ -1,0 +1,130 @@
+//! Plans as they are found.
+#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom::answers::plan::{
+    BetterPlan, ImprovingPlans, ImprovingPlansRequest, NextPlan, PlanFinding, PlanRequest,
+    PlanStop, plan,
+};
+use elbowroom::answers::{Halt, Unwatched, Watcher};
+use elbowroom::model::Task;
+use elbowroom::model::validate::{Settings, Verdict, validate};
+use elbowroom::num::Rational;
+use elbowroom::pddl::{self, Source};
+
+fn task(name: &str) -> Arc<Task> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");
+    let [domain, problem] = ["domain", "problem"].map(|file| {
+        let path = folder.join(name).join(format!("{file}.pddl"));
+        let text = std::fs::read_to_string(&path).unwrap();
+        Source::new(file, text.as_str())
+    });
+    Arc::new(Task::new(pddl::read_problem(&domain, &problem).unwrap().0))
+}
+
+fn request(task: &Arc<Task>) -> ImprovingPlansRequest<'_> {
+    ImprovingPlansRequest {
+        task,
+        most_memory: None,
+        self_overlap: false,
+        threads: 1,
+    }
+}
+
+/// By what plans are compared where the metric is to be small.
+fn value(better: &BetterPlan) -> (Rational, Rational) {
+    let PlanFinding::Plan {
+        makespan, metric, ..
+    } = &better.finding
+    else {
+        panic!("no plan: {:?}", better.finding)
+    };
+    let metric = metric.clone().unwrap_or_else(|| makespan.clone());
+    (metric, makespan.clone())
+}
+
+#[test]
+fn each_plan_is_valid_and_strictly_better_than_the_one_before() {
+    for name in ["errand", "crossing", "match", "delivery"] {
+        let task = task(name);
+        let mut search = ImprovingPlans::search(&request(&task), Box::new(Unwatched)).unwrap();
+        let plans: Vec<_> = search.by_ref().collect();
+        let values: Vec<_> = plans.iter().map(value).collect();
+        assert!(!plans.is_empty(), "{name}");
+        assert!(values.is_sorted_by(|a, b| a > b), "{name}: {values:?}");
+        for better in &plans {
+            let verdict = validate(&task, &better.plan, &Settings::default());
+            assert!(matches!(verdict, Verdict::Valid(_)), "{name}: {verdict:?}");
+        }
+        // The answer is the last one, and that of a search nobody listens to.
+        let outcome = search.answer().unwrap().as_ref().unwrap();
+        assert_eq!(
+            outcome.plan,
+            plans.last().map(|it| it.plan.clone()),
+            "{name}"
+        );
+        assert_eq!(outcome.answer.plans, plans.len(), "{name}");
+        let mut alone = PlanRequest {
+            task: &task,
+            first_plan_only: false,
+            most_memory: None,
+            self_overlap: false,
+            threads: 1,
+        };
+        let alone = plan(&mut alone, &mut Unwatched).unwrap();
+        assert_eq!(*outcome, alone, "{name}");
+        assert_eq!(search.next_within(Duration::ZERO), NextPlan::Ended);
+    }
+}
+
+#[test]
+fn where_there_is_a_better_plan_there_is_more_than_one() {
+    let search = ImprovingPlans::search(&request(&task("errand")), Box::new(Unwatched));
+    assert!(search.unwrap().count() > 1);
+}
+
+/// Is there for as long as the search.
+struct Attached(Arc<()>);
+
+impl Watcher for Attached {
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        let _ = &self.0;
+        ControlFlow::Continue(())
+    }
+}
+
+#[test]
+fn a_search_ends_when_nobody_wants_its_plans_any_more() {
+    let task = task("errand");
+    let witness = Arc::new(());
+    let watcher = Box::new(Attached(Arc::clone(&witness)));
+    let mut search = ImprovingPlans::search(&request(&task), watcher).unwrap();
+    assert!(search.next().is_some());
+    drop(search);
+    while Arc::strong_count(&witness) > 1 {
+        std::thread::yield_now();
+    }
+}
+
+/// Wants nothing.
+struct Impatient;
+
+impl Watcher for Impatient {
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        ControlFlow::Break(Halt::TimeLimit)
+    }
+}
+
+#[test]
+fn the_end_says_why_there_is_no_plan() {
+    let task = task("errand");
+    let mut search = ImprovingPlans::search(&request(&task), Box::new(Impatient)).unwrap();
+    assert_eq!(search.next(), None);
+    let outcome = search.answer().unwrap().as_ref().unwrap();
+    assert_eq!(outcome.plan, None);
+    assert_eq!(outcome.answer.stop, PlanStop::TimeLimit);
+}

@@ -1,0 +1,132 @@
+//! Plans as they are found, for a loop in Python.
+
+use std::ops::ControlFlow;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use elbowroom::answers::plan::{ImprovingPlans, ImprovingPlansRequest, NextPlan};
+use elbowroom::answers::{Halt, Watcher};
+use pyo3::prelude::*;
+
+use crate::task::{EVERY_PROCESSOR, Task, threads};
+use crate::trouble::{Trouble, guarded, json};
+
+/// How often the interpreter is asked for signals.
+const GLANCE: Duration = Duration::from_millis(50);
+/// How long the search has at most for its answer when its time is up. It comes out of the time limit.
+const GRACE: Duration = Duration::from_millis(50);
+
+/// A search for better and better plans.
+#[pyclass(frozen, module = "elbowroom._native")]
+pub(crate) struct Plans {
+    search: Mutex<ImprovingPlans>,
+    begun: Instant,
+    limit: Option<Duration>,
+}
+
+#[pymethods]
+impl Plans {
+    /// Starts the search. Its time runs from now on.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        problem: &Task,
+        time_limit: Option<f64>,
+        memory: Option<u64>,
+        jobs: Option<usize>,
+        self_overlap: bool,
+    ) -> PyResult<Self> {
+        guarded(py, || {
+            let begun = Instant::now();
+            let limit = time_limit
+                .map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
+            let request = ImprovingPlansRequest {
+                task: &problem.task,
+                most_memory: memory,
+                self_overlap,
+                threads: threads(jobs, EVERY_PROCESSOR, true)?,
+            };
+            let clock = Clock {
+                begun,
+                limit: limit.map(|limit| limit.saturating_sub(GRACE.min(limit / 10))),
+            };
+            let search = ImprovingPlans::search(&request, Box::new(clock));
+            Ok(Self {
+                search: Mutex::new(search.map_err(Trouble::request)?),
+                begun,
+                limit,
+            })
+        })
+    }
+
+    /// The next plan or, with `true`, the answer: a document. `None` when the time is up and the
+    /// search does not answer.
+    fn next(&self, py: Python<'_>) -> PyResult<Option<(String, bool)>> {
+        loop {
+            let left = self.limit.map(|it| it.saturating_sub(self.begun.elapsed()));
+            let patience = left.map_or(GLANCE, |left| left.min(GLANCE));
+            // The lock is held only while the interpreter's is not.
+            let news = guarded(py, || {
+                let mut search = self.search.lock().unwrap_or_else(PoisonError::into_inner);
+                match search.next_within(patience) {
+                    NextPlan::Better(better) => Ok(News::Document(json(&better.finding), false)),
+                    NextPlan::Later => Ok(News::None),
+                    NextPlan::Ended => match search.answer() {
+                        Some(Ok(outcome)) => Ok(News::Document(json(&outcome.answer), true)),
+                        Some(Err(error)) => Err(Trouble::Unsupported(error.to_string())),
+                        None => Ok(News::None),
+                    },
+                }
+            })?;
+            match news {
+                News::Document(document, is_last) => return Ok(Some((document, is_last))),
+                News::None if left.is_some_and(|left| left.is_zero()) => {
+                    self.stop(py)?;
+                    return Ok(None);
+                }
+                News::None => {
+                    if let Err(error) = py.check_signals() {
+                        self.stop(py)?;
+                        return Err(error);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Tells the search to stop.
+    fn stop(&self, py: Python<'_>) -> PyResult<()> {
+        guarded(py, || {
+            let search = self.search.lock().unwrap_or_else(PoisonError::into_inner);
+            search.stop();
+            Ok(())
+        })
+    }
+}
+
+/// What has come in a while.
+enum News {
+    /// A document, and whether it is the answer.
+    Document(String, bool),
+    /// Nothing.
+    None,
+}
+
+/// Ends the search at the time limit. It runs in a thread that has nothing to do with Python.
+struct Clock {
+    begun: Instant,
+    limit: Option<Duration>,
+}
+
+impl Watcher for Clock {
+    fn elapsed(&mut self) -> Duration {
+        self.begun.elapsed()
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        match self.limit {
+            Some(limit) if self.begun.elapsed() >= limit => ControlFlow::Break(Halt::TimeLimit),
+            _ => ControlFlow::Continue(()),
+        }
+    }
+}
