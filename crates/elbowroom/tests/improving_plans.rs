@@ -60,7 +60,7 @@ fn each_plan_is_valid_and_strictly_better_than_the_one_before() {
             let verdict = validate(&task, &better.plan, &Settings::default());
             assert!(matches!(verdict, Verdict::Valid(_)), "{name}: {verdict:?}");
         }
-        // The answer is the last one, and that of a search nobody listens to.
+        // The answer is the last one, and that of a search without a listener.
         let outcome = search.answer().unwrap().as_ref().unwrap();
         assert_eq!(
             outcome.plan,

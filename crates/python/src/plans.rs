@@ -11,9 +11,9 @@ use pyo3::prelude::*;
 use crate::task::{EVERY_PROCESSOR, Task, threads};
 use crate::trouble::{Trouble, guarded, json};
 
-/// How often the interpreter is asked for signals.
+/// Interval between two checks for signals.
 const GLANCE: Duration = Duration::from_millis(50);
-/// How long the search has at most for its answer when its time is up. It comes out of the time limit.
+/// Longest time that the search has for its answer after its end. It is part of the time limit.
 const GRACE: Duration = Duration::from_millis(50);
 
 /// A search for better and better plans.
@@ -104,7 +104,7 @@ impl Plans {
     }
 }
 
-/// What has come in a while.
+/// News of a search.
 enum News {
     /// A document, and whether it is the answer.
     Document(String, bool),

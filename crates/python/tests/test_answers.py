@@ -290,7 +290,7 @@ def test_plans_come_as_they_are_found_each_better_than_the_one_before() -> None:
     assert plans.answer.steps == found[-1].steps
     assert plans.answer.stop == "exhausted"
     assert list(plans) == []
-    # The answer is that of a search that nobody listens to.
+    # The answer is that of a search without a listener.
     assert str(plans.answer) == str(problem.plan(first=False, jobs=1))
 
 

@@ -22,7 +22,7 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "NAME|\"CMD\"", default_value = EMBEDDED)]
     pub(crate) planner: String,
     /// Time limit in seconds, from reading the files on; until then better plans are looked for, by
-    /// the problem's metric or else by makespan, and each one found is told of on standard error.
+    /// the problem's metric or else by makespan, and each one found is reported on standard error.
     /// Without it, the first plan is returned
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) time_limit: Option<Rational>,

@@ -246,7 +246,7 @@ impl WholeRegion {
     /// the plan.
     ///
     /// # Errors
-    /// Why it does not work.
+    /// The violation, in words.
     fn judged(task: &Task, plan: &ParametrizedPlan, values: &Valuation) -> Result<(), String> {
         let network = ConsistentNetwork::try_from(plan.plan.network(values));
         let network = network.map_err(|_| "no times satisfy the plan's constraints".to_owned())?;

@@ -137,7 +137,7 @@ impl Symbolic {
     }
 }
 
-/// Whether a comparison of a sum with zero implies another one, given their constants.
+/// Returns `true` if a comparison of a sum with zero implies another one, given their constants.
 fn implies(known: (Comparison, &Rational), other: (Comparison, &Rational)) -> bool {
     use Comparison::{AtLeast, AtMost, Greater, Less};
     let (least, most) = (known.1, other.1);

@@ -83,7 +83,7 @@ pub(crate) struct Search<'a> {
     price: u64,
     /// What all turns took, in turns of states without an unsettled past.
     labour: u64,
-    /// How many successors were made to see how new they are.
+    /// Number of successors that were made to compute their novelty.
     weighed: u64,
     /// What the turns since the last better estimate count for.
     idle: u64,
@@ -129,7 +129,7 @@ enum DeadEnd {
 
 const ROOT: u32 = u32::MAX;
 
-/// Number of lookups for which a successor counts that is made to see how new it is: some microseconds.
+/// Number of lookups for a successor that is made to compute its novelty: some microseconds.
 const SUCCESSOR_LOOKUPS: u64 = 1_500;
 
 /// The result of one expansion step of the search.
@@ -296,8 +296,8 @@ impl<'a> Search<'a> {
             && self.idle < self.compiled.tuning.patience
     }
 
-    /// What it does beside turns and estimates, in lookups of the stronger bound; words of facts seen before, and
-    /// successors that are made to see how new they are, count for some.
+    /// Work except turns and estimates, in lookups of the stronger bound. Words of known facts, and successors that
+    /// are made to compute their novelty, count for some lookups.
     pub(crate) fn lookups(&self) -> u64 {
         let words = self.novelty.as_ref().map_or(0, Novelty::words);
         self.dead_ends.lookups() + words + SUCCESSOR_LOOKUPS * self.weighed

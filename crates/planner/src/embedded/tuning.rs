@@ -15,7 +15,7 @@ pub enum Technique {
     /// Facts that only timed initials change restrict the times of happenings, instead of being
     /// changed by choices of the search.
     Calendars,
-    /// Where numbers depend on times, the linear program of a state is about the happenings only that its
+    /// If numbers depend on times, the linear program of a state is about the happenings only that its
     /// demands are about, and begins at times that were found for the state before.
     Projection,
     /// Of objects that can change places, one is tried.

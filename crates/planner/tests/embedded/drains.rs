@@ -14,15 +14,15 @@ use crate::world::{describe, task};
 #[derive(Clone, Debug)]
 struct DraftAction {
     duration: u8,
-    /// How much longer it may last.
+    /// The possible additional duration.
     room: Option<u8>,
     level: u8,
     rate: i8,
     /// A fact that holds at the start, and one that holds throughout.
     needs: [Option<u8>; 2],
-    /// What the level is compared with: at start, over all, at end.
+    /// Thresholds of the level: at start, over all, at end.
     tests: [Option<(bool, i8)>; 3],
-    /// Whether a fact is taken at the start, and given back at the end.
+    /// `true` if a fact is taken at the start and given back at the end.
     takes: Option<u8>,
     gives: u8,
     /// A jump of the level at the end.
@@ -152,7 +152,7 @@ impl Draft {
     }
 }
 
-/// What the planner comes to in so many turns; its plans have been validated.
+/// The planner's answer within a number of turns. Its plans have been validated.
 fn answer(task: &Task, is_projected: bool) -> Answer {
     let mut tuning = Tuning::default();
     if !is_projected {

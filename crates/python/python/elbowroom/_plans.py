@@ -27,7 +27,7 @@ class Plans(Iterator[Plan]):
             raise StopIteration
         news = self._native.next()
         if news is None:
-            # The search has not answered in time; what it had found until then is known.
+            # The search has not answered in time. Its last plan is known.
             self.answer = _late(self._last)
             raise StopIteration
         text, is_last = news

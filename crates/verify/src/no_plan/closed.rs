@@ -200,7 +200,7 @@ impl<'a> Closure<'a> {
         Ok(found)
     }
 
-    /// Number of ground actions and happenings that [`Closure::successors`] looks at in each state.
+    /// Number of ground actions and happenings that [`Closure::successors`] tries in each state.
     pub fn process_count(&self) -> usize {
         self.processes.len()
     }

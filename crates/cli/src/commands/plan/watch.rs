@@ -22,7 +22,7 @@ pub(super) struct Watch {
     limit: Option<Duration>,
     memory: Option<MemoryLimit>,
     best: Option<Worth>,
-    /// Whether each better plan is told of: where there is time to look for some.
+    /// `true` if each better plan is reported, because there is time to search for some.
     tells_plans: bool,
 }
 

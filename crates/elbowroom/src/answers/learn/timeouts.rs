@@ -8,7 +8,7 @@ use elbowroom_num::Rational;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-/// Number of draws, the longest of which counts.
+/// Number of draws. The longest one counts.
 const DRAWS: usize = 10_000;
 
 /// Multiple of the longest duration that is drawn or in the logs.
@@ -57,7 +57,7 @@ fn absolute(group: &Group) -> Option<TimeoutRule> {
 fn limit(group: &Group) -> Option<Rational> {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let drawn = (0..DRAWS).map(|_| group.fit.distribution.draw(&mut rng));
-    // What was cut off may have been silent for ever.
+    // A censored duration may be that of an action that never reported its end.
     let seen = group.samples.iter().filter(|sample| !sample.is_censored);
     let seen = seen.map(|sample| sample.value);
     let longest = drawn.chain(seen).fold(0.0, f64::max);

@@ -40,7 +40,7 @@ pub struct BetterPlan {
     pub finding: PlanFinding,
 }
 
-/// What comes next of a search.
+/// The next result of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NextPlan {
     /// A better plan.
@@ -51,7 +51,7 @@ pub enum NextPlan {
     Later,
 }
 
-/// What the thread of a search sends.
+/// Messages of the thread of a search.
 enum News {
     Better(BetterPlan),
     Ended(Box<Result<PlanOutcome, RequestError>>),
@@ -59,10 +59,10 @@ enum News {
 
 /// A search in a thread of its own, and an iterator of the plans that it finds.
 ///
-/// It goes on between calls. When this is dropped, it is told to stop and ends at its next step.
+/// The search continues between calls. Dropping this value requests its end at the next step.
 #[derive(Debug)]
 pub struct ImprovingPlans {
-    /// What the plans are about; the search names facts in a table of its own.
+    /// The caller's task. The search numbers facts in a table of its own.
     task: Arc<Task>,
     news: Receiver<News>,
     is_to_stop: Arc<AtomicBool>,
@@ -182,7 +182,7 @@ impl Drop for ImprovingPlans {
     }
 }
 
-/// Sends each plan on, and stops when nobody wants more.
+/// Forwards each plan, and stops the search on request.
 struct Relay<'a> {
     inner: Box<dyn Watcher + Send>,
     task: &'a Task,

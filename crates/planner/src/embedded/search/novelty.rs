@@ -20,7 +20,7 @@ pub(super) struct Novelty {
     looks_at_pairs: bool,
     /// For each worth, a bit for each fact; then for each fact a bit for each fact up to it, in words of its own.
     seen: Map<(u32, u32), Vec<u64>>,
-    /// How many words of these have been looked at.
+    /// Number of words of these that were read.
     words: u64,
     /// The effects of relaxed plans, of states in which a goal was reached.
     relaxed_plans: Vec<Vec<Literal>>,
@@ -129,14 +129,14 @@ impl Novelty {
         (novelty, memory)
     }
 
-    /// How many words of what was seen before have been looked at.
+    /// Number of words of known facts and pairs that were read.
     pub(super) fn words(&self) -> u64 {
         self.words
     }
 }
 
-/// Adds facts to those seen, in the layout of [`Novelty::seen`]: 1 if a fact is new, 2 if only a pair is, 3 otherwise; and
-/// how many words were looked at.
+/// Adds facts to those seen, in the layout of [`Novelty::seen`]. Returns 1 if a fact is new, 2 if only a pair is, 3
+/// otherwise; and the number of words that were read.
 fn newness(seen: &mut [u64], facts: &[u64], looks_at_pairs: bool) -> (i64, u64) {
     let (seen_facts, seen_pairs) = seen.split_at_mut(facts.len());
     let mut words = facts.len();
@@ -153,10 +153,10 @@ fn newness(seen: &mut [u64], facts: &[u64], looks_at_pairs: bool) -> (i64, u64) 
     (novelty, words as u64)
 }
 
-/// How many words the facts before this one have for their pairs.
+/// Number of words for the pairs of the facts before this one.
 ///
-/// A fact has one word for each 64 facts up to it. In its last word a pair may stand for a second time, which is seen or
-/// new whenever it is so in the other place.
+/// A fact has one word for each 64 facts up to it. Its last word may contain a pair for a second time, which is new
+/// exactly if it is new in the other place.
 fn row(fact: usize) -> usize {
     let (whole, rest) = (fact / 64, fact % 64);
     64 * (whole * (whole + 1) / 2) + rest * (whole + 1)

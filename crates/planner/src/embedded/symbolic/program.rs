@@ -81,17 +81,17 @@ pub(crate) fn exact_distance(
     }
 }
 
-/// What may be spent of the metric, where that depends on times.
+/// Limit on the metric, where it depends on times.
 pub(super) struct Limit<'a> {
-    /// What has been spent, without the time.
+    /// The metric without the time.
     pub(super) spent: Form,
-    /// What each unit of time counts, from the beginning to the end of the plan.
+    /// Weight of each unit of time, from the beginning to the end of the plan.
     pub(super) time: Rational,
     pub(super) bound: &'a MetricBound,
 }
 
 impl Limit<'_> {
-    /// How what is spent besides `constant`, plus the number returned, compares with zero.
+    /// Comparison with zero of the metric without `constant`, plus the number returned.
     pub(super) fn as_demand(&self, constant: &Rational) -> (Rational, Comparison) {
         let comparison = if self.bound.may_equal {
             Comparison::AtMost
@@ -126,7 +126,7 @@ pub(crate) fn is_possible(
     if !symbolic.has_demands() && limit.is_none() {
         return true;
     }
-    // Off the grid, what can happen at once happens later than the network knows.
+    // Off the grid, a happening without delay is later than in the network.
     let is_projected = compiled.tuning.uses(Technique::Projection)
         && compiled.scale.units(compiled.now) == compiled.beginning.time;
     if !is_projected {
@@ -142,7 +142,7 @@ pub(crate) fn is_possible(
     false
 }
 
-/// Whether a linear program of all happenings has a solution.
+/// Returns `true` if a linear program of all happenings has a solution.
 pub(super) fn has_solution(
     network: &Network,
     demands: &[(Form, Comparison)],

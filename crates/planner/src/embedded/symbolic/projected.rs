@@ -1,4 +1,4 @@
-//! Whether there are times for a state, asked of the few happenings that its demands are about.
+//! Decides whether a state has times, by the few happenings in its demands.
 //!
 //! These are starts and ends of actions whose duration can be chosen, and of what changes continuously
 //! meanwhile. All other happenings only limit them, and what the network allows them is again a network:
@@ -19,7 +19,7 @@ use super::super::network::{Network, NodeId};
 use super::super::time::{NEVER, Scale, Ticks};
 use super::program::{Limit, assert_comparison};
 
-/// What a network allows some of its nodes.
+/// Distances of a network between some of its nodes.
 struct Projected {
     /// Ascending.
     nodes: Vec<NodeId>,
@@ -147,7 +147,7 @@ impl Projected {
         times.into_iter().flatten().collect()
     }
 
-    /// Whether the network allows these times.
+    /// Returns `true` if the network allows these times.
     fn allows(&self, times: &[Rational]) -> bool {
         let units = |ticks| self.scale.units(ticks);
         let is_within = |(place, time): (usize, &Rational)| {
@@ -178,7 +178,7 @@ impl Projected {
             .collect()
     }
 
-    /// Whether a distance follows from two others. Among nodes without fixed distances, all of those can be left
+    /// Returns `true` if a distance follows from two others. Among nodes without fixed distances, all of those can be left
     /// out at once (Muscettola, Morris & Tsamardinos, KR 1998).
     fn is_implied(&self, from: usize, to: usize, leaders: &[usize]) -> bool {
         let distance = self.distance(from, to);

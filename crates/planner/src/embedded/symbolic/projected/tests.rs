@@ -16,7 +16,7 @@ use crate::embedded::network::{Network, NodeId};
 use crate::embedded::testing::compiled;
 use crate::embedded::time::{NEVER, Ticks};
 
-/// A happening: its earliest time, perhaps its latest one, what it comes after, and what it comes at most so
+/// A happening: its earliest time, perhaps its latest one, its predecessors, and the happenings that it comes at most so
 /// long after.
 #[derive(Clone, Debug)]
 struct DraftNode {
@@ -24,7 +24,7 @@ struct DraftNode {
     room: Option<Ticks>,
     after: Vec<(usize, Ticks)>,
     before: Option<(usize, Ticks)>,
-    /// What is demanded once it is there: coefficients of happenings, a constant, and a comparison.
+    /// The demand from then on: coefficients of happenings, a constant, and a comparison.
     demand: Option<DraftDemand>,
 }
 
