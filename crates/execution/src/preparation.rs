@@ -170,7 +170,8 @@ pub trait Region: Send {
     ) -> Option<String>;
 
     /// A box around these values in which the plan is guaranteed to work: as much of the room nearby as is found soon,
-    /// or no more than the values.
+    /// or no more than the values. Of a plan beyond exact analysis, the values are returned if nothing is known to fail
+    /// with them.
     ///
     /// # Errors
     /// Why the plan is not guaranteed to work for the values themselves.

@@ -111,7 +111,7 @@ impl Limits<'_> {
 /// The average number of ways of a node at most, once there are as many nodes as there may be.
 const WAYS: usize = 16;
 
-/// The limit on the combinations of what may happen to one state in a cell. It is needed because each running action
+/// Limit on the combinations of events of one state in a cell. It is needed because each running action
 /// may end or not, so their number grows exponentially.
 pub(super) const MOST_WAYS: usize = 1 << 16;
 

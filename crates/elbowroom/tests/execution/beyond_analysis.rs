@@ -25,7 +25,7 @@ const DOMAIN: &str = "(define (domain pond)
       :effect (and (at start (not (idle))) (at end (idle)) (at end (inspected)))))";
 const PLAN: &str = "0: (drain) [4]\n4.001: (inspect) [3]\n";
 
-/// The plan in a world in which draining takes so long, with a goal for the water.
+/// Runs the plan with this duration of draining and this goal for the water.
 fn run(takes: &str, water: u32) -> (Scene, Report) {
     let problem = format!(
         "(define (problem p) (:domain pond) (:init (idle) (= (head) 10) (= (water) 0))
