@@ -1,4 +1,4 @@
-//! Plans that are given up for want of time, where no other plan is found.
+//! Plans that are abandoned because time or numbers fall short, where no other plan is found.
 
 use elbowroom::execution::executors::DEFAULT_EXECUTOR;
 use elbowroom::execution::run::Verdict;
@@ -59,6 +59,36 @@ fn plan_that_lacks_more_than_time_is_not_carried_on() {
     let world = "[[failure]]\naction = \"go-on\"\nprobability = 1\n";
     let (verdict, _) = outcome("live", true, world);
     assert_ne!(verdict, Verdict::GoalReached);
+}
+
+/// Two hoses fill a tank in turn, each for 10 s.
+#[test]
+fn goal_is_reached_if_a_later_action_makes_up_for_numbers_that_fall_short() {
+    let domain = "(define (domain hoses)
+        (:requirements :typing :durative-actions :fluents :continuous-effects) (:types hose)
+        (:predicates (free) (new ?h - hose)) (:functions (water))
+        (:durative-action pour :parameters (?h - hose) :duration (= ?duration 10)
+          :condition (and (at start (free)) (at start (new ?h)))
+          :effect (and (at start (not (free))) (at start (not (new ?h))) (at end (free))
+            (increase (water) (* #t 1)))))";
+    let problem = "(define (problem p) (:domain hoses) (:objects a b - hose)
+        (:init (free) (new a) (new b) (= (water) 0)) (:goal (>= (water) 20)))";
+    let plan = "0: (pour a) [10]\n10.001: (pour b) [10]";
+    for (second, is_enough) in [("11.5", true), ("10.5", false)] {
+        let world = format!(
+            "[[duration]]\naction = \"(pour a)\"\nconstant = 9\n[[duration]]\naction = \"(pour b)\"\nconstant = {second}\n"
+        );
+        for watches_room in [false, true] {
+            let mut scene = Scene::new(domain, problem, Some(plan));
+            scene.settings.watches_room = watches_room;
+            let model = scene.world(&world);
+            for executor in ["live", "esterel"] {
+                let report = scene.run(executor, &model, 0);
+                let is_reached = report.verdict == Verdict::GoalReached;
+                assert_eq!(is_reached, is_enough, "{executor}, {second}: {report:#?}");
+            }
+        }
+    }
 }
 
 /// The bus cannot pass during a walk, and leaves from the place where the walk began.

@@ -30,8 +30,9 @@ pub(super) const REGISTERED: Registered = Registered {
     summary: "Dispatches so that the rest of the plan works whatever happens within its envelope. \
               When a value leaves it, gives the strongest guarantee that still holds for the rest, \
               with the observed values fixed, and replans only when the rest does not work even if \
-              nothing deviates any more. Where time is lacking and no other plan is found, it \
-              carries on by the plan's orderings, without a guarantee, as `esterel` does. With a \
+              nothing deviates any more. Where time is lacking or numbers fall short, and no other \
+              plan is found, it carries on by the plan's orderings, without a guarantee, as \
+              `esterel` does. With a \
               number, it also replans while no action is running and another plan is more likely \
               to succeed, by at least that number of percentage points, in the world that the \
               world file describes.",
@@ -57,7 +58,7 @@ struct Live {
     state: Option<Rest>,
     /// The hope for the plan for which another one was requested.
     hope: Hope,
-    /// A plan that lacks time and is executed nevertheless.
+    /// A plan that is executed without a guarantee.
     carried_on: Option<CarriedOn>,
 }
 
@@ -128,8 +129,7 @@ impl Executor for Live {
         };
         let is_abandoned = decided.decision == Decision::Replan;
         let rest = self.state.as_ref().filter(|_| is_abandoned);
-        let region = self.region.as_mut();
-        let hope = rest.map(|rest| rest.hope(&decided.reason, moment.now, region));
+        let hope = rest.map(|rest| rest.hope(&decided.reason, moment.now));
         self.hope = hope.unwrap_or_default();
         decided
     }

@@ -4,7 +4,7 @@ mod file;
 
 use elbowroom::answers::envelope::objective_of;
 use elbowroom::envelope::Objective;
-use elbowroom::execute::{FirstPlan, PLANNING_BUDGET};
+use elbowroom::execute::{FirstPlan, MOST_STATES, PLANNING_BUDGET};
 use elbowroom::timed::Settings;
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{RunSettings, TimeoutRule};
@@ -335,7 +335,7 @@ impl Experiment {
             plan: read.plan.as_ref().map(named).transpose()?,
             first_plan,
             planner,
-            planner_states: read.planner_states.unwrap_or(20_000),
+            planner_states: read.planner_states.unwrap_or(MOST_STATES),
             improve_states: read.improve_states.unwrap_or(20_000),
             planning_budget,
             table_states: Settings::default().most_states,

@@ -1,4 +1,4 @@
-//! Continuation of a plan without a guarantee: only time is lacking, and no other plan was found.
+//! Continuation of a plan without a guarantee: time is lacking or numbers fall short, and no other plan was found.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, Node, NodeId, StnPlan};
@@ -10,7 +10,7 @@ use crate::executor::{Decided, Decision, Executor, Moment};
 use crate::preparation::Region;
 use crate::reason::{About, Cause, Promise, Reason};
 
-/// The reduction of durations that the rest of a plan needs so that it works.
+/// The reduction of durations that the rest of a plan needs so that it ends in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Hope {
     /// It cannot work, however little it takes.
@@ -32,7 +32,7 @@ impl Hope {
     }
 }
 
-/// A plan that lacks time and is executed nevertheless.
+/// A plan that is executed without a guarantee.
 pub(super) struct CarriedOn {
     executor: Box<dyn Executor>,
     /// It is abandoned if there is less hope.
@@ -56,19 +56,22 @@ impl CarriedOn {
 }
 
 impl Rest {
-    /// Returns the hope for the rest of the plan after this reason to abandon it.
-    pub(super) fn hope(&self, reason: &Reason, now: &Rational, region: &mut dyn Region) -> Hope {
-        let lacks_only_time = match (reason.cause, &reason.about) {
-            // The limits of running actions come from numbers and from deadlines.
+    /// Returns the hope for the rest of the plan after this reason to abandon it. Numbers that fall short may suffice
+    /// after all if durations deviate to their advantage.
+    pub(super) fn hope(&self, reason: &Reason, now: &Rational) -> Hope {
+        let lacks_numbers = matches!(
+            (reason.cause, &reason.about),
             (
                 Cause::Outlived | Cause::GuaranteeLost,
                 Some(About::LaterNumbers | About::Said(_)),
-            ) => self.works_without_deadlines(now, region),
-            _ => promise::lacks_time(reason),
-        };
-        let may_work = |hope: &Hope| lacks_only_time && self.times(*hope, now).is_some();
+            )
+        );
+        if !lacks_numbers && !promise::lacks_time(reason) {
+            return Hope::None;
+        }
         let mut hopes = [Hope::Fair, Hope::Faint].into_iter();
-        hopes.find(may_work).unwrap_or_default()
+        let first = hopes.find(|hope| self.times(*hope, now).is_some());
+        first.unwrap_or_default()
     }
 
     fn times(&self, hope: Hope, now: &Rational) -> Option<ConsistentNetwork> {
@@ -151,7 +154,7 @@ impl Rest {
         decided
     }
 
-    /// Finds the limits of running actions by numbers. Where the rest does not work at all, there are none to find.
+    /// Finds the limits of running actions by numbers. Where numbers already fall short, there are none.
     fn limit_by_numbers(&mut self, now: &Rational, region: &mut dyn Region) {
         self.limits.clear();
         if self.durations_move_numbers && self.works_without_deadlines(now, region) {
