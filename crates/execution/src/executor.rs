@@ -79,6 +79,17 @@ pub trait Executor: Send {
         false
     }
 
+    /// Returns whether a better plan is to be searched for while the present one is executed. Asked before each wait;
+    /// the answer is `true` once for each loss of guarantee.
+    fn seeks_better_plan(&mut self, _now: &Rational) -> bool {
+        false
+    }
+
+    /// Returns whether this plan is better than the rest of the present one.
+    fn prefers(&self, _mission: &Mission, _now: &Rational) -> bool {
+        false
+    }
+
     /// The window of a time point of a step at present, for the record; in the world's time.
     fn window(&self, _step: StepId, _is_end: bool) -> Option<Planned> {
         None

@@ -93,6 +93,8 @@ pub enum Cause {
     NoOrder,
     /// Another plan is likelier to succeed.
     Likelier,
+    /// The guarantee has become weaker, and another plan may have more slack.
+    MoreSlack,
     /// The plan came too late to be started.
     Late,
     /// The plan is done, but the goal is not reached.
@@ -125,6 +127,7 @@ impl Cause {
         (Self::GuaranteeLost, "guarantee-lost"),
         (Self::NoOrder, "no-order"),
         (Self::Likelier, "likelier"),
+        (Self::MoreSlack, "more-slack"),
         (Self::Late, "late"),
         (Self::PlanDone, "plan-done"),
         (Self::GoalReached, "goal-reached"),
@@ -241,6 +244,9 @@ impl Reason {
                 None => "no order of the plan's actions leads to the goal from here".to_owned(),
             },
             Cause::Likelier => format!("there is a likelier plan: {about}"),
+            Cause::MoreSlack => {
+                "the guarantee has become weaker, and another plan has more slack".to_owned()
+            }
             Cause::Late => format!("the plan came too late: {about}"),
             Cause::PlanDone => format!("the plan is done, but the goal is not reached: {about}"),
             Cause::GoalReached => "the goal is reached".to_owned(),

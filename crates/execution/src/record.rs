@@ -163,7 +163,7 @@ pub enum Entry<'a> {
         cause: WarningCause,
     },
     /// The present plan continues: the goals have changed, and its rest reaches these, too; or it was given up, and no
-    /// other plan was found.
+    /// other plan was found; or the one that was found is no better.
     Kept {
         /// The time.
         now: &'a Rational,

@@ -75,6 +75,7 @@ mod account;
 mod agenda;
 mod amid;
 mod beginning;
+mod better;
 mod carrying_on;
 mod dead_end;
 mod doubts;
@@ -337,6 +338,7 @@ impl<'a> Run<'a> {
                 let tickets = tickets.filter_map(|step| self.account.ticket(*step));
                 self.cancel(tickets.collect());
             }
+            Decision::Wait { .. } if self.seek_better_plan() => {}
             Decision::Wait { until } => self.wait(until)?,
             Decision::Replan => {
                 self.give_up_search();

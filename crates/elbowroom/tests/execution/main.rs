@@ -5,6 +5,7 @@ mod amounts;
 mod aside;
 mod bad_worlds;
 mod beside;
+mod better;
 mod beyond_analysis;
 mod carrying_on;
 mod coupled;

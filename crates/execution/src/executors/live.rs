@@ -1,5 +1,6 @@
 //! `live`: the envelope after each observation, with what was observed fixed.
 
+mod alternative;
 mod carrying_on;
 mod inside;
 mod limits;
@@ -68,6 +69,8 @@ struct Rest {
     dispatch: Dispatch,
     /// The guarantee of the rest of the plan.
     promise: Promise,
+    /// The guarantee when a better plan was last searched for, or when the plan began.
+    sought_at: Promise,
     mission: Arc<Mission>,
     /// The values observed, and the nominal ones of the rest.
     values: Valuation,
@@ -100,6 +103,7 @@ impl Executor for Live {
         let mut rest = Rest {
             dispatch,
             promise,
+            sought_at: promise,
             mission: Arc::new(mission.clone()),
             amounts: Vec::new(),
             reads_more_than_facts,
@@ -143,6 +147,17 @@ impl Executor for Live {
         let rest = self.state.as_mut().filter(|_| hope > Hope::None);
         self.carried_on = rest.and_then(|rest| rest.carry_on(hope, now, self.region.as_mut()));
         self.carried_on.is_some()
+    }
+
+    fn seeks_better_plan(&mut self, now: &Rational) -> bool {
+        let is_carried_on = self.carried_on.is_some();
+        let rest = self.state.as_mut().filter(|_| !is_carried_on);
+        rest.is_some_and(|rest| rest.seeks_better_plan(now))
+    }
+
+    fn prefers(&self, mission: &Mission, now: &Rational) -> bool {
+        let rest = self.state.as_ref();
+        rest.is_some_and(|rest| rest.is_worse_than(mission, now))
     }
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {

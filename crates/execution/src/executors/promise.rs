@@ -3,7 +3,8 @@
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::Reading;
 use elbowroom_plan::{
-    Bound, Constraint, InstanceId, ParameterId, ParameterKind, ParametrizedPlan, Valuation,
+    Bound, Constraint, DecoupledEnvelope, InstanceId, ParameterId, ParameterKind, ParametrizedPlan,
+    Valuation,
 };
 use elbowroom_stn::ConsistentNetwork;
 
@@ -15,6 +16,9 @@ use crate::reason::{About, Cause, Promise, Reason};
 /// How much of the room around what is planned is tried, in sixteenths. On a clock each start is a little late, and where
 /// ends of the room lie on their limits, that takes as little from it.
 const SHARES: [i64; 7] = [16, 15, 12, 8, 4, 2, 1];
+
+/// The shares by which all durations may deviate at once, the greatest first, in sixteenths.
+const SLACKS: [i64; 5] = [16, 8, 4, 2, 1];
 
 /// The assumption about the remaining duration of overdue actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +41,7 @@ pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason
     let mut attempt = |share: &Rational, overrun: Overrun| {
         let room = Room {
             mission,
+            envelope: mission.envelope.as_ref(),
             values: &values,
             share,
             overrun,
@@ -116,6 +121,7 @@ pub(super) fn weaken(
     let mut attempt = |share: &Rational, overrun: Overrun| {
         let room = Room {
             mission,
+            envelope: mission.envelope.as_ref(),
             values,
             share,
             overrun,
@@ -155,6 +161,7 @@ pub(super) fn bears_until(
     let elapsed = |instance: InstanceId| elapsed(dispatch, instance, &local);
     let room = Room {
         mission,
+        envelope: mission.envelope.as_ref(),
         values,
         share: &Rational::ZERO,
         overrun: Overrun::Suitable,
@@ -205,6 +212,52 @@ fn elapsed(dispatch: &Dispatch, instance: InstanceId, now: &Rational) -> Option<
     let [start, end] = dispatch.nodes_of(instance);
     let begun = dispatch.happened(start)?;
     dispatch.happened(end).is_none().then(|| now - begun)
+}
+
+/// Returns the slack of the rest of a plan: see [`slack`].
+pub(super) fn slack_of_rest(
+    dispatch: &Dispatch,
+    plan: (&Mission, &Valuation),
+    now: &Rational,
+) -> Rational {
+    let local = dispatch.local(now);
+    let elapsed = |instance: InstanceId| elapsed(dispatch, instance, &local);
+    slack(plan, &elapsed, &mut |reading| {
+        dispatch.clone().rebound(&local, reading).is_ok()
+    })
+}
+
+/// Returns the slack of a plan that is not executed yet: see [`slack`].
+pub(super) fn slack_of_plan(mission: &Mission) -> Rational {
+    let values = mission.plan.nominal();
+    let runs = |instance: InstanceId| mission.running.contains_key(&StepId::from(instance));
+    let elapsed = |instance: InstanceId| runs(instance).then_some(Rational::ZERO);
+    slack((mission, &values), &elapsed, &mut |reading| {
+        Dispatch::controlled(mission, reading).is_ok()
+    })
+}
+
+/// The greatest share of the planned durations, at most 1, by which all durations may deviate so that every deadline is
+/// still met. It is rounded down to a power of 1/2; below 1/16 it is 0. Numbers do not count.
+fn slack(
+    (mission, values): (&Mission, &Valuation),
+    elapsed: &dyn Fn(InstanceId) -> Option<Rational>,
+    works: &mut dyn FnMut(&dyn Fn(&Constraint) -> Reading) -> bool,
+) -> Rational {
+    let shares = SLACKS.map(|sixteenths| Rational::new(sixteenths, 16));
+    let greatest = shares.into_iter().find(|share| {
+        let room = Room {
+            mission,
+            envelope: None,
+            values,
+            share,
+            overrun: Overrun::Quarter,
+            is_inside: false,
+            elapsed,
+        };
+        works(&|constraint| room.reading(constraint))
+    });
+    greatest.unwrap_or_default()
 }
 
 /// When an action that is overdue may end, on the plan's clock, the most that is asked for first.
@@ -266,6 +319,8 @@ fn most<T, E>(
 /// The room that the rest of a plan is tried with.
 struct Room<'a> {
     mission: &'a Mission,
+    /// The box that gives each duration its room. Without one, it is as much again as the planned duration.
+    envelope: Option<&'a DecoupledEnvelope>,
     /// The values observed, and the nominal ones of the rest.
     values: &'a Valuation,
     /// How much of the room around what is planned; 1 is all of it.
@@ -333,8 +388,7 @@ impl Room<'_> {
         if share.is_zero() {
             return (planned.clone(), Some(planned.clone()));
         }
-        let Some(envelope) = &self.mission.envelope else {
-            // Without an envelope as much again as is planned is taken for all the room.
+        let Some(envelope) = self.envelope else {
             let room = planned * share;
             return (planned - &room, Some(planned + room));
         };

@@ -17,10 +17,12 @@ use crate::record::Entry;
 
 /// Request for a plan for which the run waits.
 pub(super) struct Attempt {
-    reason: Reason,
-    guess: Guess,
+    pub(super) reason: Reason,
+    pub(super) guess: Guess,
     pub(super) situation: Situation,
-    running: Vec<Ticket>,
+    pub(super) running: Vec<Ticket>,
+    /// `true` if the present plan continues unless the new one is better.
+    pub(super) is_optional: bool,
 }
 
 /// The next attempt after no plan was found.
@@ -148,6 +150,7 @@ impl Run<'_> {
             guess,
             situation,
             running,
+            is_optional: false,
         });
         Ok(())
     }
@@ -173,6 +176,12 @@ impl Run<'_> {
             remark: planned.remark.as_deref(),
         });
         self.heed()?;
+        if attempt.is_optional {
+            if let PlanAnswer::Plan(plan) = planned.answer {
+                self.prepare_better_plan(attempt, &plan);
+            }
+            return Ok(());
+        }
         let plan = match planned.answer {
             PlanAnswer::Plan(_) if attempt.guess == Guess::Cancelled => {
                 self.cancel_overdue(attempt.reason);

@@ -16,6 +16,7 @@ use crate::event::{Event, Observation, Ticket};
 use crate::executor::Mission;
 use crate::planning::Planned;
 use crate::preparation::PrepareError;
+use crate::reason::Reason;
 use crate::record::Entry;
 use crate::request::{Answer, PlanRequest, PrepareRequest, RequestId, Urgency};
 
@@ -50,6 +51,9 @@ pub(super) enum Otherwise {
     SearchAgain(Box<Search>),
     /// The rest of the present plan was to be kept for other goals, and another plan is made.
     PlanForOthers(Turn),
+    /// The present plan continues, also if the executor does not prefer the prepared one, which was requested for this
+    /// reason.
+    Continue(Reason),
 }
 
 impl Run<'_> {
@@ -237,9 +241,20 @@ impl Run<'_> {
                     Otherwise::AsMade(search, plan) => self.take_over_as_made(*search, &plan),
                     Otherwise::SearchAgain(search) => self.search_again(&search.reason),
                     Otherwise::PlanForOthers(turn) => self.plan_for_others(&turn),
+                    Otherwise::Continue(_) => Ok(()),
                 };
             }
         };
+        if let Otherwise::Continue(reason) = &preparation.otherwise {
+            if !self.ports.executor.prefers(&mission, &self.now) {
+                self.ports.recorder.record(&Entry::Kept {
+                    now: &self.now,
+                    reason,
+                });
+                return Ok(());
+            }
+            self.count_replan(reason)?;
+        }
         if let Otherwise::PlanForOthers(turn) = &preparation.otherwise {
             self.ports.recorder.record(&Entry::Kept {
                 now: &self.now,

@@ -216,7 +216,7 @@ impl Run<'_> {
     }
 
     /// One more new plan is made.
-    fn count_replan(&mut self, reason: &Reason) -> Result<(), Stop> {
+    pub(super) fn count_replan(&mut self, reason: &Reason) -> Result<(), Stop> {
         self.reasons.push(reason.clone());
         self.replans += 1;
         if self.replans > self.settings.most_replans {

@@ -1,0 +1,63 @@
+//! The search for a better plan after a guarantee was lost, while the rest of the present plan is still feasible.
+
+use elbowroom::execution::Cause;
+use elbowroom::execution::run::{PlanningTime, Report, Verdict};
+use elbowroom::flow;
+use elbowroom::num::Rational;
+
+use crate::scene::Scene;
+
+/// A large robot and a fast one. Either of them may walk to a place and inspect it before a deadline.
+const DOMAIN: &str = "(define (domain robots)
+    (:requirements :typing :durative-actions :fluents :timed-initial-literals) (:types robot)
+    (:predicates (home ?r - robot) (there ?r - robot) (inspected) (day)) (:functions (pace ?r - robot))
+    (:durative-action walk :parameters (?r - robot) :duration (= ?duration (* 2 (pace ?r)))
+      :condition (and (at start (home ?r)) (over all (day)))
+      :effect (and (at start (not (home ?r))) (at end (there ?r))))
+    (:durative-action inspect :parameters (?r - robot) :duration (= ?duration (pace ?r))
+      :condition (and (over all (there ?r)) (over all (day))) :effect (at end (inspected))))";
+
+const PLAN: &str = "0: (walk large) [10]\n10.001: (inspect large) [5]";
+
+/// The walk of the large robot takes so long. It is planned for 10, and the box guarantees about 16.7.
+fn run(deadline: u32, fast_pace: u32, walk: &str, planning_time: i64) -> Report {
+    let problem = format!(
+        "(define (problem p) (:domain robots) (:objects large fast - robot)
+           (:init (home large) (home fast) (= (pace large) 5) (= (pace fast) {fast_pace}) (day)
+             (at {deadline} (not (day))))
+           (:goal (inspected)))"
+    );
+    let mut scene = Scene::new(DOMAIN, &problem, Some(PLAN));
+    scene.flow = flow::Settings::default();
+    scene.settings.planning_time = PlanningTime::Seconds(planning_time.into());
+    let world = format!("[[duration]]\naction = \"(walk large)\"\nconstant = {walk}\n");
+    scene.run("live", &scene.world(&world), 0)
+}
+
+#[test]
+fn plan_with_more_slack_takes_over_while_the_present_one_is_still_feasible() {
+    let report = run(25, 2, "21", 0);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+    let causes = report.reasons.iter().map(|reason| reason.cause);
+    assert_eq!(causes.collect::<Vec<_>>(), [Cause::MoreSlack]);
+    let since = report.reasons[0].since.clone().expect("a time");
+    assert!(since > Rational::from(16) && since < Rational::from(17));
+    // After the last moment at which the present plan is feasible, no other one is.
+    let report = run(25, 2, "21", 1);
+    assert_ne!(report.verdict, Verdict::GoalReached, "{report:#?}");
+}
+
+#[test]
+fn present_plan_continues_where_no_other_one_has_more_slack() {
+    for (deadline, fast_pace, walk) in [
+        // The other robot is too slow.
+        (25, 4, "18"),
+        // The walk stays within the box, or there is time for everything.
+        (25, 2, "16"),
+        (1000, 2, "40"),
+    ] {
+        let report = run(deadline, fast_pace, walk, 0);
+        assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+        assert_eq!(report.replans, 0, "{deadline}, {walk}: {report:#?}");
+    }
+}

@@ -1,0 +1,63 @@
+//! The search for a better plan while the present one is executed.
+
+use std::sync::Arc;
+
+use elbowroom_model::TimeTriggeredPlan;
+use elbowroom_num::Rational;
+
+use super::beginning::Course;
+use super::handover::Attempt;
+use super::here::Guess;
+use super::pending::Otherwise;
+use super::{PlanningTime, Run, RunningRule};
+use crate::executor::Need;
+use crate::reason::{Cause, Reason};
+use crate::record::Entry;
+
+impl Run<'_> {
+    /// Requests a plan if the executor seeks a better one than the present one. Returns whether it does.
+    pub(super) fn seek_better_plan(&mut self) -> bool {
+        if !self.may_seek_better_plan() || !self.ports.executor.seeks_better_plan(&self.now) {
+            return false;
+        }
+        let reason = Reason::new(Cause::MoreSlack).since(self.now.clone());
+        let guess = Guess::AQuarterLonger;
+        let (situation, running) = self.situation(&Rational::ZERO, guess);
+        self.ports.recorder.record(&Entry::Planning {
+            now: &self.now,
+            reason: &reason,
+            situation: &situation,
+        });
+        self.await_plan(Attempt {
+            reason,
+            guess,
+            situation,
+            running,
+            is_optional: true,
+        });
+        true
+    }
+
+    /// Returns whether another plan could take over at once: planning takes no time in the world, and all that was
+    /// ordered has started and can continue.
+    fn may_seek_better_plan(&self) -> bool {
+        let takes_no_time = self.settings.planning_time == PlanningTime::Seconds(Rational::ZERO);
+        let can_continue = |ticket| self.belief.running().contains_key(&ticket);
+        takes_no_time
+            && !self.settings.plans_aside
+            && self.settings.running == RunningRule::Keep
+            && self.replans < self.settings.most_replans
+            && self.ports.executor.need() != Need::PartialOrder
+            && !self.is_to_turn()
+            && !self.is_paused()
+            && self.account.open_tickets().all(can_continue)
+            && self.belief.breaking().is_empty()
+    }
+
+    /// Has a plan prepared that takes over if it is better than the present one.
+    pub(super) fn prepare_better_plan(&mut self, attempt: Attempt, plan: &TimeTriggeredPlan) {
+        let (task, goals) = (Arc::clone(&self.task), self.goals());
+        let course = Course::of(plan, &attempt.situation, &attempt.running);
+        self.await_preparation(&task, &goals, course, Otherwise::Continue(attempt.reason));
+    }
+}
