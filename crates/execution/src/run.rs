@@ -324,6 +324,13 @@ impl<'a> Run<'a> {
             return Ok(());
         }
         let decided = self.decide();
+        let is_hindered = match &decided.decision {
+            Decision::Start(orders) => !self.may_start(orders),
+            decision => *decision == Decision::GoalReached,
+        };
+        if is_hindered {
+            self.give_up_optional_search();
+        }
         match decided.decision {
             // What is begun now, the plan that is being made ready could not go on with.
             Decision::Start(orders) if !self.may_start(&orders) => self.let_go_of_plan(),

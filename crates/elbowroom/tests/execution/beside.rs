@@ -10,13 +10,12 @@ use elbowroom::execution::{
     Command, Entry, Event, Need, Observation, Passage, PlanAnswer, Planner, PlannerAnswer,
     PrepareError, Prepared, Preparer, Recorder, Wanted, World, WorldError,
 };
-
+use elbowroom::flow;
 use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::Line;
 
 use crate::lasting::scripted::{Notes, Scripted};
-use crate::scene::irr;
 
 /// A planner that works beside the run.
 #[derive(Clone, Default)]
@@ -120,7 +119,7 @@ impl Planner for Beside {
 }
 
 /// A preparer that works beside the run, and takes its time; or, without any time to take, at once.
-pub(crate) struct Readier(pub(crate) Beside);
+pub(crate) struct Readier(pub(crate) Beside, pub(crate) flow::Settings);
 
 impl Preparer for Readier {
     fn prepare(
@@ -129,7 +128,7 @@ impl Preparer for Readier {
         plan: &TimeTriggeredPlan,
         need: Need,
     ) -> Result<Prepared, PrepareError> {
-        Analyst::new(irr()).prepare(task, plan, need)
+        Analyst::new(self.1.clone()).prepare(task, plan, need)
     }
 
     fn begin(&mut self, _wanted: &Wanted<'_>) -> bool {

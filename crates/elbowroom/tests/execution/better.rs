@@ -1,10 +1,11 @@
 //! The search for a better plan after a guarantee was lost, while the rest of the present plan is still feasible.
 
 use elbowroom::execution::Cause;
-use elbowroom::execution::run::{PlanningTime, Report, Verdict};
+use elbowroom::execution::run::{PlanningTime, Report, RunSettings, Verdict};
 use elbowroom::flow;
 use elbowroom::num::Rational;
 
+use crate::beside::{Beside, Readier, Told, assert_has, settings, told};
 use crate::scene::Scene;
 
 /// A large robot and a fast one. Either of them may walk to a place and inspect it before a deadline.
@@ -19,8 +20,7 @@ const DOMAIN: &str = "(define (domain robots)
 
 const PLAN: &str = "0: (walk large) [10]\n10.001: (inspect large) [5]";
 
-/// The walk of the large robot takes so long. It is planned for 10, and the box guarantees about 16.7.
-fn run(deadline: u32, fast_pace: u32, walk: &str, planning_time: i64) -> Report {
+fn scene(deadline: u32, fast_pace: u32) -> Scene {
     let problem = format!(
         "(define (problem p) (:domain robots) (:objects large fast - robot)
            (:init (home large) (home fast) (= (pace large) 5) (= (pace fast) {fast_pace}) (day)
@@ -29,6 +29,12 @@ fn run(deadline: u32, fast_pace: u32, walk: &str, planning_time: i64) -> Report 
     );
     let mut scene = Scene::new(DOMAIN, &problem, Some(PLAN));
     scene.flow = flow::Settings::default();
+    scene
+}
+
+/// The walk of the large robot takes so long. It is planned for 10, and the box guarantees about 16.7.
+fn run(deadline: u32, fast_pace: u32, walk: &str, planning_time: i64) -> Report {
+    let mut scene = scene(deadline, fast_pace);
     scene.settings.planning_time = PlanningTime::Seconds(planning_time.into());
     let world = format!("[[duration]]\naction = \"(walk large)\"\nconstant = {walk}\n");
     scene.run("live", &scene.world(&world), 0)
@@ -47,8 +53,48 @@ fn plan_with_more_slack_takes_over_while_the_present_one_is_still_feasible() {
     assert_ne!(report.verdict, Verdict::GoalReached, "{report:#?}");
 }
 
+/// A planner in the background takes so many seconds. The walk of the large robot takes 22.5 s.
+fn run_with_background_planner(fast_pace: u32, seconds: i64, readying: &[Rational]) -> Told {
+    let scene = scene(25, fast_pace);
+    let planner = Beside::taking(&[seconds.into()]).readying(readying);
+    let execution = scene.execution("live").with_settings(RunSettings {
+        readies_aside: !readying.is_empty(),
+        ..settings()
+    });
+    let execution = execution.prepared_by(Readier(planner.clone(), scene.flow.clone()));
+    told(execution, &scene.task, (100, Vec::new()), &planner, &[5, 0, 0])
+}
+
 #[test]
-fn present_plan_continues_where_no_other_one_has_more_slack() {
+fn present_plan_continues_while_a_better_one_is_made() {
+    let readying: [&[i64]; 2] = [&[], &[1]];
+    for times in readying {
+        let times: Vec<Rational> = times.iter().map(|time| Rational::from(*time)).collect();
+        let told = run_with_background_planner(2, 1, &times);
+        assert_eq!(
+            told.report.verdict,
+            Verdict::GoalReached,
+            "{:#?}",
+            told.notes
+        );
+        let notes = ["16.7: plan", "17.7: the plan is there", "start (walk fast)"];
+        assert_has(&told, &notes);
+        // The other robot is too slow, or the planner is.
+        for (fast_pace, seconds) in [(4, 1), (2, 50)] {
+            let told = run_with_background_planner(fast_pace, seconds, &times);
+            assert_ne!(
+                told.report.verdict,
+                Verdict::GoalReached,
+                "{:#?}",
+                told.notes
+            );
+            assert!(told.report.replans <= 3, "{:#?}", told.notes);
+        }
+    }
+}
+
+#[test]
+fn present_plan_continues_where_where_no_other_one_has_more_slack() {
     for (deadline, fast_pace, walk) in [
         // The other robot is too slow.
         (25, 4, "18"),

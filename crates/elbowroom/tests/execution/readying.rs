@@ -33,7 +33,7 @@ fn execution<'a>(task: &Arc<Task>, executor: &str) -> Execution<'a> {
 fn run(task: &Arc<Task>, end: i64, script: Vec<(i64, Event)>, planner: &Beside) -> Told {
     let script = script.into_iter();
     let script = script.map(|(time, event)| (seconds(time), event));
-    let execution = execution(task, "guarded").prepared_by(Readier(planner.clone()));
+    let execution = execution(task, "guarded").prepared_by(Readier(planner.clone(), irr()));
     told(execution, task, (end, script.collect()), planner, &[])
 }
 
@@ -160,7 +160,7 @@ fn random_run(
         mut dice,
     } = Fate::of(task, seed);
     let planner = Beside::taking(&lengths).readying(&readying(&mut dice));
-    let execution = execution(task, executor(seed)).prepared_by(Readier(planner.clone()));
+    let execution = execution(task, executor(seed)).prepared_by(Readier(planner.clone(), irr()));
     let told = told(execution, task, (500, script), &planner, &quarters);
     (told, planner)
 }

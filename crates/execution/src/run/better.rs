@@ -9,18 +9,22 @@ use super::beginning::Course;
 use super::handover::Attempt;
 use super::here::Guess;
 use super::pending::Otherwise;
-use super::{PlanningTime, Run, RunningRule};
-use crate::executor::Need;
+use super::{PlanningTime, Run, RunningRule, Stop};
+use crate::executor::{Mission, Need};
 use crate::reason::{Cause, Reason};
 use crate::record::Entry;
 
 impl Run<'_> {
-    /// Requests a plan if the executor seeks a better one than the present one. Returns whether it does.
+    /// Requests a plan if the executor seeks a better one than the present one. Returns whether the run waits for it.
     pub(super) fn seek_better_plan(&mut self) -> bool {
         if !self.may_seek_better_plan() || !self.ports.executor.seeks_better_plan(&self.now) {
             return false;
         }
         let reason = Reason::new(Cause::MoreSlack).since(self.now.clone());
+        if self.plans_aside() {
+            self.search_for_a_better_plan(reason);
+            return false;
+        }
         let guess = Guess::AQuarterLonger;
         let (situation, running) = self.situation(&Rational::ZERO, guess);
         self.ports.recorder.record(&Entry::Planning {
@@ -38,13 +42,18 @@ impl Run<'_> {
         true
     }
 
-    /// Returns whether another plan could take over at once: planning takes no time in the world, and all that was
-    /// ordered has started and can continue.
+    /// Returns whether another plan could take over: the present one continues meanwhile, or planning takes no time in
+    /// the world; and all that was ordered has started and can continue.
     fn may_seek_better_plan(&self) -> bool {
         let takes_no_time = self.settings.planning_time == PlanningTime::Seconds(Rational::ZERO);
+        let has_planner = if self.plans_aside() {
+            self.search.is_none() && self.foreseen.is_none()
+        } else {
+            takes_no_time && !self.settings.plans_aside
+        };
         let can_continue = |ticket| self.belief.running().contains_key(&ticket);
-        takes_no_time
-            && !self.settings.plans_aside
+        has_planner
+            && !self.lost.plan
             && self.settings.running == RunningRule::Keep
             && self.replans < self.settings.most_replans
             && self.ports.executor.need() != Need::PartialOrder
@@ -52,6 +61,19 @@ impl Run<'_> {
             && !self.is_paused()
             && self.account.open_tickets().all(can_continue)
             && self.belief.breaking().is_empty()
+    }
+
+    /// Returns whether a prepared plan takes over from the present one, which is counted then.
+    pub(super) fn takes_over(&mut self, mission: &Mission, reason: &Reason) -> Result<bool, Stop> {
+        if self.ports.executor.prefers(mission, &self.now) {
+            self.count_replan(reason)?;
+            return Ok(true);
+        }
+        self.ports.recorder.record(&Entry::Kept {
+            now: &self.now,
+            reason,
+        });
+        Ok(false)
     }
 
     /// Has a plan prepared that takes over if it is better than the present one.

@@ -12,6 +12,7 @@ use elbowroom_num::Rational;
 use super::Run;
 use super::expectation::{Expected, Late, Prospect, Reach};
 use super::here::Guess;
+use super::search::Search;
 use crate::event::Ticket;
 use crate::executor::CAN_HAVE_A_CLOCK;
 use crate::executor::StepId;
@@ -59,6 +60,10 @@ impl Run<'_> {
     /// Tells the planner from where a plan will be needed at `until`, or before that where something
     /// else is late, too.
     pub(super) fn foresee(&mut self, until: &Rational) {
+        if self.search.as_ref().is_some_and(Search::is_optional) {
+            // It comes first; if its plan does not take over, this is asked again.
+            return;
+        }
         let until = self.next_need().unwrap_or_else(|| until.clone());
         let time = &until + self.margin() + self.task.epsilon();
         let prospect = self.what_is_foreseen(&until, &until, time);

@@ -245,15 +245,10 @@ impl Run<'_> {
                 };
             }
         };
-        if let Otherwise::Continue(reason) = &preparation.otherwise {
-            if !self.ports.executor.prefers(&mission, &self.now) {
-                self.ports.recorder.record(&Entry::Kept {
-                    now: &self.now,
-                    reason,
-                });
-                return Ok(());
-            }
-            self.count_replan(reason)?;
+        if let Otherwise::Continue(reason) = &preparation.otherwise
+            && !self.takes_over(&mission, reason)?
+        {
+            return Ok(());
         }
         if let Otherwise::PlanForOthers(turn) = &preparation.otherwise {
             self.ports.recorder.record(&Entry::Kept {

@@ -101,6 +101,11 @@ impl Search {
         }
     }
 
+    /// Returns whether the present plan continues unless the new one is better.
+    pub(super) fn is_optional(&self) -> bool {
+        self.reason.cause == Cause::MoreSlack
+    }
+
     /// Returns whether answers have arrived that are not noted yet: a plan, and a prepared plan.
     pub(super) fn arrived(&self) -> (bool, bool) {
         let is_made = self.answer.is_some() && !self.is_made;
@@ -280,6 +285,19 @@ impl Run<'_> {
         });
     }
 
+    /// Searches for a better plan while the present one is executed.
+    pub(super) fn search_for_a_better_plan(&mut self, reason: Reason) {
+        let course = Goes::Plan { until: None };
+        self.search(reason, Guess::AQuarterLonger, course);
+    }
+
+    /// Ends a search without which the present plan continues.
+    pub(super) fn give_up_optional_search(&mut self) {
+        if self.search.as_ref().is_some_and(Search::is_optional) {
+            self.give_up_search();
+        }
+    }
+
     /// Ends a search whose plan is not needed any more.
     pub(super) fn give_up_search(&mut self) {
         if let Some(search) = self.search.take() {
@@ -356,6 +374,9 @@ impl Run<'_> {
 
     /// Sees to a search, if there is one; whether the executor is not to be asked because of it.
     pub(super) fn tend_search(&mut self) -> Result<bool, Stop> {
+        if self.is_to_turn() {
+            self.give_up_optional_search();
+        }
         let Some(search) = self.search.as_ref().filter(|_| CAN_HAVE_A_CLOCK) else {
             return Ok(false);
         };
@@ -469,6 +490,7 @@ impl Run<'_> {
                 self.search = Some(search);
                 Ok(())
             }
+            _ if search.is_optional() => Ok(()),
             // Another plan is needed anyway.
             _ if self.is_to_turn() => Ok(()),
             // There was none from there; from here, there may be.
@@ -498,8 +520,11 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// The plan that was made is outdated.
+    /// The plan that was made is outdated. Another one is searched for, unless the present plan continues.
     pub(super) fn search_again(&mut self, first: &Reason) -> Result<(), Stop> {
+        if first.cause == Cause::MoreSlack {
+            return Ok(());
+        }
         let about = "what has happened while the plan was made".to_owned();
         let reason = Reason::new(Cause::Surprise).about(About::Said(about));
         let reason = if self.is_to_turn() { first } else { &reason };

@@ -190,7 +190,7 @@ impl Case {
         let execution = self.execution(&task);
         let execution = if self.is_aside {
             execution
-                .prepared_by(Readier(planner.clone()))
+                .prepared_by(Readier(planner.clone(), irr()))
                 .planned_by(planner)
         } else {
             execution.planned_by(Slow(self.seed))

@@ -181,6 +181,10 @@ impl Run<'_> {
             return Ok(true);
         };
         if self.is_silent(readying) && self.now < since + Rational::from(WORD) {
+            if search.is_optional() {
+                self.give_up_search();
+                return Ok(false);
+            }
             self.let_go_of_plan();
             self.wait_for_search();
             return Ok(true);
@@ -215,6 +219,9 @@ impl Run<'_> {
                 if let Some(turn) = search.kept_for.take() {
                     return self.plan_for_others(&turn);
                 }
+                if search.is_optional() {
+                    return Ok(());
+                }
                 if search.course != Goes::UnderWay || !begun.is_empty() {
                     return self.search_again(&search.reason);
                 }
@@ -230,7 +237,11 @@ impl Run<'_> {
         };
         let steps = self.steps_of(&mission, &begun);
         let agrees = !readying.disagrees && !self.is_silent(&readying) && steps.is_some();
-        if !agrees && (search.tries <= MOST_TRIES || !begun.is_empty()) {
+        if search.is_optional() {
+            if !agrees || !self.takes_over(&mission, &search.reason)? {
+                return Ok(());
+            }
+        } else if !agrees && (search.tries <= MOST_TRIES || !begun.is_empty()) {
             search = match self.fit_again(search)? {
                 // Its executor is told.
                 Some(search) if begun.is_empty() => search,

@@ -123,7 +123,11 @@ impl Run<'_> {
             let (plan, situation, running) = fit;
             let course = Course::of(&plan, &situation, &running);
             let (task, goals) = (Arc::clone(&search.task), search.goals.clone());
-            let otherwise = Otherwise::SearchAgain(Box::new(search));
+            let otherwise = if search.is_optional() {
+                Otherwise::Continue(search.reason)
+            } else {
+                Otherwise::SearchAgain(Box::new(search))
+            };
             self.await_preparation(&task, &goals, course, otherwise);
             return Ok(());
         }
