@@ -225,8 +225,8 @@ impl OrderSearch {
     /// The order most likely to succeed from here.
     ///
     /// `watch` is called now and then; when it breaks, the best order so far is the answer. Of
-    /// orders that are equally likely, a shorter one is preferred, then the one found first. Its starts wait for uncertain
-    /// ends that the ends of their actions depend on, where that costs no probability.
+    /// orders that are equally likely, a shorter one is preferred, then the one found first. Its starts wait for ends
+    /// as `search/postponed.rs` describes, where that costs no probability.
     ///
     /// # Errors
     /// When a condition couples too many uncertain facts.

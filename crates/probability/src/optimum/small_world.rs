@@ -239,8 +239,9 @@ fn ends_break_others(
     })
 }
 
-/// Returns `true` if the end of an action needs a fact that its start and its condition over all do not need, and that
-/// another action makes true. The table would delay such an end until the fact holds. On the clock, the action fails.
+/// Returns `true` if the end of an action needs a fact that another action makes true, and that does not hold already
+/// because of its condition over all, or because its start needs it and does not delete it. The table would delay such an
+/// end until the fact holds. On the clock, the action fails.
 fn ends_await_others(
     actions: &[Action],
     failures: impl Fn(&Action) -> BTreeSet<(FactId, bool)>,
@@ -269,9 +270,13 @@ fn ends_await_others(
             return false;
         };
         let (before, throughout) = (body.start.condition.conjuncts(), body.over_all.conjuncts());
+        let is_deleted = |part: &Condition| {
+            let mut effects = body.start.effects.iter();
+            effects.any(|effect| breaks(&effect.change, part))
+        };
         let awaited = body.end.condition.conjuncts().into_iter();
-        let mut awaited =
-            awaited.filter(|part| !before.contains(part) && !throughout.contains(part));
+        let awaited = awaited.filter(|part| !throughout.contains(part));
+        let mut awaited = awaited.filter(|part| !before.contains(part) || is_deleted(part));
         awaited.any(|part| {
             let others = made_true.iter().enumerate();
             let mut others = others.filter(|(other, _)| *other != own);

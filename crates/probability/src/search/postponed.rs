@@ -9,52 +9,94 @@ use crate::model::Event;
 use crate::network::{Happenings, PrunedNetwork, TooCoupled};
 
 impl OrderSearch {
-    /// Moves starts behind ends that may go wrong and on whose effects the end of the started action depends.
+    /// Moves starts behind ends that may go wrong and on whose effects the end of the started action depends, and behind
+    /// the ends of actions that a failure of the started action would harm.
     ///
     /// The probability of an order does not count retries, so an order that starts both actions first is as likely. But
-    /// when the first end goes wrong there, the second action fails with it, and its failure may be beyond repair. A
-    /// start stays where the order would be less likely or have no time otherwise.
+    /// there, one failure makes both actions fail, and the second one may be beyond repair. A start stays where the order
+    /// would be less likely or have no time otherwise.
     pub(super) fn postponed(
         &self,
         circumstances: &Circumstances,
         (sequence, probability): (Vec<NodeId>, f64),
     ) -> Result<Vec<NodeId>, TooCoupled> {
-        let mut sequence = sequence;
-        let mut position = 0;
-        while position < sequence.len() {
-            let moved = match self.last_end_awaited(&sequence, position) {
-                Some(end) => self.moved(&sequence, position, end),
-                None => None,
+        let mut order = sequence.clone();
+        for start in sequence {
+            let Node::Start(id) = self.model.plan().nodes[start.index()] else {
+                continue;
             };
-            match moved {
-                Some(moved) if self.is_as_likely(circumstances, &moved, probability)? => {
-                    // Another happening is here now.
-                    sequence = moved;
-                }
-                _ => position += 1,
+            if let Some(moved) = self.moved(&order, id)
+                && self.is_as_likely(circumstances, &moved, probability)?
+            {
+                order = moved;
             }
         }
-        Ok(sequence)
+        Ok(order)
     }
 
-    /// The position of the last uncertain end that the end of the action needs which starts at `position`.
-    fn last_end_awaited(&self, sequence: &[NodeId], position: usize) -> Option<usize> {
-        let Node::Start(own) = self.model.plan().nodes[sequence[position].index()] else {
-            return None;
+    /// The sequence with an action behind the last end that it should wait for: its start, and its end if that would come
+    /// before the start otherwise. `None` if it has nothing to wait for, or the plan's links forbid the change.
+    fn moved(&self, sequence: &[NodeId], id: InstanceId) -> Option<Vec<NodeId>> {
+        let (start, end) = (self.model.start(id), self.model.end(id));
+        let place = |wanted: NodeId| sequence.iter().position(|node| *node == wanted);
+        let (from, own_end) = (place(start)?, place(end)?);
+        let to = self.last_end_to_await(sequence, id, (from, own_end))?;
+        let behind = &sequence[from + 1..=to];
+        let may_follow = |own: NodeId| {
+            let mut others = behind.iter().filter(|node| **node != end);
+            others.all(|node| self.separations.may_precede(*node, own))
         };
-        let own_end = self.model.end(own);
-        let until = sequence.iter().position(|node| *node == own_end)?;
-        let needed = &self.model.event(own_end).condition.literals;
-        (position + 1..until).rev().find(|&at| {
-            let Node::End(other) = self.model.plan().nodes[sequence[at].index()] else {
-                return false;
-            };
-            let event = self.model.event(sequence[at]);
-            let mut supporting = event.effects.iter();
-            supporting.any(|effect| {
-                needed.contains(&(effect.fact, effect.makes_true))
-                    && (effect.probability < 1.0 || self.may_fail(other, event))
-            })
+        let mut moved = sequence.to_vec();
+        if own_end > to {
+            moved[from..=to].rotate_left(1);
+            return may_follow(start).then_some(moved);
+        }
+        moved.splice(
+            from..=to,
+            behind.iter().copied().filter(|node| *node != end),
+        );
+        moved.splice(to - 1..to - 1, [start, end]);
+        (may_follow(start) && may_follow(end)).then_some(moved)
+    }
+
+    /// The position of the last end that an action should wait for; its start and end have these positions.
+    fn last_end_to_await(
+        &self,
+        sequence: &[NodeId],
+        own: InstanceId,
+        (from, own_end): (usize, usize),
+    ) -> Option<usize> {
+        let mut behind = (from + 1..sequence.len()).rev();
+        behind.find(|&at| match self.model.plan().nodes[sequence[at].index()] {
+            Node::End(other) if other != own => {
+                let is_harmed = self.is_harmed(other, own) && !self.is_harmed(own, other);
+                is_harmed || at < own_end && self.is_awaited(other, own)
+            }
+            _ => false,
+        })
+    }
+
+    /// Returns `true` if the end of `own` needs an effect of the end of `other`, which may go wrong.
+    fn is_awaited(&self, other: InstanceId, own: InstanceId) -> bool {
+        let needed = &self.model.event(self.model.end(own)).condition.literals;
+        let event = self.model.event(self.model.end(other));
+        let mut supporting = event.effects.iter();
+        supporting.any(|effect| {
+            needed.contains(&(effect.fact, effect.makes_true))
+                && (effect.probability < 1.0 || self.may_fail(other, event))
+        })
+    }
+
+    /// Returns `true` if a failure of `own` may undo what `other` needs.
+    fn is_harmed(&self, other: InstanceId, own: InstanceId) -> bool {
+        let (start, end) = (self.model.start(other), self.model.end(other));
+        let (start, end) = (self.model.event(start), self.model.event(end));
+        let needed = [&start.condition, &start.over_all, &end.condition];
+        let aftermaths = self.model.event(self.model.end(own)).aftermaths.iter();
+        let mut changes = aftermaths.flat_map(|aftermath| &aftermath.changes);
+        changes.any(|&(fact, becomes)| {
+            let mut needed = needed.iter();
+            needed.any(|requirement| requirement.literals.contains(&(fact, !becomes)))
         })
     }
 
@@ -62,18 +104,6 @@ impl OrderSearch {
     fn may_fail(&self, id: InstanceId, end: &Event) -> bool {
         let start = self.model.event(self.model.start(id));
         end.success < 1.0 || start.failures_per_second > 0.0
-    }
-
-    /// The sequence with the happening at `from` right behind the one at `to`; `None` where the plan's links forbid it.
-    fn moved(&self, sequence: &[NodeId], from: usize, to: usize) -> Option<Vec<NodeId>> {
-        let start = sequence[from];
-        let mut passed = sequence[from + 1..=to].iter();
-        if !passed.all(|node| self.separations.may_precede(*node, start)) {
-            return None;
-        }
-        let mut moved = sequence.to_vec();
-        moved[from..=to].rotate_left(1);
-        Some(moved)
     }
 
     /// Returns `true` if a sequence has time and at least this probability.
