@@ -3,7 +3,7 @@
 use super::random::Random;
 use super::sketch::{Sketch, decimal};
 use super::world::{arguments, multiple};
-use super::{is_valid, sketch};
+use super::{is_valid, last_value, sketch};
 
 /// Context of a condition.
 #[derive(Clone, Copy, Debug)]
@@ -153,6 +153,12 @@ pub(crate) fn add_goal(random: &mut Random, sketch: &mut Sketch) -> Option<()> {
         for argument in arguments(sketch.predicates[number]) {
             candidates.push(format!("(p{number}{argument})"));
         }
+    }
+    if sketch.features.exact_goal
+        && let Some(value) = last_value(sketch)
+    {
+        let comparison = random.pick(&[">=", "<="]);
+        candidates.insert(0, format!("({comparison} (n0) {value})"));
     }
     for _ in 0..10 {
         let candidate = draw(random, sketch, &scope, 2);

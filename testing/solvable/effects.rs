@@ -6,8 +6,9 @@ use super::sketch::{Lasting, ONE, Schema, Sketch, decimal};
 use super::world::multiple;
 
 pub(crate) fn draw(random: &mut Random, sketch: &mut Sketch) {
-    for _ in 0..=random.below(3) {
-        let features = sketch.features;
+    let features = sketch.features;
+    let more = usize::from(features.busy);
+    for _ in 0..=random.below(3) + more {
         let duration =
             (!features.instantaneous || random.chance(60)).then(|| lasting(random, sketch));
         let mut schema = Schema {
@@ -16,7 +17,7 @@ pub(crate) fn draw(random: &mut Random, sketch: &mut Sketch) {
             conditions: Vec::new(),
             effects: Vec::new(),
         };
-        for _ in 0..=random.below(4) {
+        for _ in 0..=random.below(4) + more {
             let effect = effect(random, sketch, &schema);
             schema.effects.push(effect);
         }

@@ -61,4 +61,32 @@ features! {
     together: 35,
     /// Instances of one action that overlap.
     overlap: 25,
+    /// Exactly one numeric fluent, so that effects on numbers meet.
+    one_number: 0,
+    /// More actions, effects and steps.
+    busy: 0,
+    /// Goals that the number just meets at the end of the plan.
+    exact_goal: 0,
+}
+
+impl Features {
+    /// Draws features for problems about one changing number: continuous effects, effects that read `?duration`,
+    /// conditional effects, and starts at one moment.
+    pub(crate) fn draw_numeric(random: &mut Random) -> Self {
+        Self {
+            numbers: true,
+            continuous: random.chance(75),
+            reads_duration: random.chance(75),
+            conditional: random.chance(60),
+            inequalities: random.chance(50),
+            together: random.chance(60),
+            overlap: random.chance(25),
+            zero: random.chance(10),
+            negation: random.chance(40),
+            one_number: true,
+            busy: random.chance(50),
+            exact_goal: random.chance(60),
+            ..Self::default()
+        }
+    }
 }

@@ -86,9 +86,19 @@ impl std::fmt::Display for Solvable {
 
 /// Returns the problem of a seed, or `None` if all its drafts are unusable.
 pub(crate) fn problem(seed: u64) -> Option<Solvable> {
+    problem_with(seed, Features::draw)
+}
+
+/// The same for problems about one changing number ([`Features::draw_numeric`]).
+#[allow(dead_code, reason = "not all tests that share this ask for numbers")]
+pub(crate) fn numeric_problem(seed: u64) -> Option<Solvable> {
+    problem_with(seed, Features::draw_numeric)
+}
+
+fn problem_with(seed: u64, draw: fn(&mut Random) -> Features) -> Option<Solvable> {
     (0..DRAFTS).find_map(|draft| {
         let mut random = Random::new(seed.wrapping_mul(DRAFTS).wrapping_add(draft));
-        let features = Features::draw(&mut random);
+        let features = draw(&mut random);
         drafted(&mut random, features)
     })
 }
@@ -113,6 +123,23 @@ fn drafted(random: &mut Random, features: Features) -> Option<Solvable> {
 
 /// Returns `true` if the validator accepts the sketch's plan, or the empty one.
 fn is_valid(sketch: &Sketch, with_plan: bool) -> bool {
+    matches!(judged(sketch, with_plan), (_, Verdict::Valid(_)))
+}
+
+/// Returns the value of `(n0)` at the end of the sketch's plan; `None` if the plan is invalid, or no decimal number of nine
+/// digits is that value.
+fn last_value(sketch: &Sketch) -> Option<String> {
+    let (task, verdict) = judged(sketch, true);
+    let Verdict::Valid(report) = verdict else {
+        return None;
+    };
+    let value = report.state.values.get(&task.fluent_named("(n0)")?)?;
+    let text = value.to_decimal(9);
+    (text.parse().as_ref() == Ok(value)).then_some(text)
+}
+
+/// Returns the verdict on the sketch's plan, or the empty one.
+fn judged(sketch: &Sketch, with_plan: bool) -> (Task, Verdict) {
     let (domain, problem) = (sketch.domain(), sketch.problem());
     let task = match read(&domain, &problem) {
         Ok(task) => task,
@@ -128,7 +155,7 @@ fn is_valid(sketch: &Sketch, with_plan: bool) -> bool {
         TimeTriggeredPlan::default()
     };
     let verdict = validate(&task, &plan, &Settings::default());
-    matches!(verdict, Verdict::Valid(_))
+    (task, verdict)
 }
 
 fn read(domain: &str, problem: &str) -> Result<Task, String> {

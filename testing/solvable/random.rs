@@ -22,9 +22,10 @@ impl Random {
         usize::try_from(self.next() % count as u64).expect("less than a usize")
     }
 
-    /// Returns `true` in `percent` of 100 cases.
+    /// Returns `true` in `percent` of 100 cases. 0 takes no random number, so features that are never drawn do not change
+    /// the other draws of a seed.
     pub(crate) fn chance(&mut self, percent: usize) -> bool {
-        self.below(100) < percent
+        percent > 0 && self.below(100) < percent
     }
 
     /// Returns one of `items`.

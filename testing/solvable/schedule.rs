@@ -8,7 +8,7 @@ const EPSILON: i128 = ONE / 1000;
 
 pub(crate) fn draw(random: &mut Random, sketch: &mut Sketch) {
     let features = sketch.features;
-    let count = 1 + random.below(4);
+    let count = 1 + random.below(4) + 3 * usize::from(features.busy);
     let mut moments = vec![0, ONE, 3 * ONE];
     for _ in 0..count {
         let schema = random.below(sketch.schemas.len());

@@ -11,9 +11,12 @@ pub(crate) fn draw(random: &mut Random, sketch: &mut Sketch) {
     }
     if features.numbers || features.continuous || features.reads_duration {
         for _ in 0..=random.below(2) {
-            let arity = usize::from(random.chance(30));
+            let arity = usize::from(!features.one_number && random.chance(30));
             let unit = unit(random, features.extreme);
             sketch.functions.push(Function { arity, unit });
+            if features.one_number {
+                break;
+            }
         }
     }
     for number in 0..sketch.predicates.len() {

@@ -1,10 +1,12 @@
 //! The least separation of happenings that interfere, for executors whose networks do not order them.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use elbowroom_model::ground::Action;
 use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
+use elbowroom_probability::Likelihoods;
 
 /// Recent and expected happenings, on the plan's clock.
 ///
@@ -16,9 +18,21 @@ pub(crate) struct Separation {
     /// Changes of the last ε, each with the first time at which something that interferes may happen.
     recent: Vec<(Footprint, Rational)>,
     /// The planned ends of running actions, by a number that the executor chooses.
-    expected: BTreeMap<u32, (Footprint, Rational)>,
+    expected: BTreeMap<u32, Expected>,
     /// Timed initials, in order of time.
     timed: Vec<(Footprint, Rational)>,
+    /// Source of the facts that failures change; `None` if failures are unknown.
+    likelihoods: Option<Arc<Likelihoods>>,
+}
+
+/// The planned end of a running action.
+#[derive(Clone, Debug)]
+struct Expected {
+    time: Rational,
+    /// The footprint of a successful end.
+    successful: Footprint,
+    /// The same with everything that a failure writes.
+    possible: Footprint,
 }
 
 impl Separation {
@@ -31,7 +45,14 @@ impl Separation {
             recent: Vec::new(),
             expected: BTreeMap::new(),
             timed: timed.collect(),
+            likelihoods: None,
         }
+    }
+
+    /// Includes the facts that failures change, by `likelihoods`, in the planned ends of actions.
+    pub(crate) fn with_failures(mut self, likelihoods: Arc<Likelihoods>) -> Self {
+        self.likelihoods = Some(likelihoods);
+        self
     }
 
     /// Notes a change at `time`.
@@ -55,16 +76,31 @@ impl Separation {
 
     /// Notes that a running action is expected to end at `end`.
     pub(crate) fn expect(&mut self, number: u32, (task, action): (&Task, &Action), end: Rational) {
-        let footprint = Footprint::of_end(task, action);
-        self.expected.insert(number, (footprint, end));
+        let expected = Expected {
+            time: end,
+            successful: Footprint::of_end(task, action),
+            possible: self.possible_end(task, action),
+        };
+        self.expected.insert(number, expected);
     }
 
-    /// Notes that an action has ended at `time`; `succeeded` if its end effects took place.
+    /// Notes that an action has ended at `time`; `succeeded` if its end effects took place. The changes of a failure are
+    /// noted when they are reported.
     pub(crate) fn end(&mut self, number: u32, succeeded: bool, time: &Rational) {
         let ended = self.expected.remove(&number);
-        if let Some((footprint, _)) = ended.filter(|_| succeeded) {
-            self.note(footprint, time);
+        if let Some(ended) = ended.filter(|_| succeeded) {
+            self.note(ended.successful, time);
         }
+    }
+
+    /// Returns the footprint of an action's end, successful or failed.
+    fn possible_end(&self, task: &Task, action: &Action) -> Footprint {
+        let mut footprint = Footprint::of_end(task, action);
+        let likelihoods = self.likelihoods.iter();
+        for (fact, becomes) in likelihoods.flat_map(|it| it.failure_changes(task, action)) {
+            footprint.include_fact(fact, becomes);
+        }
+        footprint
     }
 
     /// Returns a time after `now` before which the action must not start, or `None` if it may start now.
@@ -81,7 +117,7 @@ impl Separation {
         let recent = recent.map(|(_, separated)| separated.clone());
         let soon = self.near(&start, now).filter(|time| time > now);
         let ends = duration.into_iter().flat_map(|duration| {
-            let end = Footprint::of_end(task, action);
+            let end = self.possible_end(task, action);
             let times: Vec<Rational> = self.near(&end, &(now + duration)).collect();
             times.into_iter().map(move |time| time - duration)
         });
@@ -99,8 +135,10 @@ impl Separation {
         let first = self.timed.partition_point(|(_, it)| *it <= from);
         let timed = self.timed[first..].iter();
         let timed = timed.take_while(move |(_, it)| *it < until);
-        let expected = self.expected.values().chain(timed);
-        let near = expected.filter(move |(_, it)| (it - time).abs() < self.epsilon);
+        let expected = self.expected.values();
+        let expected = expected.map(|it| (&it.possible, &it.time));
+        let expected = expected.chain(timed.map(|(other, it)| (other, it)));
+        let near = expected.filter(move |(_, it)| (*it - time).abs() < self.epsilon);
         let near = near.filter(|(other, _)| other.interferes_with(footprint));
         near.map(|(_, it)| it + &self.epsilon)
     }

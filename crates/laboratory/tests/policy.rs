@@ -6,6 +6,8 @@
 
 #![allow(clippy::print_stdout, reason = "the table is worth seeing")]
 
+#[path = "policy/failures.rs"]
+mod failures;
 #[path = "timed/twin.rs"]
 mod twin;
 

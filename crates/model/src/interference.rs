@@ -92,6 +92,16 @@ impl Footprint {
         footprint
     }
 
+    /// Adds a fact that becomes true or false.
+    pub fn include_fact(&mut self, fact: FactId, becomes: bool) {
+        let written = if becomes {
+            &mut self.adds
+        } else {
+            &mut self.deletes
+        };
+        written.insert(fact);
+    }
+
     /// Adds all that another happening reads and writes.
     pub fn include(&mut self, other: Self) {
         self.reads.extend(other.reads);

@@ -12,6 +12,8 @@ mod skipped;
 
 #[path = "val_program/cases.rs"]
 mod cases;
+#[path = "val_program/conditional.rs"]
+mod conditional;
 #[path = "val_program/course.rs"]
 mod course;
 #[path = "val_program/equal.rs"]

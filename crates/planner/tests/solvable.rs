@@ -5,13 +5,17 @@
 mod solvable;
 
 use elbowroom_model::validate::{Settings, Verdict, validate};
-use solvable::{Outcome, Tally, outcome, outcome_with, problem};
+use solvable::{Outcome, Tally, numeric_problem, outcome, outcome_with, problem};
 
 /// Number of seeds; `examples/solvable` tries more.
 const SEEDS: u64 = 1_000;
 
 /// The most states per problem.
 const STATES: u64 = 1_000;
+
+/// The same for problems about one changing number, which need more states.
+const NUMERIC_SEEDS: u64 = 300;
+const NUMERIC_STATES: u64 = 20_000;
 
 /// The most problems without a plan found, refused ones included.
 const MOST_MISSED: usize = 2;
@@ -34,6 +38,25 @@ fn solvable_problems_are_never_called_unsolvable_and_rarely_missed() {
     }
     assert!(missed.len() <= MOST_MISSED, "{tally:?}, {missed:?}");
     assert!(tally.found + missed.len() == tally.problems);
+}
+
+#[test]
+fn solvable_problems_about_one_changing_number_are_rarely_missed() {
+    let mut tally = Tally::default();
+    let mut missed = Vec::new();
+    for seed in 0..NUMERIC_SEEDS {
+        let problem = numeric_problem(seed).unwrap_or_else(|| panic!("seed {seed}: no problem"));
+        let outcome = outcome(&problem, NUMERIC_STATES);
+        tally.count(&outcome);
+        match &outcome {
+            Outcome::Found => {}
+            Outcome::FalseClaim(_) | Outcome::Invalid(_) => {
+                panic!("seed {seed}: {outcome:?}\n{problem}")
+            }
+            Outcome::NoneFound(_) | Outcome::Unsupported(_) => missed.push(seed),
+        }
+    }
+    assert!(missed.len() <= MOST_MISSED, "{tally:?}, {missed:?}");
 }
 
 #[test]

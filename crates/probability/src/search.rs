@@ -22,6 +22,7 @@ mod coupling;
 mod lattice;
 mod memo;
 mod nominal;
+mod postponed;
 mod queue;
 mod room;
 mod run;
@@ -224,7 +225,8 @@ impl OrderSearch {
     /// The order most likely to succeed from here.
     ///
     /// `watch` is called now and then; when it breaks, the best order so far is the answer. Of
-    /// orders that are equally likely, a shorter one is preferred, then the one found first.
+    /// orders that are equally likely, a shorter one is preferred, then the one found first. Its starts wait for ends
+    /// as `search/postponed.rs` describes, where that costs no probability.
     ///
     /// # Errors
     /// When a condition couples too many uncertain facts.
@@ -283,6 +285,11 @@ impl OrderSearch {
                 sequence,
                 joined,
             }) => {
+                let sequence = if joined.contains(&true) {
+                    sequence
+                } else {
+                    self.postponed(circumstances, (sequence, probability))?
+                };
                 let happenings = Happenings {
                     sequence: &sequence,
                     joined: &joined,

@@ -73,7 +73,7 @@ impl Executor for Adaptable {
             Some(tabulated) => tabulated,
             None => self.orders(mission)?,
         };
-        self.state = Some(Rest::new(mission, chooser, steps));
+        self.state = Some(Rest::new(mission, chooser, steps, &self.likelihoods));
         Ok(())
     }
 

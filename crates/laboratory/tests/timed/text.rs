@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Change, FACTS, Literal, Measure, SmallChange, SmallWorld};
+use super::{Change, FACTS, Literal, Measure, SmallChange, SmallOutcome, SmallWorld};
 
 impl SmallWorld {
     pub(crate) fn domain(&self) -> String {
@@ -86,14 +86,11 @@ impl SmallWorld {
             for outcome in &action.outcomes {
                 let _ = writeln!(
                     text,
-                    "[[failure.outcome]]\nprobability = {}\ndelay = {}",
-                    outcome.share, outcome.delay
+                    "[[failure.outcome]]\nprobability = {}\ndelay = {}\n{}",
+                    outcome.share,
+                    outcome.delay,
+                    outcome.changes_text()
                 );
-                for (word, truth) in [("true", true), ("false", false)] {
-                    let facts = outcome.changes.iter().filter(|change| change.1 == truth);
-                    let facts: Vec<String> = facts.map(|(fact, _)| format!("(f{fact})")).collect();
-                    let _ = writeln!(text, "becomes_{word} = {facts:?}");
-                }
             }
         }
         text += &amount_of;
@@ -121,6 +118,53 @@ impl SmallWorld {
             }
         }
         text
+    }
+}
+
+impl SmallWorld {
+    /// The failures of the world as a likelihood file. Facts do not change by themselves there.
+    #[allow(dead_code, reason = "not all tests that share this have likelihoods")]
+    pub(crate) fn likelihoods(&self) -> String {
+        let mut text = "format = \"elbowroom-likelihoods\"\nversion = 1\n[defaults]\nstart = 1.0\n\
+            effect = 1.0\nbecomes_true = 0.0\nbecomes_false = 0.0\n"
+            .to_owned();
+        for (index, action) in self.actions.iter().enumerate() {
+            if action.fails == 0.0 {
+                continue;
+            }
+            let _ = writeln!(
+                text,
+                "[actions.a{index}]\nend = {:?}\nundone = {}",
+                1.0 - action.fails,
+                action.is_undone
+            );
+            for outcome in &action.outcomes {
+                let _ = writeln!(
+                    text,
+                    "[[actions.a{index}.outcome]]\nprobability = {:?}\n{}",
+                    outcome.share,
+                    outcome.changes_text()
+                );
+            }
+        }
+        text
+    }
+}
+
+impl SmallOutcome {
+    /// The changes, as world and likelihood files have them.
+    fn changes_text(&self) -> String {
+        let list = |truth: bool| {
+            let facts = self.changes.iter().filter(|change| change.1 == truth);
+            facts
+                .map(|(fact, _)| format!("(f{fact})"))
+                .collect::<Vec<_>>()
+        };
+        format!(
+            "becomes_true = {:?}\nbecomes_false = {:?}",
+            list(true),
+            list(false)
+        )
     }
 }
 

@@ -137,6 +137,36 @@ impl SmallWorld {
         world
     }
 
+    /// A world without events, in which the goal can become unreachable: starts use up facts, and failures delete others.
+    #[allow(dead_code, reason = "not all tests that share this ask for it")]
+    pub(crate) fn with_costly_failures(rng: &mut ChaCha8Rng) -> Self {
+        let mut world = Self::with_outcomes(rng, false);
+        world.events.clear();
+        world.initial = 0b0011;
+        world.goal = vec![2, 3];
+        world.actions.push(world.actions[0].clone());
+        for (index, action) in world.actions.iter_mut().enumerate() {
+            let needed = rng.random_range(0..2 + index / 2);
+            action.start = Some((needed, true));
+            action.at_start = rng.random_bool(0.4).then_some((needed, false));
+            let added = if index < 2 {
+                2 + index
+            } else {
+                rng.random_range(0..FACTS)
+            };
+            action.at_end = (added, true);
+            for outcome in &mut action.outcomes {
+                outcome.delay = 0;
+                // No failure is a way to the goal.
+                outcome.changes.truncate(1);
+                if outcome.changes[0].1 {
+                    outcome.changes[0].0 = needed;
+                }
+            }
+        }
+        world
+    }
+
     /// The same world, but that failures leave nothing behind.
     #[allow(
         dead_code,

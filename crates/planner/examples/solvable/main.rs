@@ -1,12 +1,12 @@
 //! Runs the embedded planner on random problems that have a plan.
 //!
 //! ```text
-//! cargo run --release -p elbowroom-planner --example solvable -- [FIRST] [COUNT] [STATES] [FOLDER]
+//! cargo run --release -p elbowroom-planner --example solvable -- [FIRST] [COUNT] [STATES] [FOLDER] [KIND]
 //! ```
 //!
 //! `FIRST` (0) is the first seed, `COUNT` (10,000) the number of seeds, `STATES` (20,000) the number of
 //! states per problem. Problems without a plan found are written into `FOLDER`, with the plan that
-//! solves them. A single problem is printed. The exit code is 1 if a claim was false or a plan invalid.
+//! solves them. `KIND` is `any` or `numeric`: problems about one changing number. A single problem is printed. The exit code is 1 if a claim was false or a plan invalid.
 
 #![allow(
     clippy::print_stdout,
@@ -36,9 +36,17 @@ fn main() -> ExitCode {
         return ExitCode::from(2);
     };
     let folder = arguments.get(3).map(Path::new);
+    let draw = match arguments.get(4).map(String::as_str) {
+        None | Some("any") => solvable::problem,
+        Some("numeric") => solvable::numeric_problem,
+        Some(other) => {
+            eprintln!("expected `any` or `numeric`, found `{other}`");
+            return ExitCode::from(2);
+        }
+    };
     let (mut tally, mut without) = (Tally::default(), Tally::default());
     for seed in first..first.saturating_add(count) {
-        let Some(problem) = solvable::problem(seed) else {
+        let Some(problem) = draw(seed) else {
             println!("{seed}: no draft is usable");
             continue;
         };

@@ -1,5 +1,7 @@
 //! Actions that fail after their start, and what such a failure leaves behind.
 
+use std::collections::BTreeSet;
+
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Change, FactId};
 use elbowroom_model::problem::{ObjectId, PredicateId, Problem, SchemaId};
@@ -146,6 +148,16 @@ impl Likelihoods {
             });
         }
         all
+    }
+
+    /// Returns the facts that failures of an action after its start set, each with its new truth value. Empty for an action
+    /// that cannot fail after its start.
+    pub fn failure_changes(&self, task: &Task, action: &Action) -> BTreeSet<(FactId, bool)> {
+        if self.end(action) >= 1.0 && self.during(action) <= 0.0 {
+            return BTreeSet::new();
+        }
+        let aftermaths = self.aftermaths(task, action).into_iter();
+        aftermaths.flat_map(|aftermath| aftermath.changes).collect()
     }
 
     /// Whether an entry says that ends fail.

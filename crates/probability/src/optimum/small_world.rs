@@ -1,8 +1,9 @@
 //! Small worlds on a clock: whether what is best in them can be tabulated, and the table.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use elbowroom_model::ground::{Action, Body, Change, Condition, DurativeBody, Expression};
+use elbowroom_model::ground::{Action, Body, Change, Condition, DurativeBody, Expression, FactId};
 use elbowroom_model::problem::Comparison;
 use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
@@ -39,12 +40,17 @@ pub struct Table {
 impl Table {
     /// The table of a world; `None` where it is not small, or is not of the kind in which every
     /// happening can be chosen when it is due: there are numbers, timed initials or negations, or
-    /// an action's end deletes what another action, or the goal, needs.
+    /// an action's end, successful or failed, deletes what another action, or the goal, needs, or an end needs what another
+    /// action makes true while this one is running.
     pub fn new(task: &Task, likelihoods: &Likelihoods) -> Option<Self> {
         let task = task.clone();
         let likelihoods = without_luck(likelihoods);
         let actions = all_actions_under(&task, &likelihoods).ok()?;
-        if ends_break_others(&actions, task.goal()) || has_negations(&task, &actions) {
+        let failures = |action: &Action| likelihoods.failure_changes(&task, action);
+        if ends_break_others(&actions, task.goal(), failures)
+            || ends_await_others(&actions, failures)
+            || has_negations(&task, &actions)
+        {
             return None;
         }
         let plan = PartialOrderPlan::unordered(&task, actions);
@@ -208,21 +214,80 @@ fn shortest(task: &Task, body: &DurativeBody) -> Option<Rational> {
     shortest.or(longest).filter(Rational::is_positive)
 }
 
-/// Returns `true` if the end of an action deletes a fact of the goal, or of a condition of another action: at its start,
-/// at its end, or in between.
+/// Returns `true` if the end of an action, successful or failed, deletes a fact of the goal, or of a condition of another
+/// action: at its start, at its end, or in between. `failures` has the facts that a failure of an action sets.
 ///
 /// The clock decides on the order of ends. The table takes them in the best order: there, an action that needs light
 /// would always start, or end, before the light goes out.
-fn ends_break_others(actions: &[Action], goal: &Condition) -> bool {
+fn ends_break_others(
+    actions: &[Action],
+    goal: &Condition,
+    failures: impl Fn(&Action) -> BTreeSet<(FactId, bool)>,
+) -> bool {
     let all = || actions.iter().enumerate();
     let durative = all().filter_map(|(index, action)| Some((index, action.durative()?)));
     durative.into_iter().any(|(own, ending)| {
         let others = all().filter(|(other, _)| *other != own);
         let needed = others.flat_map(|(_, other)| conditions(other));
         let needed: Vec<&Condition> = needed.chain([goal]).collect();
-        let mut changes = ending.end.effects.iter().map(|effect| &effect.change);
-        changes.any(|change| needed.iter().any(|condition| breaks(change, condition)))
+        let failures = failures(&actions[own]).into_iter();
+        let deleted = failures.filter(|(_, becomes)| !becomes);
+        let deleted = deleted.map(|(fact, _)| Change::Delete(fact));
+        let changes = ending.end.effects.iter();
+        let mut changes = changes.map(|effect| effect.change.clone()).chain(deleted);
+        changes.any(|change| needed.iter().any(|condition| breaks(&change, condition)))
     })
+}
+
+/// Returns `true` if the end of an action needs a fact that another action makes true, and that does not hold already
+/// because of its condition over all, or because its start needs it and does not delete it. The table would delay such an
+/// end until the fact holds. On the clock, the action fails.
+fn ends_await_others(
+    actions: &[Action],
+    failures: impl Fn(&Action) -> BTreeSet<(FactId, bool)>,
+) -> bool {
+    let made_true_by = |action: &Action| {
+        let effects = match &action.body {
+            Body::Instantaneous(snap) => snap.effects.clone(),
+            Body::Durative(body) => {
+                let ends = body.end.effects.iter();
+                body.start.effects.iter().chain(ends).cloned().collect()
+            }
+        };
+        let added = effects
+            .into_iter()
+            .filter_map(|effect| match effect.change {
+                Change::Add(fact) => Some(fact),
+                Change::Delete(_) | Change::Update { .. } => None,
+            });
+        let left = failures(action).into_iter();
+        let left = left.filter_map(|(fact, becomes)| becomes.then_some(fact));
+        added.chain(left).collect::<BTreeSet<FactId>>()
+    };
+    let made_true: Vec<_> = actions.iter().map(made_true_by).collect();
+    actions.iter().enumerate().any(|(own, action)| {
+        let Some(body) = action.durative() else {
+            return false;
+        };
+        let (before, throughout) = (body.start.condition.conjuncts(), body.over_all.conjuncts());
+        let is_deleted = |part: &Condition| {
+            let mut effects = body.start.effects.iter();
+            effects.any(|effect| breaks(&effect.change, part))
+        };
+        let awaited = body.end.condition.conjuncts().into_iter();
+        let awaited = awaited.filter(|part| !throughout.contains(part));
+        let mut awaited = awaited.filter(|part| !before.contains(part) || is_deleted(part));
+        awaited.any(|part| {
+            let others = made_true.iter().enumerate();
+            let mut others = others.filter(|(other, _)| *other != own);
+            others.any(|(_, facts)| facts.iter().any(|fact| mentions(part, *fact)))
+        })
+    })
+}
+
+/// Returns `true` if a condition without negations reads the fact.
+fn mentions(condition: &Condition, fact: FactId) -> bool {
+    breaks(&Change::Delete(fact), condition)
 }
 
 /// Returns the conditions of an action.
@@ -257,7 +322,7 @@ fn sets(actions: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use crate::Likelihoods;
+    use crate::likelihoods;
     use elbowroom_model::Task;
     use elbowroom_num::Rational;
     use elbowroom_pddl::{Source, read_problem};
@@ -266,6 +331,11 @@ mod tests {
 
     /// The durations of what can be done by the table, if there is one.
     fn durations(actions: &str, init: &str) -> Option<Vec<Rational>> {
+        durations_under(actions, init, "")
+    }
+
+    /// The same where actions are as likely to succeed as these entries of a likelihood file say.
+    fn durations_under(actions: &str, init: &str, entries: &str) -> Option<Vec<Rational>> {
         let domain = format!(
             "(define (domain d) (:requirements :durative-actions :numeric-fluents)
                (:types place) (:predicates (light) (done ?p - place)) (:functions (far ?p - place))
@@ -279,8 +349,13 @@ mod tests {
         let problem = problem.replace("5/2", "2.5");
         let source = |text: &str| Source::new("test", text);
         let (problem, _) = read_problem(&source(&domain), &source(&problem)).unwrap();
-        let certain = Likelihoods::certain();
-        let table = Table::new(&Task::new(problem), &certain)?;
+        let task = Task::new(problem);
+        let text = format!(
+            "format = \"elbowroom-likelihoods\"\nversion = 1\n[defaults]\nbecomes_true = 0.0
+             becomes_false = 0.0\nstart = 1.0\neffect = 1.0\n{entries}"
+        );
+        let likelihoods = likelihoods::read(text.as_str(), &task).unwrap();
+        let table = Table::new(&task, &likelihoods)?;
         let durations = table.steps().iter().map(|step| step.duration.clone());
         durations.collect()
     }
@@ -338,11 +413,44 @@ mod tests {
         assert!(durations(&format!("{begin}{}", burn("")), "").is_some());
         assert!(durations(&format!("{begin}{goes_out}"), "").is_none());
         // Nor may the end delete what the goal needs.
+        // Nor may an end need what another action makes true.
+        let begin_dark = action(
+            "look",
+            "(= ?duration 2)",
+            "(at end (light))",
+            "(at end (done ?p))",
+        );
+        assert!(durations(&format!("{begin_dark}{}", burn("")), "").is_none());
         let undoes = burn("(at end (not (done ?p)))");
         assert!(durations(&format!("{look}{}", burn("")), "(light)").is_some());
         assert!(durations(&format!("{look}{undoes}"), "(light)").is_none());
         let numbers = burn("(at end (increase (far ?p) 1))");
         assert!(durations(&format!("{look}{numbers}"), "").is_none());
+    }
+
+    #[test]
+    fn failure_that_deletes_condition_of_another_action_leaves_no_table() {
+        let look = action(
+            "look",
+            "(= ?duration 2)",
+            "(at start (light))",
+            "(at end (done ?p))",
+        );
+        let burn = action("burn", "(= ?duration 9)", "()", "(at start (light))");
+        let both = format!("{look}{burn}");
+        let fails = "[actions.burn]\nend = 0.5\n";
+        assert!(durations_under(&both, "", fails).is_some());
+        assert!(durations_under(&both, "", &format!("{fails}undone = true\n")).is_none());
+        let outcome = |fact: &str| {
+            format!(
+                "{fails}[[actions.burn.outcome]]\nprobability = 0.5\nbecomes_false = [\"{fact}\"]\n"
+            )
+        };
+        assert!(durations_under(&both, "", &outcome("(light)")).is_none());
+        // The goal needs it.
+        assert!(durations_under(&both, "", &outcome("(done here)")).is_none());
+        let own = format!("{}end = 0.5\nundone = true\n", "[actions.look]\n");
+        assert!(durations_under(&both, "", &own).is_some());
     }
 
     #[test]

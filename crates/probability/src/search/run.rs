@@ -45,7 +45,7 @@ pub(super) struct Best {
 
 /// Two probabilities closer than this, relatively, count as equal. It is more than what a bound is
 /// raised by against rounding; otherwise a bound would always promise a little more than there is.
-const TIE: f64 = 1e-11;
+pub(super) const TIE: f64 = 1e-11;
 
 impl<'s, 'w> Run<'s, 'w> {
     /// With no happening yet.

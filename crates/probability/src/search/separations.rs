@@ -39,7 +39,15 @@ impl Separations {
             Node::Start(id) | Node::Instant(id) => {
                 Footprint::of_start(task, &plan.instance(id).action)
             }
-            Node::End(id) => Footprint::of_end(task, &plan.instance(id).action),
+            Node::End(id) => {
+                let mut footprint = Footprint::of_end(task, &plan.instance(id).action);
+                // An end that fails writes what the failure leaves behind.
+                let aftermaths = model.event(model.end(id)).aftermaths.iter();
+                for &(fact, becomes) in aftermaths.flat_map(|aftermath| &aftermath.changes) {
+                    footprint.include_fact(model.facts[fact], becomes);
+                }
+                footprint
+            }
             Node::Timed(index) => Footprint::of_timed(&task.timed()[index]),
         };
         let footprints: Vec<Footprint> = plan.nodes.iter().map(|&node| footprint(node)).collect();

@@ -92,7 +92,12 @@ pub(super) struct Rest {
 impl Rest {
     /// A plan that has just been taken up: `steps` are the actions in the order of the model's
     /// instances.
-    pub(super) fn new(mission: &Mission, chooser: Chooser, steps: Vec<Step>) -> Self {
+    pub(super) fn new(
+        mission: &Mission,
+        chooser: Chooser,
+        steps: Vec<Step>,
+        likelihoods: &Arc<Likelihoods>,
+    ) -> Self {
         let in_order = mission
             .order
             .iter()
@@ -111,7 +116,8 @@ impl Rest {
         let under_way: BTreeMap<_, _> = under_way
             .map(|(step, instance)| (step, (instance, Some(Rational::ZERO))))
             .collect();
-        let mut separation = Separation::new(&mission.task, &mission.origin);
+        let mut separation =
+            Separation::new(&mission.task, &mission.origin).with_failures(Arc::clone(likelihoods));
         for (step, (instance, _)) in &under_way {
             // The steps of running actions are what is left of them.
             let rest = &steps[instance.index()];
