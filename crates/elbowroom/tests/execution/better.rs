@@ -32,7 +32,7 @@ fn scene(deadline: u32, fast_pace: u32) -> Scene {
     scene
 }
 
-/// The walk of the large robot takes so long. It is planned for 10, and the box guarantees about 16.7.
+/// Runs with this duration of the large robot's walk. It is planned for 10, and the box guarantees about 16.7.
 fn run(deadline: u32, fast_pace: u32, walk: &str, planning_time: i64) -> Report {
     let mut scene = scene(deadline, fast_pace);
     scene.settings.planning_time = PlanningTime::Seconds(planning_time.into());
@@ -53,7 +53,7 @@ fn plan_with_more_slack_takes_over_while_the_present_one_is_still_feasible() {
     assert_ne!(report.verdict, Verdict::GoalReached, "{report:#?}");
 }
 
-/// A planner in the background takes so many seconds. The walk of the large robot takes 22.5 s.
+/// Runs with a planner in the background. The walk of the large robot takes 22.5 s.
 fn run_with_background_planner(fast_pace: u32, seconds: i64, readying: &[Rational]) -> Told {
     let scene = scene(25, fast_pace);
     let planner = Beside::taking(&[seconds.into()]).readying(readying);
@@ -62,7 +62,13 @@ fn run_with_background_planner(fast_pace: u32, seconds: i64, readying: &[Rationa
         ..settings()
     });
     let execution = execution.prepared_by(Readier(planner.clone(), scene.flow.clone()));
-    told(execution, &scene.task, (100, Vec::new()), &planner, &[5, 0, 0])
+    told(
+        execution,
+        &scene.task,
+        (100, Vec::new()),
+        &planner,
+        &[5, 0, 0],
+    )
 }
 
 #[test]

@@ -17,7 +17,7 @@ use crate::reason::{About, Cause, Promise, Reason};
 /// ends of the room lie on their limits, that takes as little from it.
 const SHARES: [i64; 7] = [16, 15, 12, 8, 4, 2, 1];
 
-/// The shares by which all durations may deviate at once, the greatest first, in sixteenths.
+/// Possible values of [`slack`], the greatest first, in sixteenths.
 const SLACKS: [i64; 5] = [16, 8, 4, 2, 1];
 
 /// The assumption about the remaining duration of overdue actions.
@@ -237,8 +237,8 @@ pub(super) fn slack_of_plan(mission: &Mission) -> Rational {
     })
 }
 
-/// The greatest share of the planned durations, at most 1, by which all durations may deviate so that every deadline is
-/// still met. It is rounded down to a power of 1/2; below 1/16 it is 0. Numbers do not count.
+/// Returns the greatest share of the planned durations with this property: each deadline is still met if every duration
+/// deviates by that share. It is a power of 1/2, at most 1, or 0 below 1/16. Numbers do not count.
 fn slack(
     (mission, values): (&Mission, &Valuation),
     elapsed: &dyn Fn(InstanceId) -> Option<Rational>,

@@ -412,15 +412,15 @@ mod tests {
         let begin = look.replace("over all", "at start");
         assert!(durations(&format!("{begin}{}", burn("")), "").is_some());
         assert!(durations(&format!("{begin}{goes_out}"), "").is_none());
-        // Nor may the end delete what the goal needs.
         // Nor may an end need what another action makes true.
-        let begin_dark = action(
+        let awaits_light = action(
             "look",
             "(= ?duration 2)",
             "(at end (light))",
             "(at end (done ?p))",
         );
-        assert!(durations(&format!("{begin_dark}{}", burn("")), "").is_none());
+        assert!(durations(&format!("{awaits_light}{}", burn("")), "").is_none());
+        // Nor may the end delete what the goal needs.
         let undoes = burn("(at end (not (done ?p)))");
         assert!(durations(&format!("{look}{}", burn("")), "(light)").is_some());
         assert!(durations(&format!("{look}{undoes}"), "(light)").is_none());
