@@ -87,7 +87,7 @@ impl<'a> Planner<'a> {
             names,
             progress,
             has_reservoirs: compiled.tuning.uses(Technique::Reservoirs)
-                && !relaxed::floors(compiled).is_empty(),
+                && !relaxed::reservoirs(compiled).is_empty(),
             best: None,
             finds: 0,
             stopped: None,

@@ -44,6 +44,9 @@ pub enum Technique {
     Consumables,
     /// Relaxed plans fill up what they use up.
     Reservoirs,
+    /// What relaxed plans use up and fill up includes continuous changes, and amounts that depend on the
+    /// duration.
+    ContinuousDrains,
     /// The best plan's actions are tried in other orders.
     Rescheduling,
     /// A search for better orders of the best plan's actions that proves when there is none.
@@ -74,6 +77,7 @@ impl Technique {
         (Self::Nesting, "nesting"),
         (Self::Consumables, "consumables"),
         (Self::Reservoirs, "reservoirs"),
+        (Self::ContinuousDrains, "continuous-drains"),
         (Self::Rescheduling, "rescheduling"),
         (Self::Scheduling, "scheduling"),
         (Self::Repair, "repair"),

@@ -174,7 +174,7 @@ impl Relaxed<'_> {
         touched: &mut Vec<u32>,
         estimate: &mut Estimate,
     ) {
-        self.resources.begin(state);
+        self.resources.begin(self.compiled, state);
         let mut noted = 0;
         loop {
             for &operator in &used[noted..] {
