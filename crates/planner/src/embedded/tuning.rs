@@ -44,8 +44,8 @@ pub enum Technique {
     Consumables,
     /// Relaxed plans fill up what they use up.
     Reservoirs,
-    /// What relaxed plans use up and fill up includes continuous changes, and amounts that depend on the
-    /// duration.
+    /// Continuous changes, and those that depend on the duration, count in relaxed plans that fill up what they
+    /// use up. If a fluent is of one action at a time, they count as changes at the end.
     ContinuousDrains,
     /// The best plan's actions are tried in other orders.
     Rescheduling,
@@ -55,6 +55,8 @@ pub enum Technique {
     Repair,
     /// Plans that are a little worse than the best one are gone on from.
     Leniency,
+    /// If only a first plan is asked for, the search for better ones continues for as much work as it took.
+    Cleanup,
     /// On a plateau, the newest and the oldest preferred successors take turns.
     Alternation,
 }
@@ -82,6 +84,7 @@ impl Technique {
         (Self::Scheduling, "scheduling"),
         (Self::Repair, "repair"),
         (Self::Leniency, "leniency"),
+        (Self::Cleanup, "cleanup"),
         (Self::Alternation, "alternation"),
     ];
 }

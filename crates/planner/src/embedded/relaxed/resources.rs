@@ -42,6 +42,8 @@ pub(super) struct Shortage {
     pub(super) operator: u32,
     /// How often it is needed, besides what the plan has.
     pub(super) times: u32,
+    /// `true` if the state has no room for it, or little: it is for later.
+    pub(super) is_later: bool,
 }
 
 /// The resources of a problem.
@@ -50,6 +52,8 @@ pub(super) struct Resources {
     list: Vec<Resource>,
     /// For each operator what it adds to resources, or, negative, takes.
     changes: Vec<Vec<(usize, f64)>>,
+    /// The amount of each in the state, above what must remain.
+    levels: Vec<f64>,
     /// The amount of each that a relaxed plan leaves.
     left: Vec<f64>,
     is_settled: Vec<bool>,
@@ -100,10 +104,9 @@ impl Resources {
         self.list.is_empty()
     }
 
-    /// A new relaxed plan begins. Running actions have changed continuously what they will have changed at
-    /// their ends.
+    /// Begins a new relaxed plan. The continuous changes of running actions count as complete.
     pub(super) fn begin(&mut self, compiled: &Compiled, state: &State) {
-        self.left.clear();
+        self.levels.clear();
         self.is_settled.clear();
         for Resource { reservoir, .. } in &self.list {
             let level = match &state.values[reservoir.fluent as usize] {
@@ -115,9 +118,10 @@ impl Resources {
                 }
                 None => f64::INFINITY,
             };
-            self.left.push(level - reservoir.floor);
+            self.levels.push(level - reservoir.floor);
             self.is_settled.push(false);
         }
+        self.left.clone_from(&self.levels);
     }
 
     /// The relaxed plan has an operator, so many times.
@@ -148,7 +152,12 @@ impl Resources {
                 reason = "clamped to a small positive range"
             )]
             let times = (-self.left[place] / amount).ceil().clamp(1.0, 1000.0) as u32;
-            return Some(Shortage { operator, times });
+            let room = resource.size() - self.levels[place];
+            return Some(Shortage {
+                operator,
+                times,
+                is_later: room < amount.min(resource.size() / 2.0),
+            });
         }
         None
     }
@@ -191,9 +200,8 @@ pub(super) fn note_floors(compiled: &Compiled, action: &Action, floors: &mut [Op
     for change in changes(compiled, action).filter(|change| change.amount < 0.0) {
         let (fluent, amount) = (change.fluent, change.amount);
         let mut before = change.before(compiled, action);
-        let before = before.find_map(|before| least(compiled, before, fluent));
-        let before = before.map(|least| least + amount);
-        let after = least(compiled, &action.over_all, fluent);
+        let before = before.find_map(|before| least(compiled, before, (fluent, amount)));
+        let after = least(compiled, &action.over_all, (fluent, 0.0));
         let floor = match (before, after) {
             (Some(before), Some(after)) => Some(before.max(after)),
             (before, after) => before.or(after),
@@ -210,10 +218,9 @@ fn note_ceilings(compiled: &Compiled, action: &Action, ceilings: &mut [Option<f6
     for change in changes(compiled, action).filter(|change| change.amount > 0.0) {
         let (fluent, amount) = (change.fluent, change.amount);
         let mut before = change.before(compiled, action);
-        let before = before.find_map(|before| most(compiled, before, fluent));
         let bounds = [
-            before.map(|most| most + amount),
-            most(compiled, &action.over_all, fluent),
+            before.find_map(|before| most(compiled, before, (fluent, amount))),
+            most(compiled, &action.over_all, (fluent, 0.0)),
         ];
         let ceiling = bounds.into_iter().flatten().fold(f64::INFINITY, f64::min);
         let known = &mut ceilings[fluent as usize];
@@ -221,21 +228,22 @@ fn note_ceilings(compiled: &Compiled, action: &Action, ceilings: &mut [Option<f6
     }
 }
 
-/// The least value of a fluent that a condition asks for.
-fn least(compiled: &Compiled, condition: &Formula, fluent: u32) -> Option<f64> {
-    bounds(compiled, condition, fluent, true).max_by(f64::total_cmp)
+/// The least value of a fluent that a condition leaves after a change.
+fn least(compiled: &Compiled, condition: &Formula, change: (u32, f64)) -> Option<f64> {
+    bounds(compiled, condition, change, true).max_by(f64::total_cmp)
 }
 
-/// The highest value of a fluent that a condition allows.
-fn most(compiled: &Compiled, condition: &Formula, fluent: u32) -> Option<f64> {
-    bounds(compiled, condition, fluent, false).min_by(f64::total_cmp)
+/// The highest value of a fluent that a condition allows after a change.
+fn most(compiled: &Compiled, condition: &Formula, change: (u32, f64)) -> Option<f64> {
+    bounds(compiled, condition, change, false).min_by(f64::total_cmp)
 }
 
-/// The lower or the upper bounds on a fluent in the conjuncts of a condition.
+/// The lower or the upper bounds on a fluent after a change, by the conjuncts of a condition before it. One that
+/// reads `?duration` as well is taken to be about the sum already.
 fn bounds(
     compiled: &Compiled,
     condition: &Formula,
-    fluent: u32,
+    (fluent, amount): (u32, f64),
     are_lower: bool,
 ) -> impl Iterator<Item = f64> {
     condition.tests.iter().filter_map(move |&test| {
@@ -261,6 +269,11 @@ fn bounds(
             (true, false) => -1e-6,
         };
         let bound = strictly - linear.constant.to_f64() / coefficient.to_f64();
-        (*read == fluent && is_lower == are_lower).then_some(bound)
+        let amount = if linear.duration.is_zero() {
+            amount
+        } else {
+            0.0
+        };
+        (*read == fluent && is_lower == are_lower).then_some(bound + amount)
     })
 }

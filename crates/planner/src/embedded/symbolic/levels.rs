@@ -81,7 +81,7 @@ fn take_duration(form: &mut Form, network: &Network, scale: Scale) -> Option<Rat
         .iter()
         .rposition(|(_, other)| *other == opposite)?;
     let start = form.terms[place].0;
-    // `to >= from + distance`: the end comes so long after the start, or the start so long before the end.
+    // `to >= from + distance`: a lower bound on the duration, or the negative of an upper bound.
     let (from, to) = if coefficient.is_negative() {
         (start, end)
     } else {

@@ -19,7 +19,7 @@ use super::super::interference::{Access, Annotations, Separations, TimedSeparati
 use super::super::metric::{Metric, only_grows};
 use super::super::rules::stratified;
 use super::super::times::is_symbolic;
-use super::super::{Compiled, NONE, Rule, Snap, Timed, completeness, compression};
+use super::super::{Compiled, Compressibility, NONE, Rule, Snap, Timed, completeness, compression};
 use super::{Builder, Wanted, narrow};
 use crate::embedded::formula::Literal;
 use crate::embedded::time::{Scale, Ticks};
@@ -71,11 +71,12 @@ impl Builder<'_> {
         }
         self.note_compression_safe(&annotations, &timed, !strata.is_empty());
         let mut exclusive = vec![false; self.symbols.fluents.len()];
-        if is_symbolic && wanted.tuning.uses(Technique::ContinuousDrains) {
+        let counts_drains = wanted.tuning.uses(Technique::ContinuousDrains);
+        if is_symbolic && counts_drains {
             exclusive = self.exclusive_fluents(situation, &timed, &strata);
             self.add_implied_tests(&exclusive);
         }
-        self.note_compressibility(&exclusive);
+        self.note_compressibility(&exclusive, counts_drains);
         let timed_until_goal = self.timed_until_goal(grounding, &coming);
         let (metric, cost) = self.metric(situation, &timed);
         if !goes_on() {
@@ -350,18 +351,25 @@ impl Builder<'_> {
     }
 
     /// `exclusive`: see [`exclusive`].
-    fn note_compressibility(&mut self, exclusive: &[bool]) {
+    fn note_compressibility(&mut self, exclusive: &[bool], compresses_flows: bool) {
         let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
         for (number, action) in self.actions.iter_mut().enumerate() {
-            // What changes continuously may be there to be read meanwhile.
-            let mut flows = action.flows.iter();
-            let offers_numbers = flows.any(|flow| !exclusive[flow.fluent as usize]);
-            if action.start == NONE || action.end == NONE || offers_numbers {
+            if action.start == NONE || action.end == NONE {
                 continue;
             }
             let snaps = [action.start, action.end].map(|snap| &self.snaps[snap as usize]);
             let offers = |l: Literal| readers[l.index()].has_other_than(narrow(number));
             action.compressibility = compressibility(snaps[0], snaps[1], &offers);
+            // What changes continuously may be there to be read meanwhile.
+            let mut flows = action.flows.iter();
+            if flows.any(|flow| !exclusive[flow.fluent as usize]) {
+                let most = if compresses_flows {
+                    Compressibility::HoldsResource
+                } else {
+                    Compressibility::Envelope
+                };
+                action.compressibility = action.compressibility.min(most);
+            }
         }
     }
 
