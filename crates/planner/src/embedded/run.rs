@@ -71,8 +71,8 @@ pub(super) struct Planner<'a> {
     refiners: Vec<Nearby<'a>>,
     /// The task of the second strand.
     own_task: Option<Task>,
-    /// The clean-up of the first plan ends at so much work. `None` if it has not begun.
-    cleanup_limit: Option<u64>,
+    /// Counts at which the clean-up of the first plan ends. `None` if it has not begun.
+    cleanup_limit: Option<Counts>,
 }
 
 impl<'a> Planner<'a> {
@@ -142,7 +142,7 @@ impl<'a> Planner<'a> {
                 self.compete(entrants, (turn, budget))
             }
         };
-        let stopped = self.end_cleanup(stopped);
+        self.report_held_back();
         let counts = self.progress.counts;
         match self.best {
             Some(best) => Answer::Plan {
@@ -207,7 +207,7 @@ impl<'a> Planner<'a> {
             }
         }
         if self.stopped == Some(Stopped::FirstPlan) && self.cleans_up() {
-            self.begin_cleanup();
+            self.clean_up();
         }
         if self.stopped.is_some() {
             return First::Over;
@@ -333,8 +333,7 @@ impl<'a> Planner<'a> {
             // With one thread, those that come later have not begun, and with several nobody knows how
             // far they are.
             let later = numbers.iter().skip(last + 1);
-            let is_improved = matches!(self.stopped, None | Some(Stopped::FirstPlan));
-            for &number in later.filter(|_| is_improved) {
+            for &number in later.filter(|_| self.stopped.is_none()) {
                 self.progress.counts.memory -= memory[number];
                 entrants[number] = Entrant::new(entrants[number].strategy);
             }
@@ -413,7 +412,7 @@ impl<'a> Planner<'a> {
         flow.is_continue()
     }
 
-    /// Adds a new best plan to what the caller is told next.
+    /// Adds a new best plan to the next progress report.
     fn show(&mut self, found: &Best) {
         self.progress.best = Some(found.found.value.clone());
         self.progress.plan = Some(found.found.clone());

@@ -44,8 +44,8 @@ pub enum Technique {
     Consumables,
     /// Relaxed plans fill up what they use up.
     Reservoirs,
-    /// Continuous changes, and those that depend on the duration, count in relaxed plans that fill up what they
-    /// use up. If a fluent is of one action at a time, they count as changes at the end.
+    /// Relaxed plans that fill up reservoirs count continuous changes, and those that depend on the duration.
+    /// Where a fluent concerns one action at a time, a continuous change counts as a change at the end.
     ContinuousDrains,
     /// The best plan's actions are tried in other orders.
     Rescheduling,
@@ -55,7 +55,7 @@ pub enum Technique {
     Repair,
     /// Plans that are a little worse than the best one are gone on from.
     Leniency,
-    /// If only a first plan is asked for, the search for better ones continues for as much work as it took.
+    /// If only a first plan is asked for, better ones are looked for near it, for as much work as it took.
     Cleanup,
     /// On a plateau, the newest and the oldest preferred successors take turns.
     Alternation,

@@ -52,7 +52,7 @@ pub(super) struct Resources {
     list: Vec<Resource>,
     /// For each operator what it adds to resources, or, negative, takes.
     changes: Vec<Vec<(usize, f64)>>,
-    /// The amount of each in the state, above what must remain.
+    /// The amount of each in the state, less its floor.
     levels: Vec<f64>,
     /// The amount of each that a relaxed plan leaves.
     left: Vec<f64>,

@@ -1,55 +1,74 @@
-//! The clean-up of a first plan that is all that the caller asked for.
+//! Clean-up of the first plan, where the caller asks for no other one.
 //!
-//! The searches, and the search near the best plan, continue for as much work as the first plan took. The caller
-//! is told of the best plan after that. Needless and back-and-forth actions are mostly gone then.
+//! Better plans are looked for near the first plan, for at most as much work and as many states as it took. Then
+//! the best plan is reported. It has few needless and back-and-forth actions.
 
-use super::super::answer::Stopped;
+use super::super::answer::{Counts, Stopped};
 use super::super::tuning::Technique;
 use super::Planner;
+use super::refining::Nearby;
+use super::strand::{OPERATOR_WORK, Strand};
 
-/// So many times in a clean-up, work is compared with its limit.
+/// The number of times in a clean-up that its work is compared with the limit.
 const REPORTS: u64 = 16;
 
 impl Planner<'_> {
     /// Returns `true` if the first plan is held back until it has been cleaned up.
     pub(super) fn cleans_up(&self) -> bool {
-        let tuning = &self.frame.compiled.tuning;
-        self.frame.settings.first_plan_only && tuning.uses(Technique::Cleanup)
+        let compiled = self.frame.compiled;
+        self.frame.settings.first_plan_only
+            && !compiled.is_symbolic
+            && compiled.tuning.uses(Technique::Cleanup)
     }
 
-    /// Returns `true` if a plan ends the search.
+    /// Returns `true` if a plan ends the run.
     pub(super) fn is_first_plan_enough(&self) -> bool {
         self.frame.settings.first_plan_only && self.cleanup_limit.is_none()
     }
 
-    /// Returns `true` if the clean-up has taken as much work as the first plan.
+    /// Returns `true` if the clean-up has taken as much work or as many states as the first plan.
     pub(super) fn is_cleanup_over(&self) -> bool {
-        let work = self.progress.counts.work;
-        self.cleanup_limit.is_some_and(|limit| work >= limit)
+        let counts = &self.progress.counts;
+        let is_over =
+            |limit: &Counts| counts.work >= limit.work || counts.evaluated >= limit.evaluated;
+        self.cleanup_limit.as_ref().is_some_and(is_over)
     }
 
-    /// Lets the run continue after the first plan.
-    pub(super) fn begin_cleanup(&mut self) {
-        let work = self.progress.counts.work;
+    /// Looks for better plans near the first one.
+    pub(super) fn clean_up(&mut self) {
+        let Counts {
+            work, evaluated, ..
+        } = self.progress.counts;
         self.stopped = None;
-        self.cleanup_limit = Some(work.saturating_mul(2));
+        self.cleanup_limit = Some(Counts {
+            work: 2 * work,
+            evaluated: 2 * evaluated,
+            ..Counts::default()
+        });
         self.frame.limit_report_work(work / REPORTS);
+        let (frame, best, unreported) = (self.frame, self.best.clone(), self.unreported);
+        let mut nearby = Nearby::new(frame.compiled, 1);
+        let memory = frame.settings.max_memory;
+        nearby.limit_memory(memory.saturating_sub(self.progress.counts.memory));
+        let (newest, mut base) = (self.finds, self.progress.counts);
+        let mut hear = |report| self.hear(&mut base, report);
+        let mut strand = Strand::new(frame, best, unreported, &mut hear);
+        strand.refine(&mut nearby, newest, work / OPERATOR_WORK);
+        self.unreported = strand.end(false);
+        if self.stopped != Some(Stopped::Interrupted) {
+            self.stopped = Some(Stopped::FirstPlan);
+        }
     }
 
-    /// Tells the caller of the best plan, if it was held back, and why the run ends, which would have ended for
-    /// the first plan.
-    pub(super) fn end_cleanup(&mut self, stopped: Stopped) -> Stopped {
-        let best = self.best.clone().filter(|_| self.cleans_up());
-        let Some(best) = best else {
-            return stopped;
-        };
-        self.show(&best);
-        // The run ends in any case.
-        self.tell(None);
-        if self.cleanup_limit.is_some() && stopped != Stopped::Interrupted {
-            Stopped::FirstPlan
-        } else {
-            stopped
+    /// Reports the best plan, if it was held back. A caller that interrupted the run has it in the answer.
+    pub(super) fn report_held_back(&mut self) {
+        if self.cleans_up()
+            && self.stopped != Some(Stopped::Interrupted)
+            && let Some(best) = self.best.clone()
+        {
+            self.show(&best);
+            // The run ends in any case.
+            self.tell(None);
         }
     }
 }

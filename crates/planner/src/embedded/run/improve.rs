@@ -221,7 +221,7 @@ impl<'a> Planner<'a> {
     pub(super) fn is_refining(&self) -> bool {
         let tuning = &self.frame.compiled.tuning;
         self.best.is_some()
-            && !self.is_first_plan_enough()
+            && !self.frame.settings.first_plan_only
             && !self.frame.compiled.is_symbolic
             && (tuning.uses(Technique::Rescheduling) || tuning.uses(Technique::Repair))
     }

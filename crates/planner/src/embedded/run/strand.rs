@@ -25,7 +25,7 @@ const REPORT_WORK: u64 = 2_000_000;
 const TURN_WORK: u64 = 8_000;
 
 /// Work that is counted for an operator of an estimate.
-const OPERATOR_WORK: u64 = 5;
+pub(super) const OPERATOR_WORK: u64 = 5;
 
 /// The number of looked-up pairs that lie between two reports at most: some milliseconds.
 const REPORT_LOOKUPS: u64 = 4_000_000;
@@ -45,7 +45,7 @@ pub(in super::super) struct Frame<'a> {
     pub(in super::super) situation: &'a Situation,
     pub(in super::super) settings: &'a Settings,
     pub(in super::super) compiled: &'a Compiled,
-    /// How much work lies between two reports, in operators of estimates.
+    /// The most work between two reports, in operators of estimates.
     pub(super) report_work: u64,
 }
 
@@ -66,7 +66,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// From now on, reports come at least after so much work, in units of [`work`].
+    /// Limits the work between two reports, in units of [`work`].
     pub(super) fn limit_report_work(&mut self, most: u64) {
         self.report_work = (most / OPERATOR_WORK).clamp(1, REPORT_WORK);
     }
