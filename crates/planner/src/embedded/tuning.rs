@@ -45,7 +45,7 @@ pub enum Technique {
     /// Relaxed plans fill up what they use up.
     Reservoirs,
     /// Relaxed plans that fill up reservoirs count continuous changes, and those that depend on the duration.
-    /// Where a fluent concerns one action at a time, a continuous change counts as a change at the end.
+    /// A continuous change of a fluent that concerns one action at a time counts as a change at the end.
     ContinuousDrains,
     /// The best plan's actions are tried in other orders.
     Rescheduling,
