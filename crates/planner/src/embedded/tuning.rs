@@ -55,7 +55,7 @@ pub enum Technique {
     Repair,
     /// Plans that are a little worse than the best one are gone on from.
     Leniency,
-    /// If only a first plan is asked for, better ones are looked for near it, for as much work as it took.
+    /// If only a first plan is asked for, better ones are looked for near it, for a share of its work.
     Cleanup,
     /// On a plateau, the newest and the oldest preferred successors take turns.
     Alternation,

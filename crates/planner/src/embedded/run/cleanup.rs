@@ -1,7 +1,7 @@
 //! Clean-up of the first plan, where the caller asks for no other one.
 //!
-//! Better plans are looked for near the first plan, for at most as much work and as many states as it took. Then
-//! the best plan is reported. It has few needless and back-and-forth actions.
+//! Better plans are looked for near the first plan, for a share of the work that it took and at most as many
+//! states. Then the best plan is reported. It has few needless and back-and-forth actions.
 
 use super::super::answer::{Counts, Stopped};
 use super::super::tuning::Technique;
@@ -12,12 +12,18 @@ use super::strand::{OPERATOR_WORK, Strand};
 /// The number of times in a clean-up that its work is compared with the limit.
 const REPORTS: u64 = 16;
 
+/// The work of a clean-up is this part of the work up to the first plan: a unit near a plan takes several times as
+/// long as one of a search.
+const SHARE: u64 = 4;
+
 impl Planner<'_> {
-    /// Returns `true` if the first plan is held back until it has been cleaned up.
+    /// Returns `true` if the first plan is held back until it has been cleaned up. Where actions may have to run at
+    /// the same time, networks are large, and steps near a plan take much longer than their counted work.
     pub(super) fn cleans_up(&self) -> bool {
         let compiled = self.frame.compiled;
         self.frame.settings.first_plan_only
             && !compiled.is_symbolic
+            && !self.needs_concurrency()
             && compiled.tuning.uses(Technique::Cleanup)
     }
 
@@ -26,7 +32,7 @@ impl Planner<'_> {
         self.frame.settings.first_plan_only && self.cleanup_limit.is_none()
     }
 
-    /// Returns `true` if the clean-up has taken as much work or as many states as the first plan.
+    /// Returns `true` if the clean-up has taken its share of the work, or as many states as the first plan.
     pub(super) fn is_cleanup_over(&self) -> bool {
         let counts = &self.progress.counts;
         let is_over =
@@ -41,11 +47,12 @@ impl Planner<'_> {
         } = self.progress.counts;
         self.stopped = None;
         self.cleanup_limit = Some(Counts {
-            work: 2 * work,
+            work: work + work / SHARE,
             evaluated: 2 * evaluated,
             ..Counts::default()
         });
-        self.frame.limit_report_work(work / REPORTS);
+        let most = work / SHARE;
+        self.frame.limit_report_work(most / REPORTS);
         let (frame, best, unreported) = (self.frame, self.best.clone(), self.unreported);
         let mut nearby = Nearby::new(frame.compiled, 1);
         let memory = frame.settings.max_memory;
@@ -53,7 +60,7 @@ impl Planner<'_> {
         let (newest, mut base) = (self.finds, self.progress.counts);
         let mut hear = |report| self.hear(&mut base, report);
         let mut strand = Strand::new(frame, best, unreported, &mut hear);
-        strand.refine(&mut nearby, newest, work / OPERATOR_WORK);
+        strand.refine(&mut nearby, newest, most / OPERATOR_WORK);
         self.unreported = strand.end(false);
         if self.stopped != Some(Stopped::Interrupted) {
             self.stopped = Some(Stopped::FirstPlan);
