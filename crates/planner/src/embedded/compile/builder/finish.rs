@@ -70,13 +70,8 @@ impl Builder<'_> {
             return None;
         }
         self.note_compression_safe(&annotations, &timed, !strata.is_empty());
-        let mut exclusive = vec![false; self.symbols.fluents.len()];
-        let counts_drains = wanted.tuning.uses(Technique::ContinuousDrains);
-        if is_symbolic && counts_drains {
-            exclusive = self.exclusive_fluents(situation, &timed, &strata);
-            self.add_implied_tests(&exclusive);
-        }
-        self.note_compressibility(&exclusive, counts_drains);
+        let counts_drains = is_symbolic && wanted.tuning.uses(Technique::ContinuousDrains);
+        let exclusive = self.compile_drains(situation, &timed, &strata, counts_drains);
         let timed_until_goal = self.timed_until_goal(grounding, &coming);
         let (metric, cost) = self.metric(situation, &timed);
         if !goes_on() {
@@ -308,6 +303,24 @@ impl Builder<'_> {
             });
             action.is_compression_safe = is_plain && ends.only_add(action, &self.snaps);
         }
+    }
+
+    /// Settles which actions may be compressed, and compiles continuous changes of exclusive fluents to their ends.
+    /// Returns for each fluent whether it is exclusive.
+    fn compile_drains(
+        &mut self,
+        situation: &Situation,
+        timed: &[Timed],
+        strata: &[Vec<Rule>],
+        counts_drains: bool,
+    ) -> Vec<bool> {
+        let mut exclusive = vec![false; self.symbols.fluents.len()];
+        if counts_drains {
+            exclusive = self.exclusive_fluents(situation, timed, strata);
+            self.add_implied_tests(&exclusive);
+        }
+        self.note_compressibility(&exclusive, counts_drains);
+        exclusive
     }
 
     /// For each fluent, whether continuous changes of it concern one action at a time.
