@@ -12,6 +12,9 @@ use super::strand::{OPERATOR_WORK, Strand};
 /// The number of times in a clean-up that its work is compared with the limit.
 const REPORTS: u64 = 16;
 
+/// The least states of a first plan that is cleaned up: below that, the preparation takes longer than the plan took.
+const LEAST_STATES: u64 = 64;
+
 /// The work of a clean-up is this part of the work up to the first plan: a unit near a plan takes several times as
 /// long as one of a search.
 const SHARE: u64 = 4;
@@ -45,6 +48,9 @@ impl Planner<'_> {
         let Counts {
             work, evaluated, ..
         } = self.progress.counts;
+        if evaluated < LEAST_STATES {
+            return;
+        }
         self.stopped = None;
         self.cleanup_limit = Some(Counts {
             work: work + work / SHARE,
