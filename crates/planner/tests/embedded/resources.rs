@@ -104,8 +104,10 @@ fn continuous_drain_is_filled_up_before() {
         );
     let count = |without: &[Technique]| {
         let task = task(&domain, &problem);
-        let mut settings = Settings::default();
-        settings.first_plan_only = true;
+        let mut settings = Settings {
+            first_plan_only: true,
+            ..Settings::default()
+        };
         settings.tuning.without.push(Technique::Cleanup);
         settings.tuning.without.extend(without);
         let situation = Situation::initial(&task);
