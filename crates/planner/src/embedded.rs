@@ -196,13 +196,7 @@ fn search_for_plans(
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }
-    let frame = Frame {
-        task,
-        constrained,
-        situation,
-        settings,
-        compiled: &compiled,
-    };
+    let frame = Frame::new((task, constrained), situation, settings, &compiled);
     progress.counts.work = work::spent() - begin;
     Planner::new(frame, (&names, &symmetry), progress, observe).run()
 }

@@ -39,7 +39,8 @@ use instances::{Instance, Selection, instances, task};
 use summary::{Answered, Comparison};
 
 /// What only better plans are looked for with.
-const AFTER_THE_FIRST_PLAN: [Technique; 3] = [
+const AFTER_THE_FIRST_PLAN: [Technique; 4] = [
+    Technique::Cleanup,
     Technique::Rescheduling,
     Technique::Repair,
     Technique::Leniency,
@@ -194,6 +195,8 @@ fn cell(options: &Options, tuning: &Tuning, instance: &Instance) -> Cell {
         ..Settings::default()
     };
     settings.max_memory = options.memory.unwrap_or(settings.max_memory);
+    // The states up to the first plan count.
+    settings.tuning.without.push(Technique::Cleanup);
     let clock = Clock::now(options.counts_processor_time);
     let answer = plan(&task, &situation, &settings, &mut |progress| {
         if progress.counts.evaluated >= options.states || clock.elapsed() >= options.time {

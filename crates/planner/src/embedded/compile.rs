@@ -15,6 +15,7 @@ mod completeness;
 mod compressibility;
 mod compression;
 mod directions;
+mod exclusive;
 mod fixed_durations;
 mod guarded;
 mod interference;
@@ -69,6 +70,8 @@ pub(crate) struct Compiled {
     pub(crate) facts: Vec<FactId>,
     /// The fluents that matter to some condition, duration or rate.
     pub(crate) fluents: Vec<FluentId>,
+    /// For each fluent, `true` if continuous changes of it are known to concern one action at a time.
+    pub(crate) exclusive_fluents: Vec<bool>,
     pub(crate) tests: Vec<Test>,
     pub(crate) snaps: Vec<Snap>,
     pub(crate) actions: Vec<Action>,

@@ -41,6 +41,7 @@ use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 
 use super::answer::{Answer, Counts, Found, Objective, Progress, Proof, Settings, Stopped};
 use super::compile::Unsupported;
+use super::tuning::Technique;
 pub(super) use delay::delayed;
 use rewriting::Coverage;
 
@@ -180,12 +181,19 @@ impl Search<'_> {
                 }));
             }
         };
-        let settings = Settings {
+        let settings = self.settings_of_search(first_plan_only);
+        let constrained = (coverage == Coverage::Expressible).then_some(self.task);
+        Ok(self.search(&free, constrained, &settings, most_states))
+    }
+
+    /// The settings of one search. A plan is judged under the constraints as soon as it is found.
+    fn settings_of_search(&self, first_plan_only: bool) -> Settings {
+        let mut settings = Settings {
             first_plan_only,
             ..self.settings.clone()
         };
-        let constrained = (coverage == Coverage::Expressible).then_some(self.task);
-        Ok(self.search(&free, constrained, &settings, most_states))
+        settings.tuning.without.push(Technique::Cleanup);
+        settings
     }
 
     /// Searches for plans of a task without constraints; evaluates about `most_states` states at most.
@@ -246,10 +254,7 @@ impl Search<'_> {
         }
         let task = self.task;
         let loose = free_task(task, rewriting::loosened(task));
-        let settings = Settings {
-            first_plan_only: true,
-            ..self.settings.clone()
-        };
+        let settings = self.settings_of_search(true);
         let answer = self.search(&loose, Some(task), &settings, most_states);
         match answer {
             // A rejected plan may represent others that satisfy the constraints.

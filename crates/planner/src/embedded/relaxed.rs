@@ -8,6 +8,7 @@
 //! numeric effects are taken to reach any value at once. So a state without relaxed plan has no
 //! plan.
 
+mod changes;
 mod consumables;
 mod deadlines;
 mod graph;
@@ -19,6 +20,8 @@ mod spread;
 #[cfg(test)]
 mod tests;
 
+use elbowroom_num::Rational;
+
 use super::apply::Step;
 use super::compile::{Compiled, Compressibility};
 use super::formula::Literal;
@@ -26,6 +29,7 @@ use super::network::SETTLED;
 use super::spans::Spans;
 use super::state::{Open, State};
 use super::step_costs::StepCosts;
+use super::symbolic;
 use super::time::{NEVER, Ticks};
 use consumables::Consumables;
 pub(crate) use consumables::{Consumable, consumables};
@@ -35,7 +39,7 @@ pub(crate) use graph::Graph;
 pub(crate) use labels::Labels;
 pub(crate) use plan::OVERDRAWN;
 use resources::Resources;
-pub(crate) use resources::floors;
+pub(crate) use resources::reservoirs;
 
 /// Beyond this, costs are all alike.
 const MOST: u32 = 1 << 15;
@@ -331,15 +335,22 @@ impl<'a> Relaxed<'a> {
             #[allow(clippy::cast_possible_truncation, reason = "facts are numbered by u32")]
             reach(proposition as u32, cost, buckets);
         }
+        let levels = highest_levels(self.compiled, state);
         for (number, gap) in self.gaps.iter_mut().enumerate() {
             #[allow(clippy::cast_possible_truncation, reason = "tests are numbered by u32")]
             let test = number as u32;
-            let is_free =
-                self.graph.is_free_test[number] || depends_on_times(self.compiled, test, state);
-            if is_free || state.passes(self.compiled, test, None) {
-                reach(self.graph.test(test), cost, buckets);
+            let missing = if self.graph.is_free_test[number] {
+                None
+            } else if depends_on_times(self.compiled, test, state) {
+                numbers::gap_of_levels(self.compiled, test, &levels)
+            } else if state.passes(self.compiled, test, None) {
+                None
             } else {
-                *gap = numbers::gap(self.compiled, test, state);
+                Some(numbers::gap(self.compiled, test, state))
+            };
+            match missing {
+                None => reach(self.graph.test(test), cost, buckets),
+                Some(missing) => *gap = missing,
             }
         }
         for stay in &graph.stays {
@@ -366,6 +377,18 @@ fn own_costs(graph: &Graph) -> Vec<u32> {
 pub(crate) fn last_end(spans: &[(Ticks, Ticks)]) -> Option<Ticks> {
     let ends = spans.iter().map(|span| span.1);
     ends.filter(|&end| end < NEVER).max()
+}
+
+/// The highest levels of exclusive fluents whose values depend on times. No other action reads them before the
+/// ends of the running ones.
+fn highest_levels(compiled: &Compiled, state: &State) -> Vec<(u32, Rational)> {
+    let courses = state.symbolic.iter().flat_map(|symbolic| &symbolic.courses);
+    let exclusive = courses.filter(|(fluent, _)| compiled.exclusive_fluents[*fluent as usize]);
+    let levels = exclusive.filter_map(|(fluent, _)| {
+        let level = symbolic::highest_level(compiled, state, *fluent)?;
+        Some((*fluent, level))
+    });
+    levels.collect()
 }
 
 /// Whether times decide the test; then it is taken for granted.

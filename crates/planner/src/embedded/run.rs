@@ -1,5 +1,6 @@
 //! One run of the planner: how many turns a search gets, and what becomes of the plans.
 
+mod cleanup;
 mod improve;
 mod portfolio;
 mod refining;
@@ -70,6 +71,8 @@ pub(super) struct Planner<'a> {
     refiners: Vec<Nearby<'a>>,
     /// The task of the second strand.
     own_task: Option<Task>,
+    /// Counts at which the clean-up of the first plan ends. `None` if it has not begun.
+    cleanup_limit: Option<Counts>,
 }
 
 impl<'a> Planner<'a> {
@@ -87,7 +90,7 @@ impl<'a> Planner<'a> {
             names,
             progress,
             has_reservoirs: compiled.tuning.uses(Technique::Reservoirs)
-                && !relaxed::floors(compiled).is_empty(),
+                && !relaxed::reservoirs(compiled).is_empty(),
             best: None,
             finds: 0,
             stopped: None,
@@ -97,6 +100,7 @@ impl<'a> Planner<'a> {
             has_given_up: false,
             refiners: Vec::new(),
             own_task: None,
+            cleanup_limit: None,
         }
     }
 
@@ -138,6 +142,7 @@ impl<'a> Planner<'a> {
                 self.compete(entrants, (turn, budget))
             }
         };
+        self.report_held_back();
         let counts = self.progress.counts;
         match self.best {
             Some(best) => Answer::Plan {
@@ -200,6 +205,9 @@ impl<'a> Planner<'a> {
                 budget = budget.saturating_mul(2);
                 (turn, left) = (0, None);
             }
+        }
+        if self.stopped == Some(Stopped::FirstPlan) && self.cleans_up() {
+            self.clean_up();
         }
         if self.stopped.is_some() {
             return First::Over;
@@ -380,7 +388,7 @@ impl<'a> Planner<'a> {
         }
         if !goes_on {
             self.stopped = Some(Stopped::Interrupted);
-        } else if is_found && self.frame.settings.first_plan_only {
+        } else if is_found && self.is_first_plan_enough() || self.is_cleanup_over() {
             self.stopped = Some(Stopped::FirstPlan);
             goes_on = false;
         } else if self.progress.counts.memory > self.frame.settings.max_memory {
@@ -393,14 +401,21 @@ impl<'a> Planner<'a> {
     /// Tells the caller how it goes, and of a new best plan. Whether to go on.
     fn tell(&mut self, found: Option<Arc<Best>>) -> bool {
         if let Some(found) = found {
-            self.progress.best = Some(found.found.value.clone());
-            self.progress.plan = Some(found.found.clone());
+            if !self.cleans_up() {
+                self.show(&found);
+            }
             self.best = Some(found);
             self.finds += 1;
         }
         let flow = (self.observe)(&self.progress);
         self.progress.plan = None;
         flow.is_continue()
+    }
+
+    /// Adds a new best plan to the next progress report.
+    fn show(&mut self, found: &Best) {
+        self.progress.best = Some(found.found.value.clone());
+        self.progress.plan = Some(found.found.clone());
     }
 
     /// A proof from the bound on pairs. Told to stop meanwhile, it names no deadlines.

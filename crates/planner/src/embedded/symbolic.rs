@@ -7,6 +7,7 @@
 //! that has a solution. Here the network keeps all happenings, since a choice made long ago may
 //! still matter.
 
+mod levels;
 mod program;
 mod projected;
 
@@ -18,6 +19,7 @@ use super::expressions::{Course, Form, Moment, Symbolic};
 use super::formula::{Formula, Linear, Numeric};
 use super::network::{NodeId, SETTLED};
 use super::state::{Open, State};
+pub(crate) use levels::highest_level;
 pub(crate) use program::{Exact, KnownEnd, exact_distance, is_possible, not_before, solve};
 
 /// The value of an expression at some moment.
@@ -233,12 +235,9 @@ pub(crate) fn flow(state: &mut State, fluent: u32, rate: &Rational, time: &Form)
 /// depend on times.
 pub(crate) fn settled_value(compiled: &Compiled, state: &State, fluent: u32) -> Option<Rational> {
     let symbolic = state.symbolic.as_ref()?;
-    let mut to_come = compiled.timed[state.timed as usize..].iter();
-    let is_assigned = |assigns: &[(u32, Rational)]| assigns.iter().any(|(own, _)| *own == fluent);
-    if to_come.any(|timed| is_assigned(&timed.assigns)) {
+    if is_assigned_later(compiled, state, fluent) {
         return None;
     }
-    let mut course = symbolic.course(fluent).cloned();
     for open in &state.open {
         let end = compiled.snap(compiled.action(open.action).end);
         let conditional = end
@@ -252,21 +251,34 @@ pub(crate) fn settled_value(compiled: &Compiled, state: &State, fluent: u32) -> 
         if updates.any(|update| update.fluent == fluent) {
             return None;
         }
-        for (own, rate) in &open.flows {
-            if let Some(course) = course.as_mut().filter(|_| *own == fluent) {
-                let time = end_form(open, open.end);
-                course.base = std::mem::take(&mut course.base).plus(rate, &time);
-                course.rate -= rate;
-            }
-        }
     }
-    match course {
+    match settled_course(symbolic, state, fluent) {
         None => state.values[fluent as usize].clone(),
         Some(course) => {
             let is_settled = course.rate.is_zero();
             course.base.as_constant().filter(|_| is_settled).cloned()
         }
     }
+}
+
+/// Returns `true` if a timed initial to come assigns the fluent.
+fn is_assigned_later(compiled: &Compiled, state: &State, fluent: u32) -> bool {
+    let mut to_come = compiled.timed[state.timed as usize..].iter();
+    to_come.any(|timed| timed.assigns.iter().any(|(own, _)| *own == fluent))
+}
+
+/// The course of a fluent after the ends of all running actions, without its jumps at these ends. `None` if
+/// its value does not depend on times.
+fn settled_course(symbolic: &Symbolic, state: &State, fluent: u32) -> Option<Course> {
+    let mut course = symbolic.course(fluent)?.clone();
+    for open in &state.open {
+        for (_, rate) in open.flows.iter().filter(|(own, _)| *own == fluent) {
+            let time = end_form(open, open.end);
+            course.base = std::mem::take(&mut course.base).plus(rate, &time);
+            course.rate -= rate;
+        }
+    }
+    Some(course)
 }
 
 /// The time of an action's end. A fixed duration counts from the start, so that the total of a continuous

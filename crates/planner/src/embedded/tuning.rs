@@ -44,6 +44,9 @@ pub enum Technique {
     Consumables,
     /// Relaxed plans fill up what they use up.
     Reservoirs,
+    /// Relaxed plans that fill up reservoirs count continuous changes, and those that depend on the duration.
+    /// A continuous change of a fluent that concerns one action at a time counts as a change at the end.
+    ContinuousDrains,
     /// The best plan's actions are tried in other orders.
     Rescheduling,
     /// A search for better orders of the best plan's actions that proves when there is none.
@@ -52,6 +55,8 @@ pub enum Technique {
     Repair,
     /// Plans that are a little worse than the best one are gone on from.
     Leniency,
+    /// If only a first plan is asked for, better ones are looked for near it, for a share of its work.
+    Cleanup,
     /// On a plateau, the newest and the oldest preferred successors take turns.
     Alternation,
 }
@@ -74,10 +79,12 @@ impl Technique {
         (Self::Nesting, "nesting"),
         (Self::Consumables, "consumables"),
         (Self::Reservoirs, "reservoirs"),
+        (Self::ContinuousDrains, "continuous-drains"),
         (Self::Rescheduling, "rescheduling"),
         (Self::Scheduling, "scheduling"),
         (Self::Repair, "repair"),
         (Self::Leniency, "leniency"),
+        (Self::Cleanup, "cleanup"),
         (Self::Alternation, "alternation"),
     ];
 }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use elbowroom_model::Situation;
 use elbowroom_planner::{Answer, Counts, Member, Settings, Technique, Tuning, plan};
 
-use crate::world::{answer, describe, task};
+use crate::world::{answer, answer_without_cleanup, describe, task};
 
 /// The answer with other constants of the search, within so many states.
 fn tuned(domain: &str, problem: &str, tuning: Tuning, states: u64) -> Answer {
@@ -79,7 +79,7 @@ fn embossing(sheets: usize) -> (String, String) {
 #[test]
 fn what_must_follow_before_something_is_cold_is_not_put_off() {
     let (domain, problem) = embossing(9);
-    let answer = answer(&domain, &problem);
+    let answer = answer_without_cleanup(&domain, &problem);
     let evaluated = counts(&answer).evaluated;
     assert!(evaluated < 4_000, "{evaluated} states");
 }
@@ -124,7 +124,7 @@ fn pottery(pots: usize) -> (String, String) {
 #[test]
 fn what_outlasts_a_fire_is_not_fired_in_it() {
     let (domain, problem) = pottery(24);
-    let answer = answer(&domain, &problem);
+    let answer = answer_without_cleanup(&domain, &problem);
     let evaluated = counts(&answer).evaluated;
     assert!(evaluated < 1_000, "{evaluated} states");
 }
@@ -180,7 +180,7 @@ fn filling(cans: &[usize], jars: &[usize]) -> (String, String) {
 #[test]
 fn a_can_that_is_still_needed_is_not_shipped() {
     let (domain, problem) = filling(&[4, 2, 5, 1], &[5, 2, 1, 4]);
-    let answer = answer(&domain, &problem);
+    let answer = answer_without_cleanup(&domain, &problem);
     let evaluated = counts(&answer).evaluated;
     assert!(evaluated < 10_000, "{evaluated} states");
 }

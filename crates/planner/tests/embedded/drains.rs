@@ -36,6 +36,8 @@ struct Draft {
     levels: [i8; 2],
     goal: Vec<u8>,
     least: Option<(u8, i8)>,
+    /// A bit for each action that needs the idle machine of its level, and takes it while it runs.
+    machines: u8,
 }
 
 fn drafts() -> impl Strategy<Value = Draft> {
@@ -70,9 +72,12 @@ fn drafts() -> impl Strategy<Value = Draft> {
         prop::sample::select(vec![0_u8, 1, 2, 4, 7]),
         [0..12_i8, 0..12_i8],
         prop::collection::vec(0..3_u8, 1..4),
-        prop::option::weighted(0.4, (0..2_u8, 0..15_i8)),
+        (
+            prop::option::weighted(0.4, (0..2_u8, 0..15_i8)),
+            prop_oneof![3 => Just(u8::MAX), 1 => any::<u8>(), 2 => Just(0)],
+        ),
     )
-        .prop_map(|(mut actions, initial, levels, goal, least)| {
+        .prop_map(|(mut actions, initial, levels, goal, (least, machines))| {
             for (number, action) in (0..).zip(&mut actions) {
                 action.gives = number % 3;
             }
@@ -82,6 +87,7 @@ fn drafts() -> impl Strategy<Value = Draft> {
                 levels,
                 goal,
                 least,
+                machines,
             }
         })
 }
@@ -90,7 +96,7 @@ impl Draft {
     fn task(&self) -> Task {
         let mut domain = "(:requirements :durative-actions :numeric-fluents :continuous-effects
              :duration-inequalities :adl)
-            (:predicates (f0) (f1) (f2)) (:functions (l0) (l1))"
+            (:predicates (f0) (f1) (f2) (idle0) (idle1)) (:functions (l0) (l1))"
             .to_owned();
         for (number, action) in self.actions.iter().enumerate() {
             let (level, rate) = (action.level, action.rate);
@@ -110,6 +116,14 @@ impl Draft {
             let mut changes = format!(" (at end (f{}))", action.gives);
             if let Some(fact) = action.takes.filter(|&fact| fact != action.gives) {
                 write!(changes, " (at start (not (f{fact}))) (at end (f{fact}))").unwrap();
+            }
+            if self.machines >> number & 1 == 1 {
+                write!(needs, " (at start (idle{level}))").unwrap();
+                write!(
+                    changes,
+                    " (at start (not (idle{level}))) (at end (idle{level}))"
+                )
+                .unwrap();
             }
             if rate != 0 {
                 let (verb, size) = if rate < 0 {
@@ -137,7 +151,7 @@ impl Draft {
             )
             .unwrap();
         }
-        let mut initial = String::new();
+        let mut initial = " (idle0) (idle1)".to_owned();
         for fact in (0..3).filter(|fact| self.initial >> fact & 1 == 1) {
             write!(initial, " (f{fact})").unwrap();
         }
@@ -153,11 +167,10 @@ impl Draft {
 }
 
 /// The planner's answer within a number of turns. Its plans have been validated.
-fn answer(task: &Task, is_projected: bool) -> Answer {
+fn answer(task: &Task, without: &[Technique]) -> Answer {
     let mut tuning = Tuning::default();
-    if !is_projected {
-        tuning.without.push(Technique::Projection);
-    }
+    tuning.without.push(Technique::Cleanup);
+    tuning.without.extend(without);
     let settings = Settings {
         first_plan_only: true,
         max_memory: 64 << 20,
@@ -180,13 +193,32 @@ proptest! {
     #[test]
     fn problem_is_solvable_with_few_happenings_exactly_when_it_is_with_all(draft in drafts()) {
         let task = draft.task();
-        let answers = [true, false].map(|is_projected| answer(&task, is_projected));
+        let answers = [&[][..], &[Technique::Projection]].map(|without| answer(&task, without));
         // Where one ran out of turns, nothing is known.
-        let is_interrupted = |answer: &Answer| {
-            matches!(answer, Answer::NoneFound { stopped: Stopped::Interrupted, .. })
-        };
         if !answers.iter().any(is_interrupted) {
             prop_assert_eq!(describe(&answers[0]), describe(&answers[1]));
         }
     }
+
+    #[test]
+    fn problem_is_solvable_whether_or_not_drains_count_as_changes_at_the_end(draft in drafts()) {
+        let task = draft.task();
+        let answers =
+            [&[][..], &[Technique::ContinuousDrains]].map(|without| answer(&task, without));
+        if !answers.iter().any(is_interrupted) {
+            let are_found = answers.each_ref().map(|answer| answer.found().is_some());
+            prop_assert_eq!(are_found[0], are_found[1]);
+        }
+    }
+}
+
+/// Returns `true` if the turns were used up.
+fn is_interrupted(answer: &Answer) -> bool {
+    matches!(
+        answer,
+        Answer::NoneFound {
+            stopped: Stopped::Interrupted,
+            ..
+        }
+    )
 }

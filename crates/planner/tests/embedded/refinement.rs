@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use elbowroom_model::validate::{self, Verdict, validate};
 use elbowroom_model::{Situation, Task};
-use elbowroom_planner::{Answer, Found, Member, Phase, Settings, Technique, plan};
+use elbowroom_planner::{Answer, Found, Member, Phase, Settings, Stopped, Technique, plan};
 
 use crate::world::{describe, task};
 
@@ -225,5 +225,39 @@ fn each_report_can_be_the_last_one_here_too() {
         });
         assert!(answer.found().is_some() || !phases.contains(&Phase::Improving));
         assert!(phases.len() <= most);
+    }
+}
+
+/// The same plan as without the clean-up, or a better one, for little more work.
+#[test]
+fn cleaned_up_plan_is_no_worse_and_takes_a_share_of_the_work() {
+    for seed in 0..6 {
+        let task = shop(&made_up(seed, 6, 3), seed % 2 == 0);
+        let run = |without: &[Technique]| {
+            let mut settings = Settings {
+                first_plan_only: true,
+                ..Settings::default()
+            };
+            settings.tuning.without.extend(without);
+            let situation = Situation::initial(&task);
+            let mut plans = 0;
+            let answer = plan(&task, &situation, &settings, &mut |progress| {
+                plans += usize::from(progress.plan.is_some());
+                ControlFlow::Continue(())
+            });
+            let Answer::Plan {
+                found,
+                stopped,
+                counts,
+            } = answer
+            else {
+                panic!("no plan");
+            };
+            assert_eq!((plans, stopped), (1, Stopped::FirstPlan));
+            (found.makespan, counts.work)
+        };
+        let (first, cleaned) = (run(&[Technique::Cleanup]), run(&[]));
+        assert!(cleaned.0 <= first.0);
+        assert!(cleaned.1 <= 3 * first.1, "{} after {}", cleaned.1, first.1);
     }
 }

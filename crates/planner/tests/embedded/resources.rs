@@ -1,8 +1,13 @@
 //! Numbers that are used up, lent out, and filled up again.
 
-use elbowroom_planner::Answer;
+use std::ops::ControlFlow;
 
-use crate::world::{answer, answer_with_self_overlap, describe, makespan};
+use elbowroom_model::Situation;
+use elbowroom_planner::{Answer, Settings, Technique, plan};
+
+use crate::world::{
+    answer, answer_with_self_overlap, answer_without_cleanup, describe, makespan, task,
+};
 
 /// A hand-truck pair is lent out for a while; moving the piano takes two of them at once.
 #[test]
@@ -61,13 +66,61 @@ fn road(length: usize, capacity: usize) -> (String, String) {
 #[test]
 fn what_a_relaxed_plan_uses_up_is_filled_up_before() {
     let (domain, problem) = road(6, 12);
-    let answer = answer(&domain, &problem);
+    let answer = answer_without_cleanup(&domain, &problem);
     let Answer::Plan { counts, .. } = &answer else {
         panic!("{}", describe(&answer));
     };
     // Nothing else tells the rover to charge before it is stranded: without counting what is used
     // up, this takes ten times as many states.
     assert!(counts.evaluated < 150, "{} states", counts.evaluated);
+}
+
+/// The battery drains while the rover drives, and is charged for as long as it takes. Its actions exclude each
+/// other.
+#[test]
+fn continuous_drain_is_filled_up_before() {
+    let (domain, problem) = road(8, 20);
+    let domain = domain
+        .replace(
+            "(at start (at ?p)) (at start (next",
+            "(at start (idle)) (at start (at ?p)) (at start (next",
+        )
+        .replace("(at start (>= (battery) 1))", "(over all (>= (battery) 0))")
+        .replace(
+            "(at start (decrease (battery) 1))",
+            "(at start (not (idle))) (at end (idle)) (decrease (battery) (* #t 0.5))",
+        )
+        .replace(
+            ":duration (= ?duration 3)",
+            ":duration (and (>= ?duration 1) (<= ?duration 30))",
+        )
+        .replace(
+            "(at start (< (battery) (capacity)))",
+            "(over all (<= (battery) (capacity)))",
+        )
+        .replace(
+            "(at end (increase (battery) 1))",
+            "(increase (battery) (* #t 1))",
+        );
+    let count = |without: &[Technique]| {
+        let task = task(&domain, &problem);
+        let mut settings = Settings {
+            first_plan_only: true,
+            ..Settings::default()
+        };
+        settings.tuning.without.push(Technique::Cleanup);
+        settings.tuning.without.extend(without);
+        let situation = Situation::initial(&task);
+        let answer = plan(&task, &situation, &settings, &mut |_| {
+            ControlFlow::Continue(())
+        });
+        let Answer::Plan { counts, .. } = &answer else {
+            panic!("{}", describe(&answer));
+        };
+        counts.evaluated
+    };
+    let (with, without) = (count(&[]), count(&[Technique::ContinuousDrains]));
+    assert!(4 * with < without, "{with} states, {without} without");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use elbowroom_model::{Situation, Task};
 use elbowroom_pddl::{Source, read_problem};
-use elbowroom_planner::{Answer, Settings, plan};
+use elbowroom_planner::{Answer, Settings, Technique, plan};
 
 /// The task of a domain's and a problem's inner parts.
 pub(crate) fn task(domain: &str, problem: &str) -> Task {
@@ -45,6 +45,14 @@ pub(crate) fn answer(domain: &str, problem: &str) -> Answer {
     let task = task(domain, problem);
     let situation = Situation::initial(&task);
     answer_from(&task, &situation, 400)
+}
+
+/// The same without clean-up, so that the counts are those of the first plan.
+pub(crate) fn answer_without_cleanup(domain: &str, problem: &str) -> Answer {
+    let task = task(domain, problem);
+    let mut settings = Settings::default();
+    settings.tuning.without.push(Technique::Cleanup);
+    answer_by(&task, &Situation::initial(&task), 400, &settings)
 }
 
 /// The same, with self-overlap allowed.

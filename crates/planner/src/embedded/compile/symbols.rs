@@ -152,6 +152,11 @@ impl Symbols {
         }
     }
 
+    /// The number of the test `difference comparison 0`.
+    pub(super) fn linear_test(&mut self, comparison: Comparison, difference: Linear) -> u32 {
+        self.test(normal(comparison, Numeric::Linear(difference)))
+    }
+
     /// The number of a test.
     fn test(&mut self, test: Test) -> u32 {
         let next = narrow(self.tests.len());

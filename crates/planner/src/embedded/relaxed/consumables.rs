@@ -12,8 +12,9 @@ use elbowroom_num::Rational;
 
 use super::super::compile::{Change, Compiled, NONE};
 use super::super::state::State;
+use super::changes::changes_by;
 use super::graph::{Gain, Graph, Kind};
-use super::resources::{amounts, note_floors, snaps_of};
+use super::resources::note_floors;
 
 /// Something that steps use up and nothing fills up.
 #[derive(Clone, Debug)]
@@ -111,7 +112,7 @@ impl Consumables {
                 kind => [Kind::Axiom, kind],
             };
             for kind in kinds.into_iter().filter(|_| operator.is_step) {
-                for (fluent, amount) in snaps_of(compiled, kind).into_iter().flat_map(amounts) {
+                for (fluent, amount) in changes_by(compiled, kind) {
                     if let Some(place) = list
                         .iter()
                         .position(|consumable| consumable.fluent == fluent)

@@ -17,6 +17,30 @@ pub(super) fn gap(compiled: &Compiled, test: u32, state: &State) -> f64 {
     }
 }
 
+/// The gap of a test that fails even where the only fluent that it reads has its highest level. `None` if it may
+/// pass.
+pub(super) fn gap_of_levels(
+    compiled: &Compiled,
+    test: u32,
+    levels: &[(u32, Rational)],
+) -> Option<f64> {
+    let test = &compiled.tests[test as usize];
+    let Numeric::Linear(linear) = &test.difference else {
+        return None;
+    };
+    let [(fluent, coefficient)] = &linear.terms[..] else {
+        return None;
+    };
+    let is_lower = matches!(test.comparison, Comparison::AtLeast | Comparison::Greater);
+    if is_lower != coefficient.is_positive() || !linear.duration.is_zero() {
+        return None;
+    }
+    let (_, level) = levels.iter().find(|(own, _)| own == fluent)?;
+    let difference = coefficient * level + &linear.constant;
+    let fails = !test.comparison.holds(&difference, &Rational::ZERO);
+    fails.then(|| strictly(test.comparison) - difference.to_f64())
+}
+
 /// How often a change must happen to close a gap; `None` if it never will.
 fn repetitions(gap: f64, gain: f64) -> Option<u32> {
     if gap.is_nan() || (gap > 0.0) != (gain > 0.0) {

@@ -31,8 +31,9 @@ impl Relaxed<'_> {
         if !self.consumables.is_empty() && self.consumables.are_overdrawn() {
             estimate.steps += OVERDRAWN;
         }
+        let mut later = Vec::new();
         if !self.resources.is_empty() {
-            self.fill_up(state, &mut wanted, &mut used, &mut touched, estimate);
+            later = self.fill_up(state, &mut wanted, &mut used, &mut touched, estimate);
         }
         for &operator in &used {
             let data = &self.graph.operators[operator as usize];
@@ -45,6 +46,7 @@ impl Relaxed<'_> {
                 estimate.actions.push(action);
             }
             let is_next = self.operator_cost[operator as usize] == own;
+            let is_next = is_next && !later.contains(&operator);
             if is_next || matches!(data.kind, Kind::Timed(_)) {
                 push_steps(data.kind, state, &mut estimate.preferred);
             }
@@ -165,7 +167,8 @@ impl Relaxed<'_> {
         true
     }
 
-    /// Adds what fills up the resources that the relaxed plan uses up.
+    /// Adds what fills up the resources that the relaxed plan uses up. Returns the operators that are not worth
+    /// a step before something is used up.
     fn fill_up(
         &mut self,
         state: &State,
@@ -173,8 +176,9 @@ impl Relaxed<'_> {
         used: &mut Vec<u32>,
         touched: &mut Vec<u32>,
         estimate: &mut Estimate,
-    ) {
-        self.resources.begin(state);
+    ) -> Vec<u32> {
+        let mut later = Vec::new();
+        self.resources.begin(self.compiled, state);
         let mut noted = 0;
         loop {
             for &operator in &used[noted..] {
@@ -184,10 +188,13 @@ impl Relaxed<'_> {
             let (missing, costs) = (&self.missing, &self.operator_cost);
             let cost = |o: u32| (missing[o as usize] == 0).then(|| costs[o as usize]);
             let Some(shortage) = self.resources.shortage(cost) else {
-                break;
+                return later;
             };
             let data = &self.graph.operators[shortage.operator as usize];
             let is_new = Self::use_operator(&mut self.is_used, used, shortage.operator);
+            if is_new && shortage.is_later {
+                later.push(shortage.operator);
+            }
             let more = shortage.times - u32::from(is_new);
             self.resources.note(shortage.operator, more);
             estimate.steps += more * data.cost;

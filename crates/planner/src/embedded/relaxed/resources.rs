@@ -6,21 +6,33 @@
 //! is LPRPG's idea; Coles, Fox, Long & Smith, ICAPS 2008. Here no linear program is solved, only
 //! the sum over one relaxed plan is looked at.)
 
-use elbowroom_model::problem::{Comparison, UpdateOperator};
+use elbowroom_model::problem::Comparison;
+use elbowroom_num::Rational;
 
-use super::super::compile::{Action, Compiled, NONE, Snap};
+use super::super::compile::{Action, Compiled};
 use super::super::formula::{Formula, Numeric};
 use super::super::state::State;
-use super::graph::{Graph, Kind};
+use super::super::symbolic;
+use super::super::tuning::Technique;
+use super::changes::{changes, changes_by};
+use super::graph::Graph;
+
+/// The most that fits into a reservoir without a capacity.
+const UNBOUNDED: f64 = 1e12;
 
 /// A fluent that some steps use up, and must not run out of.
 #[derive(Clone, Debug)]
 struct Resource {
-    fluent: u32,
-    /// The amount that must remain.
-    floor: f64,
+    reservoir: Reservoir,
     /// The operators that fill it up, and by how much.
     feeds: Vec<(u32, f64)>,
+}
+
+impl Resource {
+    /// The most that fits into it.
+    fn size(&self) -> f64 {
+        (self.reservoir.ceiling - self.reservoir.floor).clamp(0.0, UNBOUNDED)
+    }
 }
 
 /// A shortage of a resource in a relaxed plan.
@@ -30,6 +42,8 @@ pub(super) struct Shortage {
     pub(super) operator: u32,
     /// How often it is needed, besides what the plan has.
     pub(super) times: u32,
+    /// `true` if the state has no room for it, or little: it is for later.
+    pub(super) is_later: bool,
 }
 
 /// The resources of a problem.
@@ -38,6 +52,8 @@ pub(super) struct Resources {
     list: Vec<Resource>,
     /// For each operator what it adds to resources, or, negative, takes.
     changes: Vec<Vec<(usize, f64)>>,
+    /// The amount of each in the state, less its floor.
+    levels: Vec<f64>,
     /// The amount of each that a relaxed plan leaves.
     left: Vec<f64>,
     is_settled: Vec<bool>,
@@ -47,11 +63,10 @@ impl Resources {
     pub(super) fn of(compiled: &Compiled, graph: &Graph) -> Self {
         let mut resources = Self::default();
         let mut place = vec![None; compiled.fluents.len()];
-        for (fluent, floor) in floors(compiled) {
-            place[fluent as usize] = Some(resources.list.len());
+        for reservoir in reservoirs(compiled) {
+            place[reservoir.fluent as usize] = Some(resources.list.len());
             resources.list.push(Resource {
-                fluent,
-                floor,
+                reservoir,
                 feeds: Vec::new(),
             });
         }
@@ -61,12 +76,10 @@ impl Resources {
         for (number, operator) in (0..).zip(&graph.operators) {
             let mut changes: Vec<(usize, f64)> = Vec::new();
             // An operator for a conditional effect has no other effects.
-            let snaps = if operator.is_step {
-                snaps_of(compiled, operator.kind)
-            } else {
-                Vec::new()
-            };
-            for (fluent, amount) in snaps.into_iter().flat_map(amounts) {
+            let own = operator
+                .is_step
+                .then(|| changes_by(compiled, operator.kind));
+            for (fluent, amount) in own.into_iter().flatten() {
                 let Some(place) = place[fluent as usize] else {
                     continue;
                 };
@@ -74,6 +87,9 @@ impl Resources {
                     Some(change) => change.1 += amount,
                     None => changes.push((place, amount)),
                 }
+            }
+            for (place, amount) in &mut changes {
+                *amount = amount.min(resources.list[*place].size());
             }
             for &(place, amount) in changes.iter().filter(|change| change.1 > 0.0) {
                 resources.list[place].feeds.push((number, amount));
@@ -88,16 +104,24 @@ impl Resources {
         self.list.is_empty()
     }
 
-    /// A new relaxed plan begins.
-    pub(super) fn begin(&mut self, state: &State) {
-        self.left.clear();
+    /// Begins a new relaxed plan. The continuous changes of running actions count as complete.
+    pub(super) fn begin(&mut self, compiled: &Compiled, state: &State) {
+        self.levels.clear();
         self.is_settled.clear();
-        for resource in &self.list {
-            let value = state.values[resource.fluent as usize].as_ref();
-            self.left
-                .push(value.map_or(f64::INFINITY, |value| value.to_f64() - resource.floor));
+        for Resource { reservoir, .. } in &self.list {
+            let level = match &state.values[reservoir.fluent as usize] {
+                Some(value) => value.to_f64(),
+                None if compiled.tuning.uses(Technique::ContinuousDrains) => {
+                    let highest = symbolic::highest_level(compiled, state, reservoir.fluent);
+                    let highest = highest.map_or(f64::INFINITY, |level| level.to_f64());
+                    highest.min(reservoir.ceiling)
+                }
+                None => f64::INFINITY,
+            };
+            self.levels.push(level - reservoir.floor);
             self.is_settled.push(false);
         }
+        self.left.clone_from(&self.levels);
     }
 
     /// The relaxed plan has an operator, so many times.
@@ -128,85 +152,101 @@ impl Resources {
                 reason = "clamped to a small positive range"
             )]
             let times = (-self.left[place] / amount).ceil().clamp(1.0, 1000.0) as u32;
-            return Some(Shortage { operator, times });
+            let room = resource.size() - self.levels[place];
+            return Some(Shortage {
+                operator,
+                times,
+                is_later: room < amount.min(resource.size() / 2.0),
+            });
         }
         None
     }
 }
 
-pub(super) fn snaps_of(compiled: &Compiled, kind: Kind) -> Vec<&Snap> {
-    let numbers = match kind {
-        Kind::Start(action) => vec![compiled.action(action).start],
-        Kind::End(action) => vec![compiled.action(action).end],
-        Kind::Compressed(action) => {
-            let action = compiled.action(action);
-            vec![action.start, action.end]
-        }
-        Kind::Timed(_) | Kind::Axiom => Vec::new(),
-    };
-    numbers.into_iter().map(|n| compiled.snap(n)).collect()
+/// A fluent that is used up and filled up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Reservoir {
+    pub(crate) fluent: u32,
+    /// The amount that must remain.
+    pub(crate) floor: f64,
+    /// The highest value at the beginning or after an action that fills it up; infinite if it has no bound.
+    pub(crate) ceiling: f64,
 }
 
-/// The constants that a happening adds to fluents.
-pub(super) fn amounts(snap: &Snap) -> impl Iterator<Item = (u32, f64)> + '_ {
-    snap.updates.iter().filter_map(|update| {
-        let amount = update.value.as_constant()?.to_f64();
-        match update.operator {
-            UpdateOperator::Increase => Some((update.fluent, amount)),
-            UpdateOperator::Decrease => Some((update.fluent, -amount)),
-            _ => None,
-        }
-    })
-}
-
-/// The fluents that are used up and filled up, with what has to be left of them.
-pub(crate) fn floors(compiled: &Compiled) -> Vec<(u32, f64)> {
+/// The fluents that are used up and filled up.
+pub(crate) fn reservoirs(compiled: &Compiled) -> Vec<Reservoir> {
     let mut floors: Vec<Option<f64>> = vec![None; compiled.fluents.len()];
+    let mut ceilings: Vec<Option<f64>> = vec![None; compiled.fluents.len()];
     for action in &compiled.actions {
         note_floors(compiled, action, &mut floors);
+        note_ceilings(compiled, action, &mut ceilings);
     }
-    let mut is_filled_up = vec![false; compiled.fluents.len()];
-    for (fluent, _) in compiled
-        .snaps
-        .iter()
-        .flat_map(amounts)
-        .filter(|c| c.1 > 0.0)
-    {
-        is_filled_up[fluent as usize] = true;
-    }
-    let floors = (0..).zip(floors).zip(is_filled_up);
-    floors
-        .filter(|&(_, is_filled_up)| is_filled_up)
-        .filter_map(|((fluent, floor), _)| Some((fluent, floor?)))
-        .collect()
+    let bounds = (0..).zip(floors.into_iter().zip(ceilings));
+    let reservoirs = bounds.filter_map(|(fluent, (floor, ceiling))| {
+        let initial = compiled.beginning.values[fluent as usize].as_ref();
+        let initial = initial.map_or(f64::INFINITY, Rational::to_f64);
+        Some(Reservoir {
+            fluent,
+            floor: floor?,
+            ceiling: ceiling?.max(initial),
+        })
+    });
+    reservoirs.collect()
 }
 
 /// Notes what has to be left of the fluents that the action uses up: the least that some action
 /// leaves.
 pub(super) fn note_floors(compiled: &Compiled, action: &Action, floors: &mut [Option<f64>]) {
-    for number in [action.start, action.end] {
-        if number == NONE {
-            continue;
-        }
-        let snap = compiled.snap(number);
-        for (fluent, amount) in amounts(snap).filter(|change| change.1 < 0.0) {
-            let before = least(compiled, &snap.condition, fluent).map(|least| least + amount);
-            let after = least(compiled, &action.over_all, fluent);
-            let floor = match (before, after) {
-                (Some(before), Some(after)) => Some(before.max(after)),
-                (before, after) => before.or(after),
-            };
-            if let Some(floor) = floor {
-                let known = &mut floors[fluent as usize];
-                *known = Some(known.map_or(floor, |known| known.min(floor)));
-            }
+    for change in changes(compiled, action).filter(|change| change.amount < 0.0) {
+        let (fluent, amount) = (change.fluent, change.amount);
+        let mut before = change.before(compiled, action);
+        let before = before.find_map(|before| least(compiled, before, (fluent, amount)));
+        let after = least(compiled, &action.over_all, (fluent, 0.0));
+        let floor = match (before, after) {
+            (Some(before), Some(after)) => Some(before.max(after)),
+            (before, after) => before.or(after),
+        };
+        if let Some(floor) = floor {
+            let known = &mut floors[fluent as usize];
+            *known = Some(known.map_or(floor, |known| known.min(floor)));
         }
     }
 }
 
-/// The least value of a fluent that a condition asks for.
-fn least(compiled: &Compiled, condition: &Formula, fluent: u32) -> Option<f64> {
-    let bounds = condition.tests.iter().filter_map(|&test| {
+/// Notes the highest values of the fluents that the action fills up.
+fn note_ceilings(compiled: &Compiled, action: &Action, ceilings: &mut [Option<f64>]) {
+    for change in changes(compiled, action).filter(|change| change.amount > 0.0) {
+        let (fluent, amount) = (change.fluent, change.amount);
+        let mut before = change.before(compiled, action);
+        let bounds = [
+            before.find_map(|before| most(compiled, before, (fluent, amount))),
+            most(compiled, &action.over_all, (fluent, 0.0)),
+        ];
+        let ceiling = bounds.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        let known = &mut ceilings[fluent as usize];
+        *known = Some(known.map_or(ceiling, |known| known.max(ceiling)));
+    }
+}
+
+/// The least value of a fluent that a condition leaves after a change.
+fn least(compiled: &Compiled, condition: &Formula, change: (u32, f64)) -> Option<f64> {
+    bounds(compiled, condition, change, true).max_by(f64::total_cmp)
+}
+
+/// The highest value of a fluent that a condition allows after a change.
+fn most(compiled: &Compiled, condition: &Formula, change: (u32, f64)) -> Option<f64> {
+    bounds(compiled, condition, change, false).min_by(f64::total_cmp)
+}
+
+/// The lower or the upper bounds on a fluent after a change, by the conjuncts of a condition before it. One that
+/// reads `?duration` as well is taken to be about the sum already.
+fn bounds(
+    compiled: &Compiled,
+    condition: &Formula,
+    (fluent, amount): (u32, f64),
+    are_lower: bool,
+) -> impl Iterator<Item = f64> {
+    condition.tests.iter().filter_map(move |&test| {
         let test = &compiled.tests[test as usize];
         let Numeric::Linear(linear) = &test.difference else {
             return None;
@@ -214,14 +254,26 @@ fn least(compiled: &Compiled, condition: &Formula, fluent: u32) -> Option<f64> {
         let [(read, coefficient)] = &linear.terms[..] else {
             return None;
         };
-        let is_lower = matches!(test.comparison, Comparison::AtLeast | Comparison::Greater);
-        let applies = *read == fluent && is_lower && coefficient.is_positive();
-        // What is more than a bound is a little more.
-        let strictly = match test.comparison {
-            Comparison::Greater => 1e-6,
-            _ => 0.0,
+        let (is_at_least, is_strict) = match test.comparison {
+            Comparison::AtLeast => (true, false),
+            Comparison::Greater => (true, true),
+            Comparison::AtMost => (false, false),
+            Comparison::Less => (false, true),
+            Comparison::Equal => return None,
         };
-        applies.then(|| strictly - linear.constant.to_f64() / coefficient.to_f64())
-    });
-    bounds.max_by(f64::total_cmp)
+        let is_lower = is_at_least == coefficient.is_positive();
+        // What is more than a bound is a little more.
+        let strictly = match (is_strict, is_lower) {
+            (false, _) => 0.0,
+            (true, true) => 1e-6,
+            (true, false) => -1e-6,
+        };
+        let bound = strictly - linear.constant.to_f64() / coefficient.to_f64();
+        let amount = if linear.duration.is_zero() {
+            amount
+        } else {
+            0.0
+        };
+        (*read == fluent && is_lower == are_lower).then_some(bound + amount)
+    })
 }

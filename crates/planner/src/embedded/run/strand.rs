@@ -25,7 +25,7 @@ const REPORT_WORK: u64 = 2_000_000;
 const TURN_WORK: u64 = 8_000;
 
 /// Work that is counted for an operator of an estimate.
-const OPERATOR_WORK: u64 = 5;
+pub(super) const OPERATOR_WORK: u64 = 5;
 
 /// The number of looked-up pairs that lie between two reports at most: some milliseconds.
 const REPORT_LOOKUPS: u64 = 4_000_000;
@@ -45,6 +45,31 @@ pub(in super::super) struct Frame<'a> {
     pub(in super::super) situation: &'a Situation,
     pub(in super::super) settings: &'a Settings,
     pub(in super::super) compiled: &'a Compiled,
+    /// The most work between two reports, in operators of estimates.
+    pub(super) report_work: u64,
+}
+
+impl<'a> Frame<'a> {
+    pub(in super::super) fn new(
+        (task, constrained): (&'a Task, Option<&'a Task>),
+        situation: &'a Situation,
+        settings: &'a Settings,
+        compiled: &'a Compiled,
+    ) -> Self {
+        Self {
+            task,
+            constrained,
+            situation,
+            settings,
+            compiled,
+            report_work: REPORT_WORK,
+        }
+    }
+
+    /// Limits the work between two reports, in units of [`work`].
+    pub(super) fn limit_report_work(&mut self, most: u64) {
+        self.report_work = (most / OPERATOR_WORK).clamp(1, REPORT_WORK);
+    }
 }
 
 /// A plan, and the choices that it comes from.
@@ -256,7 +281,7 @@ impl<'a, 't> Strand<'a, 't> {
                 }
             }
             is_report_due |= search.labour() - reported.0 >= most_turns
-                || self.unreported + work_since(search, reported) >= REPORT_WORK;
+                || self.unreported + work_since(search, reported) >= self.frame.report_work;
             if is_report_due {
                 spend_since(search, reported);
                 reported = (search.labour(), search.lookups());
@@ -295,7 +320,7 @@ impl<'a, 't> Strand<'a, 't> {
         self.counts.evaluated = before + evaluated;
         work::spend(OPERATOR_WORK * work);
         self.unreported += work;
-        self.unreported < REPORT_WORK || self.ask()
+        self.unreported < self.frame.report_work || self.ask()
     }
 
     /// Asks the judge about the plan of these choices, and tells of it if it is better than the best.
@@ -306,6 +331,7 @@ impl<'a, 't> Strand<'a, 't> {
             situation,
             settings,
             compiled,
+            ..
         } = self.frame;
         let judged = extract::plan_of(task, situation, compiled, steps, &mut || self.ask());
         if self.is_stopped {

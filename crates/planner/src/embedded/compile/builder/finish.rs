@@ -14,11 +14,12 @@ use elbowroom_num::Rational;
 use super::super::beginning::{Beginning, has_values_to_change, running};
 use super::super::compressibility::{compressibility, readers};
 use super::super::directions::Shifts;
+use super::super::exclusive::{self, implied_tests};
 use super::super::interference::{Access, Annotations, Separations, TimedSeparations};
 use super::super::metric::{Metric, only_grows};
 use super::super::rules::stratified;
 use super::super::times::is_symbolic;
-use super::super::{Compiled, NONE, Rule, Snap, Timed, completeness, compression};
+use super::super::{Compiled, Compressibility, NONE, Rule, Snap, Timed, completeness, compression};
 use super::{Builder, Wanted, narrow};
 use crate::embedded::formula::Literal;
 use crate::embedded::time::{Scale, Ticks};
@@ -69,7 +70,8 @@ impl Builder<'_> {
             return None;
         }
         self.note_compression_safe(&annotations, &timed, !strata.is_empty());
-        self.note_compressibility();
+        let counts_drains = is_symbolic && wanted.tuning.uses(Technique::ContinuousDrains);
+        let exclusive = self.compile_drains(situation, &timed, &strata, counts_drains);
         let timed_until_goal = self.timed_until_goal(grounding, &coming);
         let (metric, cost) = self.metric(situation, &timed);
         if !goes_on() {
@@ -122,6 +124,7 @@ impl Builder<'_> {
             fact_annotations,
             facts,
             fluents: self.symbols.fluents,
+            exclusive_fluents: exclusive,
             tests: self.symbols.tests,
             snaps: self.snaps,
             actions: self.actions,
@@ -302,16 +305,84 @@ impl Builder<'_> {
         }
     }
 
-    fn note_compressibility(&mut self) {
+    /// Settles which actions may be compressed, and compiles continuous changes of exclusive fluents to their ends.
+    /// Returns for each fluent whether it is exclusive.
+    fn compile_drains(
+        &mut self,
+        situation: &Situation,
+        timed: &[Timed],
+        strata: &[Vec<Rule>],
+        counts_drains: bool,
+    ) -> Vec<bool> {
+        let mut exclusive = vec![false; self.symbols.fluents.len()];
+        if counts_drains {
+            exclusive = self.exclusive_fluents(situation, timed, strata);
+            self.add_implied_tests(&exclusive);
+        }
+        self.note_compressibility(&exclusive, counts_drains);
+        exclusive
+    }
+
+    /// For each fluent, whether continuous changes of it concern one action at a time.
+    fn exclusive_fluents(
+        &self,
+        situation: &Situation,
+        timed: &[Timed],
+        strata: &[Vec<Rule>],
+    ) -> Vec<bool> {
+        let facts = self.symbols.facts.iter();
+        let holds: Vec<bool> = facts
+            .map(|fact| situation.state.facts.contains(fact))
+            .collect();
+        let parts = exclusive::Parts {
+            actions: &self.actions,
+            snaps: &self.snaps,
+            timed,
+            strata,
+            symbols: &self.symbols,
+            holds: &holds,
+        };
+        parts.exclusive_fluents()
+    }
+
+    /// Adds what continuous changes demand to the conditions of starts.
+    fn add_implied_tests(&mut self, exclusive: &[bool]) {
+        for action in self
+            .actions
+            .iter()
+            .filter(|action| !action.flows.is_empty())
+        {
+            let implied = implied_tests(action, exclusive, &self.snaps, &self.symbols.tests);
+            for (comparison, difference) in implied {
+                let test = self.symbols.linear_test(comparison, difference);
+                let tests = &mut self.snaps[action.start as usize].condition.tests;
+                if !tests.contains(&test) {
+                    tests.push(test);
+                }
+            }
+        }
+    }
+
+    /// `exclusive`: see [`exclusive`].
+    fn note_compressibility(&mut self, exclusive: &[bool], compresses_flows: bool) {
         let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
         for (number, action) in self.actions.iter_mut().enumerate() {
-            // What changes continuously is there to be read meanwhile.
-            if action.start == NONE || action.end == NONE || !action.flows.is_empty() {
+            if action.start == NONE || action.end == NONE {
                 continue;
             }
             let snaps = [action.start, action.end].map(|snap| &self.snaps[snap as usize]);
             let offers = |l: Literal| readers[l.index()].has_other_than(narrow(number));
             action.compressibility = compressibility(snaps[0], snaps[1], &offers);
+            // What changes continuously may be there to be read meanwhile.
+            let mut flows = action.flows.iter();
+            if flows.any(|flow| !exclusive[flow.fluent as usize]) {
+                let most = if compresses_flows {
+                    Compressibility::HoldsResource
+                } else {
+                    Compressibility::Envelope
+                };
+                action.compressibility = action.compressibility.min(most);
+            }
         }
     }
 

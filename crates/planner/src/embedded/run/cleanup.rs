@@ -1,0 +1,87 @@
+//! Clean-up of the first plan, where the caller asks for no other one.
+//!
+//! Better plans are looked for near the first plan, for a share of the work that it took and at most as many
+//! states. Then the best plan is reported. It has few needless and back-and-forth actions.
+
+use super::super::answer::{Counts, Stopped};
+use super::super::tuning::Technique;
+use super::Planner;
+use super::refining::Nearby;
+use super::strand::{OPERATOR_WORK, Strand};
+
+/// The number of times in a clean-up that its work is compared with the limit.
+const REPORTS: u64 = 16;
+
+/// The least states of a first plan that is cleaned up: below that, the preparation takes longer than the plan took.
+const LEAST_STATES: u64 = 64;
+
+/// The work of a clean-up is this part of the work up to the first plan: a unit near a plan takes several times as
+/// long as one of a search.
+const SHARE: u64 = 4;
+
+impl Planner<'_> {
+    /// Returns `true` if the first plan is held back until it has been cleaned up. Where actions may have to run at
+    /// the same time, networks are large, and steps near a plan take much longer than their counted work.
+    pub(super) fn cleans_up(&self) -> bool {
+        let compiled = self.frame.compiled;
+        self.frame.settings.first_plan_only
+            && !compiled.is_symbolic
+            && !self.needs_concurrency()
+            && compiled.tuning.uses(Technique::Cleanup)
+    }
+
+    /// Returns `true` if a plan ends the run.
+    pub(super) fn is_first_plan_enough(&self) -> bool {
+        self.frame.settings.first_plan_only && self.cleanup_limit.is_none()
+    }
+
+    /// Returns `true` if the clean-up has taken its share of the work, or as many states as the first plan.
+    pub(super) fn is_cleanup_over(&self) -> bool {
+        let counts = &self.progress.counts;
+        let is_over =
+            |limit: &Counts| counts.work >= limit.work || counts.evaluated >= limit.evaluated;
+        self.cleanup_limit.as_ref().is_some_and(is_over)
+    }
+
+    /// Looks for better plans near the first one.
+    pub(super) fn clean_up(&mut self) {
+        let Counts {
+            work, evaluated, ..
+        } = self.progress.counts;
+        if evaluated < LEAST_STATES {
+            return;
+        }
+        self.stopped = None;
+        self.cleanup_limit = Some(Counts {
+            work: work + work / SHARE,
+            evaluated: 2 * evaluated,
+            ..Counts::default()
+        });
+        let most = work / SHARE;
+        self.frame.limit_report_work(most / REPORTS);
+        let (frame, best, unreported) = (self.frame, self.best.clone(), self.unreported);
+        let mut nearby = Nearby::new(frame.compiled, 1);
+        let memory = frame.settings.max_memory;
+        nearby.limit_memory(memory.saturating_sub(self.progress.counts.memory));
+        let (newest, mut base) = (self.finds, self.progress.counts);
+        let mut hear = |report| self.hear(&mut base, report);
+        let mut strand = Strand::new(frame, best, unreported, &mut hear);
+        strand.refine(&mut nearby, newest, most / OPERATOR_WORK);
+        self.unreported = strand.end(false);
+        if self.stopped != Some(Stopped::Interrupted) {
+            self.stopped = Some(Stopped::FirstPlan);
+        }
+    }
+
+    /// Reports the best plan, if it was held back. A caller that interrupted the run has it in the answer.
+    pub(super) fn report_held_back(&mut self) {
+        if self.cleans_up()
+            && self.stopped != Some(Stopped::Interrupted)
+            && let Some(best) = self.best.clone()
+        {
+            self.show(&best);
+            // The run ends in any case.
+            self.tell(None);
+        }
+    }
+}
