@@ -31,7 +31,7 @@ from unified_planning.exceptions import UPUsageError
 from unified_planning.model import ProblemKind
 from unified_planning.plans import PlanKind, STNPlan
 
-from ._answers import NoPlan, Plan
+from ._answers import NoPlan, Plan, Step
 from ._errors import ReadError, UnsupportedError
 from ._up_apart import apart
 from ._up_stn import stn_plan, stn_text
@@ -223,7 +223,7 @@ class ElbowroomPlanner(
     def _with_plan(self, translated: Translation, found: Plan) -> PlanGenerationResult:
         """The result where a plan was found, if it keeps unified-planning's rules."""
         status = PlanGenerationResultStatus
-        steps = apart(translated, found.steps)
+        steps = apart(translated, [_on_time(translated, step) for step in found.steps])
         if steps is None:
             text = (
                 "no plan found: the one that was found has steps that write the same fact at one time, "
@@ -233,7 +233,8 @@ class ElbowroomPlanner(
             return PlanGenerationResult(
                 status.UNSOLVABLE_INCOMPLETELY, None, self.name, log_messages=[message]
             )
-        metrics = {"makespan": str(max((s.start + (s.duration or 0) for s in steps), default=0))}
+        ends = (s.start + (s.duration or 0) for s in steps if s.action not in translated.timed_actions)
+        metrics = {"makespan": str(max(ends, default=0))}
         plan: Any = translated.plan_back(steps)
         if self._plan_kind == "stn" and plan.kind == PlanKind.TIME_TRIGGERED_PLAN:
             plan = stn_plan(translated, translated.steps(plan))
@@ -365,17 +366,27 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
         return CREDITS
 
     def _validate(self, problem: Any, plan: Any) -> ValidationResult:
-        translated = Translation(problem)
-        if isinstance(plan, STNPlan):
-            return self._validate_network(translated, plan)
-        verdict = translated.check(translated.steps(plan))
-        if verdict.violation is None:
+        try:
+            translated = Translation(problem)
+            if isinstance(plan, STNPlan):
+                return self._validate_network(translated, plan)
+            steps = translated.steps(plan)
+        except UnsupportedError as error:
+            message = LogMessage(LogLevel.ERROR, str(error))
+            return ValidationResult(ValidationResultStatus.UNKNOWN, self.name, [message])
+        verdict = translated.check(steps)
+        if verdict:
             return ValidationResult(ValidationResultStatus.VALID, self.name, [])
         violation = verdict.violation
+        if violation is None:
+            message = LogMessage(LogLevel.INFO, str(verdict))
+            return ValidationResult(ValidationResultStatus.UNKNOWN, self.name, [message])
         is_goal = violation.action is None
         reason = FailedValidationReason
         message = LogMessage(LogLevel.INFO, violation.message)
-        instance = None if is_goal else translated.instance(str(violation.action))
+        instance = None
+        if not is_goal and violation.action not in translated.timed_actions:
+            instance = translated.instance(str(violation.action))
         return ValidationResult(
             ValidationResultStatus.INVALID,
             self.name,
@@ -391,6 +402,11 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
             return ValidationResult(ValidationResultStatus.VALID, self.name, [])
         message = LogMessage(LogLevel.INFO, found.why_not or found.answer)
         return ValidationResult(ValidationResultStatus.INVALID, self.name, [message])
+
+
+def _on_time(translated: Translation, step: Step) -> Step:
+    """A step, at its time if it stands for timed effects."""
+    return step._replace(start=translated.timed_actions.get(step.action, step.start))
 
 
 def _left(timeout: float | None, begun: float) -> float | None:
