@@ -28,7 +28,7 @@ from unified_planning.engines.mixins import (
 from unified_planning.engines.mixins.oneshot_planner import OptimalityGuarantee
 from unified_planning.engines.results import FailedValidationReason
 from unified_planning.exceptions import UPUsageError
-from unified_planning.model import ProblemKind
+from unified_planning.model import AbstractProblem, ProblemKind
 from unified_planning.plans import PlanKind, STNPlan
 
 from ._answers import NoPlan, Plan, Step
@@ -49,13 +49,16 @@ CREDITS = Credits(
 )
 
 
+_LONGEST = 1e9
+"""Seconds, longer than any search: larger time limits, infinite ones among them, mean the same."""
+
+
 def _common_kind() -> ProblemKind:
     kind = ProblemKind(version=2)
     kind.set_problem_class("ACTION_BASED")
     for feature in ("SIMPLE_NUMERIC_PLANNING", "GENERAL_NUMERIC_PLANNING"):
         kind.set_problem_type(feature)
-    for feature in ("CONTINUOUS_TIME", "DISCRETE_TIME", "TIMED_EFFECTS", "DURATION_INEQUALITIES",
-                    "SELF_OVERLAPPING"):  # fmt: skip
+    for feature in ("CONTINUOUS_TIME", "TIMED_EFFECTS", "DURATION_INEQUALITIES", "SELF_OVERLAPPING"):
         kind.set_time(feature)
     for feature in ("STATIC_FLUENTS_IN_DURATIONS", "FLUENTS_IN_DURATIONS", "INT_TYPE_DURATIONS",
                     "REAL_TYPE_DURATIONS"):  # fmt: skip
@@ -107,6 +110,9 @@ class ElbowroomPlanner(
         time_limit: float | None = None,
         **unknown: Any,
     ) -> None:
+        if not isinstance(problem, (AbstractProblem, type(None))):
+            # Only replanners are made for a problem.
+            unknown = {"problem": problem, **unknown}
         _refuse_unknown(unknown, "elbowroom", ("plan", "jobs", "memory", "seed", "time_limit"))
         Engine.__init__(self)
         OneshotPlannerMixin.__init__(self)
@@ -116,7 +122,10 @@ class ElbowroomPlanner(
         self._plan_kind = plan
         self._last: Any = None
         _whole("seed", seed, None)
-        self._options: dict[str, Any] = {"jobs": _whole("jobs", jobs, 0), "memory": _whole("memory", memory, 1 << 20)}
+        self._options: dict[str, Any] = {
+            "jobs": _whole("jobs", jobs, range(1 << 16)),
+            "memory": _whole("memory", memory, range(1 << 20, 1 << 63)),
+        }
         self._time_limit = _positive("time_limit", time_limit)
         if problem is not None:
             ReplannerMixin.__init__(self, problem, error_on_failed_checks)
@@ -411,7 +420,7 @@ def _on_time(translated: Translation, step: Step) -> Step:
 
 def _left(timeout: float | None, begun: float) -> float | None:
     """What is left of a time limit after the translation, which counts, too."""
-    return None if timeout is None else max(timeout - (time.monotonic() - begun), 0.001)
+    return None if timeout is None else min(max(timeout - (time.monotonic() - begun), 0.001), _LONGEST)
 
 
 def _refuse_unknown(unknown: dict[str, Any], engine: str, known: Sequence[str]) -> None:
@@ -422,21 +431,23 @@ def _refuse_unknown(unknown: dict[str, Any], engine: str, known: Sequence[str]) 
         raise UPUsageError(f"{engine} has no parameter {name!r}; {advice}")
 
 
-def _whole(name: str, value: Any, least: int | None) -> int | None:
+def _whole(name: str, value: Any, allowed: range | None) -> int | None:
     """A parameter that is a whole number, perhaps as text."""
     if value is None:
         return None
     number = None
     try:
-        if not isinstance(value, bool) and int(value) == float(value):
+        if not isinstance(value, bool) and (isinstance(value, str) or int(value) == value):
             number = int(value)
     except (TypeError, ValueError, OverflowError):
         pass
     if number is None:
         raise UPUsageError(f"{name} must be a whole number, not {value!r}")
-    if least is not None and number < least:
+    if allowed is not None and number not in allowed:
         unit = " bytes" if name == "memory" else ""
-        raise UPUsageError(f"{name} must be at least {least}{unit}, not {value!r}")
+        raise UPUsageError(
+            f"{name} must be between {allowed.start} and {allowed.stop - 1}{unit}, not {value!r}"
+        )
     return number
 
 

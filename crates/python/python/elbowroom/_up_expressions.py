@@ -19,7 +19,7 @@ _TAKEN = frozenset(
     "assign scale-up scale-down minimize maximize total-time object number either constraints "
     "always sometime within at-most-once preference is-violated undefined".split()
 )
-_INITIAL = {"type": "t", "object": "o", "fluent": "f", "action": "a", "running": "r"}
+_INITIAL = {"type": "t", "object": "o", "fluent": "f", "action": "a", "timed": "t"}
 
 
 class Expressions:

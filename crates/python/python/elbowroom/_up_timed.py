@@ -23,27 +23,6 @@ class TimedAction(NamedTuple):
     time: Fraction
     effects: list[Any]
 
-    @property
-    def name(self) -> str:
-        """The key of its name, and of its two facts: actions and fluents of a problem have others."""
-        return f"timed effects at {self.time}"
-
-    @property
-    def is_possible(self) -> Fact:
-        """The fact that is true only around its time."""
-        return Fact(f"time of {self.name}")
-
-    @property
-    def is_done(self) -> Fact:
-        """The fact that it has been executed."""
-        return Fact(f"done {self.name}")
-
-
-class Fact(NamedTuple):
-    """A fact of a timed action."""
-
-    name: str
-
 
 class TimedEffects:
     """The timed effects of a problem, as timed initials and as actions.
@@ -81,24 +60,24 @@ class TimedEffects:
     def predicates(self) -> Iterator[str]:
         """The facts of the actions."""
         for action in self.actions:
-            yield self._fact(action.is_possible)
-            yield self._fact(action.is_done)
+            yield self._possible(action)
+            yield self._done(action)
 
     def domain(self) -> Iterator[str]:
         """The actions."""
         for action in self.actions:
-            possible = self._fact(action.is_possible)
+            possible = self._possible(action)
             conditions = " ".join(self._bounds.before(action.effects))
             effects = " ".join(self._say.effect(it) for it in action.effects)
             yield f"  (:action {self.name_of(action)} :parameters ()"
             yield f"    :precondition (and {possible} {conditions})"
-            yield f"    :effect (and (not {possible}) {self._fact(action.is_done)} {effects}))"
+            yield f"    :effect (and (not {possible}) {self._done(action)} {effects}))"
 
     def initials(self) -> Iterator[str]:
         """What the initial state and the timed initials consist of."""
         yield from self._initials
         for action in self.actions:
-            possible = self._fact(action.is_possible)
+            possible = self._possible(action)
             begin = action.time - self._epsilon
             yield f"(at {begin} {possible})" if begin > 0 else possible
             yield f"(at {action.time + self._epsilon} (not {possible}))"
@@ -106,16 +85,21 @@ class TimedEffects:
     def goals(self) -> Iterator[str]:
         """That each action is executed."""
         for action in self.actions:
-            yield self._fact(action.is_done)
+            yield self._done(action)
 
-    def _fact(self, fact: Fact) -> str:
-        return f"({self._say.name('fluent', fact)})"
+    def _possible(self, action: TimedAction) -> str:
+        """The fact that is true only around the action's time."""
+        return f"({self._say.name('timed', f'time of effects at {action.time}')})"
+
+    def _done(self, action: TimedAction) -> str:
+        """The fact that the action has been executed."""
+        return f"({self._say.name('timed', f'done effects at {action.time}')})"
 
     # Plans.
 
     def name_of(self, action: TimedAction) -> str:
         """Its name in PDDL."""
-        return self._say.name("action", action)
+        return self._say.name("timed", f"effects at {action.time}")
 
     def times(self) -> dict[str, Fraction]:
         """The time of each action, by its name in plans."""

@@ -75,8 +75,7 @@ class Translation:
     @property
     def is_temporal(self) -> bool:
         """Whether plans of the problem have times."""
-        kind = self.original.kind
-        return bool(kind.has_continuous_time() or kind.has_discrete_time())
+        return bool(self.original.kind.has_continuous_time())
 
     def is_refuted_by(self, certificate: dict[str, Any]) -> bool:
         """Whether a certificate that no plan of the translation exists holds for the problem itself.
@@ -90,6 +89,8 @@ class Translation:
 
     def _refuse_what_has_no_counterpart(self) -> None:
         problem = self.original
+        if problem.kind.has_discrete_time():
+            raise UnsupportedError("discrete time is not supported: plans have times of any fraction")
         if problem.timed_goals:
             raise UnsupportedError("timed goals are not supported")
         if problem.trajectory_constraints or getattr(problem, "state_invariants", None):
