@@ -145,8 +145,12 @@ class Translation:
             raise UnsupportedError(f"the simulated effect of {action.name} is not supported")
         cost = self._cost(action)
         if isinstance(action, InstantaneousAction):
-            bounds = self._bounds.before(action.effects)
-            conditions = " ".join([*(self._say.condition(it) for it in action.preconditions), *bounds])
+            conditions = " ".join(
+                [
+                    *(self._say.condition(it) for it in action.preconditions),
+                    *self._bounds.before(action.effects),
+                ]
+            )
             effects = " ".join([*(self._say.effect(it) for it in action.effects), *cost])
             yield f"  (:action {name} :parameters ({parameters})"
             yield f"    :precondition (and {conditions})"
