@@ -95,6 +95,21 @@ def test_timed_effects_of_one_time_are_combined_as_by_unified_planning() -> None
     assert solved(problem).status == Status.SOLVED_SATISFICING
 
 
+def test_timed_effects_may_be_close_to_each_other() -> None:
+    problem, is_open, level = valve()
+    for time in ("0", "0.0001", "0.0002", "5"):
+        problem.add_timed_effect(GlobalStartTiming(Fraction(time)), level, Plus(level, 1))
+    problem.add_goal(Equals(level, 5))
+    result = solved(problem)
+    assert result.status == Status.SOLVED_SATISFICING, result.log_messages
+    assert verdicts(problem, result.plan) == (True, True)
+    # They cannot keep an ε of the problem, which is about actions.
+    problem.epsilon = Fraction(1, 100)
+    assert solved(problem).status == Status.UNSUPPORTED_PROBLEM
+    problem.epsilon = Fraction(1, 10_000)
+    assert solved(problem).status == Status.SOLVED_SATISFICING
+
+
 def test_actions_for_timed_effects_are_in_no_plan_that_is_returned() -> None:
     problem = tank(5)
     plan = solved(problem).plan

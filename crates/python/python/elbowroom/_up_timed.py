@@ -17,6 +17,10 @@ from ._up_bounds import Bounds
 from ._up_expressions import Expressions
 
 
+DEFAULT_EPSILON = Fraction(1, 1000)
+"""The least separation of interfering happenings where the problem has none and its timed effects allow it."""
+
+
 class TimedAction(NamedTuple):
     """An action without parameters that has the timed effects of one time."""
 
@@ -28,21 +32,31 @@ class TimedEffects:
     """The timed effects of a problem, as timed initials and as actions.
 
     Raises:
-        UnsupportedError: if an effect is at a time that is not counted from the start.
+        UnsupportedError: if an effect is at a time that is not counted from the start, or an action is closer
+            to other effects than the ε of the problem, which would make it impossible.
     """
 
-    def __init__(self, problem: UPProblem, say: Expressions, bounds: Bounds, epsilon: Fraction) -> None:
+    def __init__(self, problem: UPProblem, say: Expressions, bounds: Bounds) -> None:
         self._say = say
         self._bounds = bounds
-        self._epsilon = epsilon
         self.actions: list[TimedAction] = []
         self._initials: list[str] = []
-        for time, effects in _by_time(problem):
+        by_time = _by_time(problem)
+        for time, effects in by_time:
             possible = [it for it in effects if not say.simplify(it.condition).is_false()]
             if time > 0 and self._are_assignments(possible):
                 self._initials += [f"(at {time} {say.effect(it)})" for it in possible]
             elif possible:
                 self.actions.append(TimedAction(time, possible))
+        times = {time for time, _ in by_time}
+        self.epsilon = Fraction(problem.epsilon or min([DEFAULT_EPSILON, *self._gaps({Fraction(0), *times})]))
+        """The least separation of interfering happenings: that of the problem, if it has one."""
+        if min(self._gaps(times), default=self.epsilon) < self.epsilon:
+            raise UnsupportedError(f"timed effects closer than the epsilon {problem.epsilon} are not supported")
+
+    def _gaps(self, times: set[Fraction]) -> list[Fraction]:
+        """The distances of the actions to other times."""
+        return [abs(action.time - it) for action in self.actions for it in times if it != action.time]
 
     def _are_assignments(self, effects: list[Any]) -> bool:
         """Whether they assign constants, and each to another fluent."""
@@ -78,9 +92,9 @@ class TimedEffects:
         yield from self._initials
         for action in self.actions:
             possible = self._possible(action)
-            begin = action.time - self._epsilon
+            begin = action.time - self.epsilon
             yield f"(at {begin} {possible})" if begin > 0 else possible
-            yield f"(at {action.time + self._epsilon} (not {possible}))"
+            yield f"(at {action.time + self.epsilon} (not {possible}))"
 
     def goals(self) -> Iterator[str]:
         """That each action is executed."""

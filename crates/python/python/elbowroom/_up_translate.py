@@ -30,9 +30,6 @@ from ._up_timed import TimedEffects
 COST = "action-costs"
 """The fluent that is added where actions have costs."""
 
-DEFAULT_EPSILON = Fraction(1, 1000)
-"""The least separation of interfering happenings where the problem has none."""
-
 
 class Translation:
     """A problem of unified-planning, and what it is in PDDL.
@@ -52,9 +49,8 @@ class Translation:
         for action in problem.actions:
             # Actions keep their names; additional facts get others.
             self._say.name("action", action)
-        epsilon = Fraction(problem.epsilon or DEFAULT_EPSILON)
         self._bounds = Bounds(problem, self._say)
-        self._timed = TimedEffects(problem, self._say, self._bounds, epsilon)
+        self._timed = TimedEffects(problem, self._say, self._bounds)
         self.domain_text = "\n".join(self._domain())
         self.problem_text = "\n".join(self._problem())
         self.actions: dict[str, Any] = {
@@ -65,7 +61,7 @@ class Translation:
         }
         self.timed_actions = self._timed.times()
         """The actions that stand for timed effects, as in plans of ours, each with its time."""
-        self.problem: Problem = read(self.domain_text, self.problem_text, epsilon=epsilon)
+        self.problem: Problem = read(self.domain_text, self.problem_text, epsilon=self._timed.epsilon)
 
     @property
     def rules(self) -> str:
