@@ -376,7 +376,7 @@ fn details(
     details
 }
 
-/// How to change a plan that does not work, as the command says it after such answers.
+/// Section that names the command for repairs. It is part of each page of a plan that does not work.
 pub(crate) fn repair_advice() -> Section {
     let advice = "elbowroom envelope DOMAIN PROBLEM PLAN --repair prints the cheapest repair.";
     prose("What to do", vec![advice.to_owned()])
