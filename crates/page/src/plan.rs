@@ -93,10 +93,12 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
         }) => {
             sections.extend(failure(counterexample, &mut texts));
             sections.push(Section::Table(quantities(parameters)));
+            sections.push(repair_advice());
             bad("The plan fails even if nothing deviates.")
         }
         EnvelopeFinding::Fails(Failing::Invalid { violation }) => {
             sections.push(prose("What is wrong", vec![violation.message.clone()]));
+            sections.push(repair_advice());
             bad("The plan is not valid as it stands.")
         }
         EnvelopeFinding::None { stop } => Verdict {
@@ -372,6 +374,12 @@ fn details(
         }
     }
     details
+}
+
+/// Section that names the command for repairs. It is part of each page of a plan that does not work.
+pub(crate) fn repair_advice() -> Section {
+    let advice = "elbowroom envelope DOMAIN PROBLEM PLAN --repair prints the cheapest repair.";
+    prose("What to do", vec![advice.to_owned()])
 }
 
 pub(crate) fn prose(heading: &str, paragraphs: Vec<String>) -> Section {

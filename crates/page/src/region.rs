@@ -13,7 +13,9 @@ use std::collections::BTreeMap;
 use crate::document::{
     Document, Plane, PlaneBox, PlaneQuantity, PlaneRow, Section, Table, Texts, Tone, Verdict,
 };
-use crate::plan::{Reach, bad, chart, good, name_of, prose, quantities, sliders, times};
+use crate::plan::{
+    Reach, bad, chart, good, name_of, prose, quantities, repair_advice, sliders, times,
+};
 use alone::{Alone, reach};
 
 /// More quantities than anybody would look through.
@@ -80,6 +82,7 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
         }
         RegionFinding::Invalid { violation } => {
             sections.push(prose("What is wrong", vec![violation.message.clone()]));
+            sections.push(repair_advice());
             bad("The plan is not valid as it stands.")
         }
         RegionFinding::Unscheduled => bad("The plan has no schedule at its nominal values."),

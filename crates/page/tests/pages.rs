@@ -89,6 +89,27 @@ fn words<'a>(document: &'a Document, text: &'a Text) -> &'a str {
 }
 
 #[test]
+fn page_of_an_invalid_plan_names_the_command_that_repairs_it() {
+    let (task, mut plan) = read("delivery");
+    let step = plan
+        .steps
+        .iter_mut()
+        .find(|step| step.duration.is_some())
+        .expect("a durative action");
+    // Ten times as long as the domain says.
+    step.duration = step.duration.take().map(|it| it * Rational::from(10));
+    let answer = envelope(&EnvelopeRequest::new(&task, plan), &mut Unwatched);
+    let json = serde_json::to_string(&answer.expect("an answer").answer).expect("JSON");
+    let document = document("envelope.json", &json).expect("a document");
+    assert_eq!(document.verdict.tone, Tone::Bad);
+    let advice = document.sections.iter().any(|section| match section {
+        Section::Prose(prose) => prose.paragraphs.iter().any(|it| it.contains("--repair")),
+        _ => false,
+    });
+    assert!(advice);
+}
+
+#[test]
 fn the_page_of_an_envelope_has_each_action_and_each_interval() {
     for case in ["delivery", "battery", "match", "tank", "paintshop"] {
         let (task, plan) = read(case);

@@ -46,7 +46,7 @@ def apart(translated: Translation, steps: Sequence[Step]) -> list[Step] | None:
         best = None
         delay = epsilon or Fraction(count, 1_000_000)
         for other in range(len(moved)):
-            if not _shares_time(moved[other], moved[place]):
+            if moved[other].action in translated.timed_actions or not _shares_time(moved[other], moved[place]):
                 continue
             for change in _changes(moved[other], delay):
                 tried = [*moved[:other], change, *moved[other + 1 :]]

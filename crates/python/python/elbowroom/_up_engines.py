@@ -28,10 +28,10 @@ from unified_planning.engines.mixins import (
 from unified_planning.engines.mixins.oneshot_planner import OptimalityGuarantee
 from unified_planning.engines.results import FailedValidationReason
 from unified_planning.exceptions import UPUsageError
-from unified_planning.model import ProblemKind
+from unified_planning.model import AbstractProblem, ProblemKind
 from unified_planning.plans import PlanKind, STNPlan
 
-from ._answers import NoPlan, Plan
+from ._answers import NoPlan, Plan, Step
 from ._errors import ReadError, UnsupportedError
 from ._up_apart import apart
 from ._up_stn import stn_plan, stn_text
@@ -49,13 +49,16 @@ CREDITS = Credits(
 )
 
 
+_LONGEST = 1e9
+"""Seconds, longer than any search: larger time limits, infinite ones among them, mean the same."""
+
+
 def _common_kind() -> ProblemKind:
     kind = ProblemKind(version=2)
     kind.set_problem_class("ACTION_BASED")
     for feature in ("SIMPLE_NUMERIC_PLANNING", "GENERAL_NUMERIC_PLANNING"):
         kind.set_problem_type(feature)
-    for feature in ("CONTINUOUS_TIME", "DISCRETE_TIME", "TIMED_EFFECTS", "DURATION_INEQUALITIES",
-                    "SELF_OVERLAPPING"):  # fmt: skip
+    for feature in ("CONTINUOUS_TIME", "TIMED_EFFECTS", "DURATION_INEQUALITIES", "SELF_OVERLAPPING"):
         kind.set_time(feature)
     for feature in ("STATIC_FLUENTS_IN_DURATIONS", "FLUENTS_IN_DURATIONS", "INT_TYPE_DURATIONS",
                     "REAL_TYPE_DURATIONS"):  # fmt: skip
@@ -107,6 +110,9 @@ class ElbowroomPlanner(
         time_limit: float | None = None,
         **unknown: Any,
     ) -> None:
+        if not isinstance(problem, (AbstractProblem, type(None))):
+            # Only replanners are made for a problem.
+            unknown = {"problem": problem, **unknown}
         _refuse_unknown(unknown, "elbowroom", ("plan", "jobs", "memory", "seed", "time_limit"))
         Engine.__init__(self)
         OneshotPlannerMixin.__init__(self)
@@ -116,7 +122,10 @@ class ElbowroomPlanner(
         self._plan_kind = plan
         self._last: Any = None
         _whole("seed", seed, None)
-        self._options: dict[str, Any] = {"jobs": _whole("jobs", jobs, 0), "memory": _whole("memory", memory, 1 << 20)}
+        self._options: dict[str, Any] = {
+            "jobs": _whole("jobs", jobs, range(1 << 16)),
+            "memory": _whole("memory", memory, range(1 << 20, 1 << 63)),
+        }
         self._time_limit = _positive("time_limit", time_limit)
         if problem is not None:
             ReplannerMixin.__init__(self, problem, error_on_failed_checks)
@@ -223,7 +232,7 @@ class ElbowroomPlanner(
     def _with_plan(self, translated: Translation, found: Plan) -> PlanGenerationResult:
         """The result where a plan was found, if it keeps unified-planning's rules."""
         status = PlanGenerationResultStatus
-        steps = apart(translated, found.steps)
+        steps = apart(translated, [_on_time(translated, step) for step in found.steps])
         if steps is None:
             text = (
                 "no plan found: the one that was found has steps that write the same fact at one time, "
@@ -233,7 +242,8 @@ class ElbowroomPlanner(
             return PlanGenerationResult(
                 status.UNSOLVABLE_INCOMPLETELY, None, self.name, log_messages=[message]
             )
-        metrics = {"makespan": str(max((s.start + (s.duration or 0) for s in steps), default=0))}
+        ends = (s.start + (s.duration or 0) for s in steps if s.action not in translated.timed_actions)
+        metrics = {"makespan": str(max(ends, default=0))}
         plan: Any = translated.plan_back(steps)
         if self._plan_kind == "stn" and plan.kind == PlanKind.TIME_TRIGGERED_PLAN:
             plan = stn_plan(translated, translated.steps(plan))
@@ -365,17 +375,27 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
         return CREDITS
 
     def _validate(self, problem: Any, plan: Any) -> ValidationResult:
-        translated = Translation(problem)
-        if isinstance(plan, STNPlan):
-            return self._validate_network(translated, plan)
-        verdict = translated.check(translated.steps(plan))
-        if verdict.violation is None:
+        try:
+            translated = Translation(problem)
+            if isinstance(plan, STNPlan):
+                return self._validate_network(translated, plan)
+            steps = translated.steps(plan)
+        except UnsupportedError as error:
+            message = LogMessage(LogLevel.ERROR, str(error))
+            return ValidationResult(ValidationResultStatus.UNKNOWN, self.name, [message])
+        verdict = translated.check(steps)
+        if verdict:
             return ValidationResult(ValidationResultStatus.VALID, self.name, [])
         violation = verdict.violation
+        if violation is None:
+            message = LogMessage(LogLevel.INFO, str(verdict))
+            return ValidationResult(ValidationResultStatus.UNKNOWN, self.name, [message])
         is_goal = violation.action is None
         reason = FailedValidationReason
         message = LogMessage(LogLevel.INFO, violation.message)
-        instance = None if is_goal else translated.instance(str(violation.action))
+        instance = None
+        if not is_goal and violation.action not in translated.timed_actions:
+            instance = translated.instance(str(violation.action))
         return ValidationResult(
             ValidationResultStatus.INVALID,
             self.name,
@@ -393,9 +413,14 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
         return ValidationResult(ValidationResultStatus.INVALID, self.name, [message])
 
 
+def _on_time(translated: Translation, step: Step) -> Step:
+    """A step, at its time if it stands for timed effects."""
+    return step._replace(start=translated.timed_actions.get(step.action, step.start))
+
+
 def _left(timeout: float | None, begun: float) -> float | None:
     """What is left of a time limit after the translation, which counts, too."""
-    return None if timeout is None else max(timeout - (time.monotonic() - begun), 0.001)
+    return None if timeout is None else min(max(timeout - (time.monotonic() - begun), 0.001), _LONGEST)
 
 
 def _refuse_unknown(unknown: dict[str, Any], engine: str, known: Sequence[str]) -> None:
@@ -406,21 +431,23 @@ def _refuse_unknown(unknown: dict[str, Any], engine: str, known: Sequence[str]) 
         raise UPUsageError(f"{engine} has no parameter {name!r}; {advice}")
 
 
-def _whole(name: str, value: Any, least: int | None) -> int | None:
+def _whole(name: str, value: Any, allowed: range | None) -> int | None:
     """A parameter that is a whole number, perhaps as text."""
     if value is None:
         return None
     number = None
     try:
-        if not isinstance(value, bool) and int(value) == float(value):
+        if not isinstance(value, bool) and (isinstance(value, str) or int(value) == value):
             number = int(value)
     except (TypeError, ValueError, OverflowError):
         pass
     if number is None:
         raise UPUsageError(f"{name} must be a whole number, not {value!r}")
-    if least is not None and number < least:
+    if allowed is not None and number not in allowed:
         unit = " bytes" if name == "memory" else ""
-        raise UPUsageError(f"{name} must be at least {least}{unit}, not {value!r}")
+        raise UPUsageError(
+            f"{name} must be between {allowed.start} and {allowed.stop - 1}{unit}, not {value!r}"
+        )
     return number
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any
 
 from unified_planning.model import FNode, OperatorKind, Problem as UPProblem
 
@@ -19,28 +19,16 @@ _TAKEN = frozenset(
     "assign scale-up scale-down minimize maximize total-time object number either constraints "
     "always sometime within at-most-once preference is-violated undefined".split()
 )
-_INITIAL = {"type": "t", "object": "o", "fluent": "f", "action": "a", "running": "r"}
-
-
-class _Shift(NamedTuple):
-    """What stands for the timed increases of a fluent."""
-
-    of: str
-
-    @property
-    def name(self) -> str:
-        """No fluent of a problem has a name like this, unless it is made to."""
-        return f"timed increases of {self.of}"
+_INITIAL = {"type": "t", "object": "o", "fluent": "f", "action": "a", "timed": "t"}
 
 
 class Expressions:
     """The names of a problem's things in PDDL, and its conditions, numbers and effects."""
 
-    def __init__(self, problem: UPProblem, taken: Iterable[str], shifted: Iterable[Any] = ()) -> None:
+    def __init__(self, problem: UPProblem, taken: Iterable[str]) -> None:
         self._names: dict[tuple[str, Any], str] = {}
         self._used = {*_TAKEN, *taken}
         self._variables: dict[tuple[type, str, Any], str] = {}
-        self._shifted = set(shifted)
         self.simplify = problem.environment.simplifier.simplify
 
     def name(self, kind: str, thing: Any) -> str:
@@ -81,19 +69,6 @@ class Expressions:
         args = [self.walk(arg) for arg in e.args]
         return f"({' '.join([self.name('fluent', e.fluent()), *args])})"
 
-    def shift(self, e: FNode) -> str:
-        """The sum of the timed increases of a fluent so far, which is a fluent of its own in PDDL."""
-        args = [self.walk(arg) for arg in e.args]
-        return f"({' '.join([self.shift_name(e.fluent()), *args])})"
-
-    def shift_name(self, fluent: Any) -> str:
-        """The name of the fluent for the timed increases of another one."""
-        return self.name("fluent", _Shift(fluent.name))
-
-    def is_shifted(self, e: FNode) -> bool:
-        """Whether the fluent has timed increases."""
-        return e.fluent() in self._shifted
-
     def type_name(self, of: Any) -> str:
         """The name of a user type."""
         if not of.is_user_type():
@@ -118,7 +93,7 @@ class Expressions:
         if e.is_variable_exp():
             return self.variable(e.variable())
         if e.is_fluent_exp():
-            return f"(+ {self.target(e)} {self.shift(e)})" if self.is_shifted(e) else self.target(e)
+            return self.target(e)
         is_truth = e.is_equals() and any(arg.type.is_bool_type() for arg in e.args)
         if e.is_iff() or is_truth:
             return f"(and (imply {args[0]} {args[1]}) (imply {args[1]} {args[0]}))"
@@ -153,8 +128,6 @@ class Expressions:
                 made = [f"(when {truth} {target})", f"(when (not {truth}) (not {target}))"]
         else:
             value = self.condition(effect.value)
-            if self.is_shifted(effect.fluent):
-                value = f"(- {value} {self.shift(effect.fluent)})"
             made = [f"(assign {target} {value})"]
         condition = self.simplify(effect.condition)
         if not condition.is_true():

@@ -33,6 +33,9 @@ def stn_plan(translated: Translation, plan: Any) -> STNPlan:
         label, _, end = name.partition(".")
         if name in fixed or label not in whats:
             continue
+        if whats[label] in translated.timed_actions:
+            fixed[name] = translated.timed_actions[whats[label]]
+            continue
         if label not in made:
             made[label] = translated.instance(whats[label])
         kind = {"start": TimepointKind.START, "end": TimepointKind.END}
@@ -98,6 +101,9 @@ def stn_text(translated: Translation, plan: STNPlan) -> str:
             least = "-inf" if lower is None else text(lower)
             most = "inf" if upper is None else text(upper)
             bounds.append(f"c: {node(second)} - {node(first)} in [{least}, {most}];")
+    for number, (action, time) in enumerate(translated.timed_actions.items()):
+        lines.append(f"action instance t{number} : {action};")
+        bounds.append(f"c: t{number} - .zero in [{text(time)}, {text(time)}];")
     return "\n".join([*lines, *bounds, ""])
 
 

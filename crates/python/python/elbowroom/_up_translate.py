@@ -6,13 +6,10 @@ same. What has no counterpart is refused by name.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Any
 
-from unified_planning.engines import CompilationKind
-from unified_planning.engines.compilers.bounded_types_remover import BoundedTypesRemover
 from unified_planning.model import (
     DurativeAction,
     FNode,
@@ -26,7 +23,9 @@ from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, STN
 from ._answers import Verdict
 from ._errors import UnsupportedError
 from ._problem import AnyPlan, Problem, read
+from ._up_bounds import Bounds
 from ._up_expressions import Expressions, first_of
+from ._up_timed import TimedEffects
 
 COST = "action-costs"
 """The fluent that is added where actions have costs."""
@@ -45,28 +44,24 @@ class Translation:
                 f"a {type(problem).__name__} is no action-based problem; only these are supported"
             )
         self.original = problem
-        if problem.kind.has_bounded_types():
-            problem = _without_bounds(problem)
-        self.source = problem
-        self._timed_effects = list(_timed_effects(problem))
-        self._shifted = _shifted(problem, self._timed_effects)
-        self._say = Expressions(problem, [COST], self._shifted)
+        self._say = Expressions(problem, [COST])
         self._refuse_what_has_no_counterpart()
         for action in problem.actions:
             # Actions keep their names; additional facts get others.
             self._say.name("action", action)
+        self._bounds = Bounds(problem, self._say)
+        self._timed = TimedEffects(problem, self._say, self._bounds)
         self.domain_text = "\n".join(self._domain())
         self.problem_text = "\n".join(self._problem())
         self.actions: dict[str, Any] = {
-            self._say.name("action", action): action for action in self.original.actions
+            self._say.name("action", action): action for action in problem.actions
         }
         self.objects: dict[str, Any] = {
             self._say.name("object", it): it for it in problem.all_objects
         }
-        epsilon = problem.epsilon
-        self.problem: Problem = read(
-            self.domain_text, self.problem_text, epsilon="0.001" if not epsilon else epsilon
-        )
+        self.timed_actions = self._timed.times()
+        """The actions that stand for timed effects, as in plans of ours, each with its time."""
+        self.problem: Problem = read(self.domain_text, self.problem_text, epsilon=self._timed.epsilon)
 
     @property
     def rules(self) -> str:
@@ -76,8 +71,7 @@ class Translation:
     @property
     def is_temporal(self) -> bool:
         """Whether plans of the problem have times."""
-        kind = self.original.kind
-        return bool(kind.has_continuous_time() or kind.has_discrete_time())
+        return bool(self.original.kind.has_continuous_time())
 
     def is_refuted_by(self, certificate: dict[str, Any]) -> bool:
         """Whether a certificate that no plan of the translation exists holds for the problem itself.
@@ -90,7 +84,9 @@ class Translation:
     # Refusals.
 
     def _refuse_what_has_no_counterpart(self) -> None:
-        problem = self.source
+        problem = self.original
+        if problem.kind.has_discrete_time():
+            raise UnsupportedError("discrete time is not supported: plans have times of any fraction")
         if problem.timed_goals:
             raise UnsupportedError("timed goals are not supported")
         if problem.trajectory_constraints or getattr(problem, "state_invariants", None):
@@ -104,13 +100,11 @@ class Translation:
             of = fluent.type
             if of.is_user_type():
                 raise UnsupportedError(f"the object fluent {fluent.name} is not supported")
-            if not of.is_bool_type() and (of.lower_bound, of.upper_bound) != (None, None):
-                raise UnsupportedError(f"the bounds of {fluent.name} are not supported")
 
     # The domain.
 
     def _domain(self) -> Iterator[str]:
-        problem = self.source
+        problem = self.original
         yield "(define (domain d)"
         yield (
             "  (:requirements :typing :adl :negative-preconditions :fluents :durative-actions "
@@ -126,22 +120,19 @@ class Translation:
         ]
         yield f"  (:constants {' '.join(constants)})"
         is_fact = [fluent for fluent in problem.fluents if fluent.type.is_bool_type()]
-        predicates = [self._signature(fluent) for fluent in is_fact]
+        predicates = [*(self._signature(fluent) for fluent in is_fact), *self._timed.predicates()]
         yield f"  (:predicates {' '.join(predicates)})"
         functions = [self._signature(fluent) for fluent in problem.fluents if fluent not in is_fact]
-        functions += [self._shift_signature(fluent) for fluent in self._shifted]
         if self._costs() is not None:
             functions.append(f"({COST})")
         yield f"  (:functions {' '.join(functions)})"
         for action in problem.actions:
             yield from self._action(action)
+        yield from self._timed.domain()
         yield ")"
 
     def _signature(self, fluent: Any) -> str:
         return f"({self._say.name('fluent', fluent)} {self._say.declared(fluent.signature)})"
-
-    def _shift_signature(self, fluent: Any) -> str:
-        return f"({self._say.shift_name(fluent)} {self._say.declared(fluent.signature)})"
 
     def _action(self, action: Any) -> Iterator[str]:
         name = self._say.name("action", action)
@@ -150,7 +141,12 @@ class Translation:
             raise UnsupportedError(f"the simulated effect of {action.name} is not supported")
         cost = self._cost(action)
         if isinstance(action, InstantaneousAction):
-            conditions = " ".join(self._say.condition(it) for it in action.preconditions)
+            conditions = " ".join(
+                [
+                    *(self._say.condition(it) for it in action.preconditions),
+                    *self._bounds.before(action.effects),
+                ]
+            )
             effects = " ".join([*(self._say.effect(it) for it in action.effects), *cost])
             yield f"  (:action {name} :parameters ({parameters})"
             yield f"    :precondition (and {conditions})"
@@ -169,7 +165,12 @@ class Translation:
                 for it in found
             )
             strict = " ".join(f"(at start {it})" for it in self._strict(action.duration))
-            yield f"    :condition (and {conditions} {strict})"
+            bounds = " ".join(
+                f"({_when_of(timing, action)} {it})"
+                for timing, found in action.effects.items()
+                for it in self._bounds.before(found)
+            )
+            yield f"    :condition (and {conditions} {strict} {bounds})"
             effects = " ".join(
                 f"({_when_of(timing, action)} {part})"
                 for timing, found in action.effects.items()
@@ -196,15 +197,15 @@ class Translation:
 
     def _costs(self) -> dict[Any, FNode] | None:
         """What each action costs, if that is the metric."""
-        metrics = self.source.quality_metrics
+        metrics = self.original.quality_metrics
         if len(metrics) != 1:
             return None
         metric = metrics[0]
         if metric.is_minimize_action_costs():
-            return {action: metric.get_action_cost(action) for action in self.source.actions}
+            return {action: metric.get_action_cost(action) for action in self.original.actions}
         if metric.is_minimize_sequential_plan_length():
-            one = self.source.environment.expression_manager.Int(1)
-            return dict.fromkeys(self.source.actions, one)
+            one = self.original.environment.expression_manager.Int(1)
+            return dict.fromkeys(self.original.actions, one)
         return None
 
     def _cost(self, action: Any) -> list[str]:
@@ -216,7 +217,7 @@ class Translation:
     # The problem.
 
     def _problem(self) -> Iterator[str]:
-        problem = self.source
+        problem = self.original
         yield "(define (problem p) (:domain d)"
         yield "  (:init"
         for fluent, value in problem.initial_values.items():
@@ -230,76 +231,19 @@ class Translation:
                 yield f"    (= {target} {self._say.condition(value)})"
         if self._costs() is not None:
             yield f"    (= ({COST}) 0)"
-        for fluent, value in problem.initial_values.items():
-            if value is not None and self._say.is_shifted(fluent):
-                yield f"    (= {self._say.shift(fluent)} 0)"
-        for timed in self._timed():
+        for timed in self._timed.initials():
             yield f"    {timed}"
         yield "  )"
         goals = [self._say.condition(goal) for goal in problem.goals]
+        goals += [*self._bounds.goals(), *self._timed.goals()]
         yield f"  (:goal (and {' '.join(goals)}))"
         metric = self._metric()
         if metric is not None:
             yield f"  (:metric {metric})"
         yield ")"
 
-    def _timed(self) -> Iterator[str]:
-        """The timed effects; those of one time that increase the same fluent are one."""
-        totals: dict[str, Fraction] = {}
-        sums: dict[tuple[Fraction, str], Fraction] = {}
-        for time, effect in self._timed_effects:
-            if effect.is_assignment() and not self._say.is_shifted(effect.fluent):
-                yield self._timed_assignment(time, effect)
-                continue
-            target = self._say.shift(effect.fluent)
-            amount = Fraction(self._timed_value(effect).constant_value())
-            if effect.is_assignment():
-                totals[target] = amount - self._lasting_value(effect)
-            else:
-                sign = 1 if effect.is_increase() else -1
-                totals[target] = totals.get(target, Fraction(0)) + sign * amount
-            sums[time, target] = totals[target]
-        for (time, target), total in sums.items():
-            yield f"(at {time} (= {target} {total}))"
-
-    def _timed_value(self, effect: Any) -> FNode:
-        if not effect.condition.is_true():
-            raise UnsupportedError(f"the timed effect {effect} has a condition, which is not supported")
-        value = self._say.simplify(effect.value)
-        if not value.is_constant():
-            raise UnsupportedError(
-                f"the timed effect {effect} is not supported: its value is not a constant"
-            )
-        return value
-
-    def _timed_assignment(self, time: Fraction, effect: Any) -> str:
-        value = self._timed_value(effect)
-        target = self._say.target(effect.fluent)
-        if value.is_bool_constant():
-            return f"(at {time} {target if value.is_true() else f'(not {target})'})"
-        return f"(at {time} (= {target} {self._say.walk(value)}))"
-
-    def _lasting_value(self, effect: Any) -> Fraction:
-        """The initial value of a fluent that only timed effects change."""
-        changed = {
-            it.fluent.fluent()
-            for action in self.source.actions
-            for it in (
-                action.effects
-                if isinstance(action, InstantaneousAction)
-                else itertools.chain.from_iterable(action.effects.values())
-            )
-        }
-        value = self.source.initial_values.get(effect.fluent)
-        if effect.fluent.fluent() in changed or value is None or not value.is_constant():
-            raise UnsupportedError(
-                f"the timed effect {effect} is not supported: the same fluent has timed increases and is "
-                "changed by actions"
-            )
-        return Fraction(value.constant_value())
-
     def _metric(self) -> str | None:
-        metrics = self.source.quality_metrics
+        metrics = self.original.quality_metrics
         if len(metrics) != 1:
             return None
         metric = metrics[0]
@@ -317,7 +261,7 @@ class Translation:
     # Plans.
 
     def steps(self, plan: Any) -> list[tuple[Fraction, str, Fraction | None]]:
-        """A plan of unified-planning as (start, action, duration).
+        """A plan of unified-planning as (start, action, duration), with the actions for timed effects.
 
         Raises:
             UnsupportedError: if it is no sequential or time-triggered plan.
@@ -325,18 +269,23 @@ class Translation:
         if isinstance(plan, SequentialPlan):
             # One after the other, further apart than any ε.
             gap = max(Fraction(1), 2 * Fraction(self.original.epsilon or 0))
-            return [(gap * (i + 1), self.name_of(it), None) for i, it in enumerate(plan.actions)]
+            steps = [(gap * (i + 1), self.name_of(it), None) for i, it in enumerate(plan.actions)]
+            return [*steps, *self._timed_steps()]
         if isinstance(plan, TimeTriggeredPlan):
-            return [
+            timed = [
                 (Fraction(start), self.name_of(it), None if d is None else Fraction(d))
                 for start, it, d in plan.timed_actions
             ]
+            return [*timed, *self._timed_steps()]
         if isinstance(plan, STNPlan):
             converted = plan.convert_to(PlanKind.TIME_TRIGGERED_PLAN, self.original)
             return self.steps(converted)
         raise UnsupportedError(
             f"a {type(plan).__name__} is not supported; give a sequential or time-triggered plan"
         )
+
+    def _timed_steps(self) -> list[tuple[Fraction, str, None]]:
+        return [(time, name, None) for name, time in self.timed_actions.items()]
 
     def check(self, steps: AnyPlan) -> Verdict:
         """Judges a plan with exactly these numbers, by the rules of unified-planning."""
@@ -357,7 +306,11 @@ class Translation:
 
     def plan_back(self, steps: Iterable[Any]) -> Any:
         """Our plan as a sequential plan, if the problem has no time, or a time-triggered one."""
-        made = [(s.start, self.instance(s.action), s.duration) for s in steps]
+        made = [
+            (s.start, self.instance(s.action), s.duration)
+            for s in steps
+            if s.action not in self.timed_actions
+        ]
         environment = self.original.environment
         if self.is_temporal:
             return TimeTriggeredPlan(made, environment)
@@ -365,42 +318,11 @@ class Translation:
         return SequentialPlan([it for _, it, _ in ordered], environment)
 
 
-def _timed_effects(problem: UPProblem) -> Iterator[tuple[Fraction, Any]]:
-    """The timed effects by time, those for all objects one by one."""
-    found = []
-    for timing, effects in problem.timed_effects.items():
-        time = _absolute(timing)
-        for effect in effects:
-            found += [(time, it) for it in effect.expand_effect(problem)]
-    yield from sorted(found, key=lambda it: it[0])
-
-
-def _shifted(problem: UPProblem, timed: list[tuple[Fraction, Any]]) -> list[Any]:
-    """The fluents with timed increases or decreases.
-
-    PDDL has only timed assignments. So these fluents are the sum of two: one that actions change, and one
-    that timed initials assign.
-    """
-    increased = {effect.fluent.fluent() for _, effect in timed if not effect.is_assignment()}
-    return [fluent for fluent in problem.fluents if fluent in increased]
-
-
 def _split(text: str) -> Iterator[str]:
     """The expressions of a text, one by one."""
     while text:
         first, text = first_of(text)
         yield first
-
-
-def _without_bounds(problem: UPProblem) -> UPProblem:
-    """The problem with conditions instead of bounds of its numbers."""
-    kind = CompilationKind.BOUNDED_TYPES_REMOVING
-    try:
-        return BoundedTypesRemover().compile(problem, kind).problem
-    except Exception as error:
-        raise UnsupportedError(
-            f"bounds of numbers are not supported where unified-planning cannot take them away: {error}"
-        ) from error
 
 
 def _point(timing: Timing, action: Any) -> str:
@@ -431,9 +353,3 @@ def _whens(interval: TimeInterval, action: Any) -> list[str]:
     if not interval.is_right_open():
         whens.append("at end")
     return whens
-
-
-def _absolute(timing: Timing) -> Fraction:
-    if not timing.is_from_start():
-        raise UnsupportedError(f"a timed effect at {timing}, counted from the end")
-    return Fraction(timing.delay)
