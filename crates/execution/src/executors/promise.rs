@@ -17,6 +17,9 @@ use crate::reason::{About, Cause, Promise, Reason};
 /// ends of the room lie on their limits, that takes as little from it.
 const SHARES: [i64; 7] = [16, 15, 12, 8, 4, 2, 1];
 
+/// A reading of each constraint of a plan.
+type Readings<'a> = dyn Fn(&Constraint) -> Reading + 'a;
+
 /// Possible values of [`slack`], the greatest first, in sixteenths.
 const SLACKS: [i64; 5] = [16, 8, 4, 2, 1];
 
@@ -242,7 +245,7 @@ pub(super) fn slack_of_plan(mission: &Mission) -> Rational {
 fn slack(
     (mission, values): (&Mission, &Valuation),
     elapsed: &dyn Fn(InstanceId) -> Option<Rational>,
-    works: &mut dyn FnMut(&dyn Fn(&Constraint) -> Reading) -> bool,
+    works: &mut dyn FnMut(&Readings<'_>) -> bool,
 ) -> Rational {
     let shares = SLACKS.map(|sixteenths| Rational::new(sixteenths, 16));
     let greatest = shares.into_iter().find(|share| {
