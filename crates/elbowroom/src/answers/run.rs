@@ -54,6 +54,10 @@ pub struct RunAnswer {
     /// Among what the first plan was chosen, in words; left out where it was not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_plan: Option<String>,
+    /// The reason why an executor that weighs each move has no table of moves and tries moves out in samples of the
+    /// world instead. Left out if it has one, or needs none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_table: Option<String>,
     /// Violations that the validator finds in the execution: bugs of this program. Left out if there are
     /// none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -166,6 +170,7 @@ pub fn run(
 ) -> Result<RunOutcome, SpecError> {
     let spec = request.spec;
     let mut execution = spec.execution(request.task)?;
+    let no_table = execution.no_table().map(str::to_owned);
     if let Some(preparer) = request.preparer {
         execution = execution.prepared_by(preparer);
     }
@@ -210,6 +215,7 @@ pub fn run(
     Ok(RunOutcome {
         answer: RunAnswer {
             first_plan,
+            no_table,
             invalid: validation.found().iter().map(ToString::to_string).collect(),
             ..RunAnswer::of(&report)
         },
@@ -242,6 +248,7 @@ impl RunAnswer {
         Self {
             report: ReportLine::of(report),
             first_plan: None,
+            no_table: None,
             invalid: Vec::new(),
             format: RunFormat::Run,
             version: Version,

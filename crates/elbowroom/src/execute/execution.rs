@@ -119,6 +119,7 @@ pub struct Execution<'a> {
     foresight: Foresight,
     odds: Option<Box<dyn Odds>>,
     outlook: Option<Arc<dyn Outlook>>,
+    no_table: Option<String>,
     rehearsal: Option<SharedRehearse>,
     planner: Option<Box<dyn Planner + 'a>>,
     preparer: Option<Box<dyn Preparer + 'a>>,
@@ -154,6 +155,7 @@ impl<'a> Execution<'a> {
             foresight: Foresight::default(),
             odds: None,
             outlook: None,
+            no_table: None,
             rehearsal: None,
             planner: None,
             preparer: None,
@@ -230,6 +232,17 @@ impl<'a> Execution<'a> {
     /// Goes by this outlook, in executors that weigh each move ([`ExecutorSpec::asks_outlook`]).
     pub fn with_outlook(self, outlook: Option<Arc<dyn Outlook>>) -> Self {
         Self { outlook, ..self }
+    }
+
+    /// Notes why there is no outlook, although the executor weighs each move by one.
+    pub(crate) fn without_table(self, no_table: Option<String>) -> Self {
+        Self { no_table, ..self }
+    }
+
+    /// Returns why there is no table of moves for an executor that weighs each move; `None` if there is one or none was
+    /// attempted.
+    pub fn no_table(&self) -> Option<&str> {
+        self.no_table.as_deref()
     }
 
     /// Tries out what can be done like that, in executors that weigh each move where there is no

@@ -253,3 +253,31 @@ fn the_answer_and_each_line_of_the_trace_are_read_as_they_were_written() {
         assert_eq!(*last, answer.report, "{executor}");
     }
 }
+
+/// `policy` in this world. The embedded planner makes the plan.
+fn answer_of_policy(world: &str, budget: &str) -> RunAnswer {
+    let spec = RunSpec {
+        world: Some(format!(
+            "format = \"elbowroom-world\"\nversion = 1\n{world}"
+        )),
+        executor: "policy".parse().expect("a correct test"),
+        planning_budget: Some(budget.parse().expect("a correct test")),
+        ..spec()
+    };
+    let problem = read_problem(&spec.domain.source(), &spec.problem.source());
+    let (problem, _) = problem.expect("a correct test");
+    let task = Arc::new(Task::new(problem));
+    let request = RunRequest::new(&spec, &task);
+    let outcome = simulate(request, &mut Unwatched).expect("a correct test");
+    outcome.answer
+}
+
+#[test]
+fn policy_says_why_it_has_no_table() {
+    let varied =
+        "[[duration]]\naction = \"*\"\nuniform = { from = 0.9, to = 1.1 }\nrelative = true\n";
+    let delayed = "[[delay]]\naction = \"*\"\nconstant = 1\n";
+    let reason = |world: &str, budget: &str| answer_of_policy(world, budget).no_table;
+    assert!(reason(delayed, "10").is_some_and(|why| why.contains("delay")));
+    assert!(reason(varied, "0.000001").is_some_and(|why| why.contains("--planning-budget")));
+}

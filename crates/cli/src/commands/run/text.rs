@@ -88,6 +88,14 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
         let words = wrapped(&tame(choice), width, 2);
         let _ = writeln!(text, "\n{}\n{words}", styled(STRONG, "The first plan"));
     }
+    if let Some(why) = &answer.no_table {
+        let what = format!(
+            "{}; moves are tried out in samples of the world instead",
+            tame(why)
+        );
+        let words = wrapped(&what, width, 2);
+        let _ = writeln!(text, "\n{}\n{words}", styled(STRONG, "No table of moves"));
+    }
     for (heading, reasons) in [
         ("Why no plan reaches the goal", &report.dead_end),
         ("Why the plan was given up", &report.reasons),

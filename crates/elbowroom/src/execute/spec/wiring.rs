@@ -410,8 +410,12 @@ impl RunSpec {
         let envelopes = self.envelopes_in(model.as_ref());
         let model = model.filter(|_| self.executor.asks_odds());
         let is_embedded = matches!(self.whom()?, Whom::Embedded);
-        let outlook = model.as_ref().filter(|_| self.executor.asks_outlook());
-        let outlook = outlook.and_then(|model| self.outlook(task, model, is_embedded));
+        let tabulated = model.as_ref().filter(|_| self.executor.asks_outlook());
+        let tabulated = tabulated.map(|model| self.outlook(task, model, is_embedded));
+        let (outlook, no_table) = match tabulated.transpose() {
+            Ok(outlook) => (outlook, None),
+            Err(why) => (None, Some(why)),
+        };
         let model = model.filter(|_| is_embedded);
         let rehearsal = match &outlook {
             Some(_) => None,
@@ -430,16 +434,20 @@ impl RunSpec {
             .with_likelihoods(self.likelihoods(task)?)
             .with_odds(odds)
             .with_outlook(outlook)
+            .without_table(no_table)
             .with_rehearsal(rehearsal))
     }
 
-    /// The table of moves of `policy` for the world of `model`; `None` if it cannot be finished within the planning budget.
+    /// The table of moves of `policy` for the world of `model`.
+    ///
+    /// # Errors
+    /// The reason if there is none, for people.
     fn outlook(
         &self,
         task: &Arc<Task>,
         model: &WorldModel,
         is_embedded: bool,
-    ) -> Option<Arc<dyn Outlook>> {
+    ) -> Result<Arc<dyn Outlook>, String> {
         let embedded = self.embedded();
         let budget = work::Budget::new(embedded.work);
         let goes_on = || !budget.is_spent();
@@ -453,8 +461,15 @@ impl RunSpec {
             fallbacks: sets.fallbacks,
             ..Settings::default()
         };
-        let policy = Policy::close(task, model, &settings, &goes_on).ok()??;
-        Some(Arc::new(policy))
+        let policy = Policy::close(task, model, &settings, &goes_on);
+        match policy.map_err(|error| error.what)? {
+            Some(policy) => Ok(Arc::new(policy)),
+            None if goes_on() => Err(
+                "it would have too many states, or its bounds would stay more than two points apart"
+                    .to_owned(),
+            ),
+            None => Err("the planning budget is spent (`--planning-budget`)".to_owned()),
+        }
     }
 }
 
