@@ -73,6 +73,7 @@ impl Run<'_> {
         missed.sort_by(|(one, _), (other, _)| one.cmp(other));
         self.account.resume_plan(abandoned.plan);
         self.lost.plan = false;
+        self.lost.in_vain = Some((self.now.clone(), verdict));
         let is_of_a_step = |it: &News| matches!(it, News::Started { .. } | News::Ended { .. });
         self.news.retain(|it| !is_of_a_step(it));
         self.news

@@ -47,6 +47,7 @@ const MOST_NAMED: usize = 3;
 impl Run<'_> {
     /// Something has happened that was believed: records it, for a later explanation of a dead end.
     pub(super) fn note(&mut self, time: &Rational, what: What) {
+        self.lost.in_vain = None;
         if !matches!(what, What::Stopped(_)) {
             self.refusals.forget();
         }

@@ -111,6 +111,11 @@ impl Run<'_> {
             self.stay();
             return Ok(());
         }
+        if let Some((time, verdict)) = &self.lost.in_vain
+            && *time == self.now
+        {
+            return Err(Stop::Over(verdict.clone()));
+        }
         if self.inquire(reason) {
             return Ok(());
         }

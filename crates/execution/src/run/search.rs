@@ -142,6 +142,9 @@ pub(super) struct Lost {
     pub(super) inquiry: Inquiry,
     /// The plan that the executor abandoned, until another one is adopted.
     pub(super) abandoned: Option<Abandoned>,
+    /// The time at which no plan was found and the executor carried on, and the verdict without it; `None` once
+    /// something has happened since.
+    pub(super) in_vain: Option<(Rational, Verdict)>,
     /// How many plans in a row were outdated when they came.
     outdated: usize,
     /// How many searches in a row were ended because goals were abandoned.
