@@ -157,8 +157,8 @@ fn what_was_taken_in_counts_for_the_next_request() {
 #[test]
 fn in_a_pause_nothing_is_started() {
     let own = Executive::start(&folder("pause"), &[DOMAIN, PROBLEM, "--realtime", "10"]);
-    // It listens a moment before it has a run.
-    own.await_state(|state| state["activity"] != "beginning");
+    // An action that was ordered before the pause starts in it.
+    own.await_state(|state| state["running"].as_array().is_some_and(|it| it.len() == 2));
     let (status, answer) = own.post("/v1/pause", &Value::Null);
     assert_eq!(status, 200, "{answer}");
     let state = own.await_state(|state| state["running"].as_array().is_some_and(Vec::is_empty));
