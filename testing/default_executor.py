@@ -86,8 +86,9 @@ def recharge(needed, planned, least, most, deadline, name):
     return domain, problem, f"0.000: (recharge) [{planned}]\n{planned + 0.001:.3f}: (drive) [20]\n"
 
 
-def errands(robots, stops, deadline, name):
-    """Robots that visit places in turn, with one deadline for all; two of them meet at the end."""
+def errands(robots, stops, deadline, name, of_two=True):
+    """Robots that visit places in turn, with one deadline for all; two of them meet at the end, or one meets itself."""
+    differ = "(at start (not (= ?a ?b))) " if of_two else ""
     domain = f"""(define (domain {name})
   (:requirements :typing :equality :negative-preconditions :durative-actions :timed-initial-literals)
   (:types robot place) (:predicates (at ?r - robot ?p - place) (next ?p ?q - place) (open) (met))
@@ -95,7 +96,7 @@ def errands(robots, stops, deadline, name):
     :condition (and (at start (at ?r ?p)) (over all (next ?p ?q)) (over all (open)))
     :effect (and (at start (not (at ?r ?p))) (at end (at ?r ?q))))
   (:durative-action meet :parameters (?a ?b - robot ?p - place) :duration (= ?duration 2)
-    :condition (and (at start (not (= ?a ?b))) (over all (at ?a ?p)) (over all (at ?b ?p)) (over all (open)))
+    :condition (and {differ}(over all (at ?a ?p)) (over all (at ?b ?p)) (over all (open)))
     :effect (at end (met))))
 """
     robot_names = [f"r{it}" for it in range(robots)]
@@ -148,6 +149,10 @@ def own_worlds():
         worlds[f"recharge-{needed}-of-{planned}-by-{deadline}"] = recharge(*values, "recharge")
     for robots, stops, deadline in ((2, 1, 9), (2, 2, 14), (2, 3, 40), (2, 4, 26), (3, 1, 8), (3, 3, 22), (4, 5, 33)):
         worlds[f"errands-{robots}x{stops}-by-{deadline}"] = errands(robots, stops, deadline, "errands")
+    # The given plan lets two robots meet. Another plan need not wait for the second one.
+    for robots, stops, deadline in ((2, 2, 14), (3, 3, 19), (3, 3, 22), (4, 3, 22)):
+        files = errands(robots, stops, deadline, "errands", of_two=False)
+        worlds[f"meeting-{robots}x{stops}-by-{deadline}"] = files
     for deadline in (17, 18, 22, 40):
         worlds[f"handover-by-{deadline}"] = handover(deadline, "handover")
     return worlds
