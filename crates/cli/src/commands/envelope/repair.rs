@@ -67,8 +67,16 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     }
     Ok(match &outcome.answer.finding {
         RepairFinding::Repaired { .. } => Exit::Yes,
-        RepairFinding::Impossible { .. } => Exit::No,
-        RepairFinding::None { .. } => Exit::Limit,
+        RepairFinding::Impossible {
+            orders: Orders::All,
+            ..
+        } => Exit::No,
+        // A repair may exist in another order.
+        RepairFinding::Impossible {
+            orders: Orders::Kept,
+            ..
+        }
+        | RepairFinding::None { .. } => Exit::Limit,
     })
 }
 

@@ -360,12 +360,16 @@ fn ended(
                 .flat_map(|room| [&room.lower_limit, &room.upper_limit]);
             let is_any = limits.any(|limit| limit.as_deref() == Some(elbowroom::ANY_FINITE));
             let any = if is_any { " or has none" } else { "" };
-            let untold = if parameters.iter().any(is_untold) {
-                ". Where no reason is given, no limit was found"
+            // Ends without a reason stay at the farthest value that the search tries.
+            let (which, untold) = if parameters.iter().any(is_untold) {
+                (
+                    "Each end with a reason",
+                    ". Where no reason is given, an end could still move",
+                )
             } else {
-                ""
+                ("Each end", "")
             };
-            format!("Each end is at its limit{any}{untold}")
+            format!("{which} is at its limit{any}{untold}")
         }
         Stop::Converged => {
             let steps = match &request.search.relative {
