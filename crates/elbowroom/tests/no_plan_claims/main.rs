@@ -411,3 +411,31 @@ fn fluents_without_value_that_change_nothing_are_not_named() {
         assert_eq!(fluents, expected, "{name}");
     }
 }
+
+/// An action for the goal `(there)` whose condition or effect mentions `(used)`.
+#[test]
+fn fluent_without_value_is_named_wherever_it_is_mentioned() {
+    for (condition, effect) in [
+        ("(over all (> (used) 3))", "(at end (there))"),
+        ("(at start (not (> (used) 3)))", "(at end (there))"),
+        ("(at start (or (never) (> (used) 3)))", "(at end (there))"),
+        ("(at start (much))", "(at end (there))"),
+        ("(and)", "(when (at start (> (used) 3)) (at end (there)))"),
+        ("(and)", "(and (at end (there)) (decrease (used) (* #t 1)))"),
+        (
+            "(at end (> (other) 3))",
+            "(and (at end (there)) (increase (other) (* #t (used))))",
+        ),
+    ] {
+        let domain = format!(
+            "(:requirements :adl :fluents :derived-predicates :continuous-effects)
+            (:functions (used) (other)) (:predicates (there) (never) (much))
+            (:derived (much) (> (used) 3))
+            (:durative-action go :parameters () :duration (= ?duration 5)
+              :condition {condition} :effect {effect})"
+        );
+        let task = task(&domain, "(= (other) 0)", "(there)");
+        let fluents = fluents_without_value(&task, &Situation::initial(&task));
+        assert_eq!(fluents, ["(used)"], "{condition}, {effect}");
+    }
+}

@@ -17,7 +17,8 @@ impl Instances {
     pub fn fluents_without_value(&self, reached: &Reached, stated: &Reached) -> Vec<String> {
         let goal = self.task.goal();
         let mut found = BTreeSet::new();
-        self.lasting.read_by_condition(&self.task, goal, &mut found);
+        self.lasting
+            .mentioned_by_condition(&self.task, goal, &mut found);
         if found.is_empty() && self.is_goal_in_reach(reached) {
             let is_open = !self.is_goal_in_reach(stated);
             let mut relevance = Relevance {
@@ -29,7 +30,8 @@ impl Instances {
             };
             relevance.need(goal);
             for action in relevance.contributors() {
-                self.lasting.read_by_action(&self.task, action, &mut found);
+                self.lasting
+                    .mentioned_by_action(&self.task, action, &mut found);
             }
         }
         let names = found.into_iter();

@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Action, Body, Change, Condition, Expression, FluentId, SnapAction};
+use elbowroom_model::ground::{
+    Action, Body, Change, Condition, Expression, FluentId, Guard, SnapAction,
+};
 use elbowroom_model::problem::UpdateOperator;
 
 use super::lasting::{Lasting, Value};
@@ -34,7 +36,7 @@ impl Lasting {
     }
 
     /// Adds the valueless fluents of comparisons without which a condition does not hold.
-    pub(super) fn read_by_condition(
+    fn read_by_condition(
         &self,
         task: &Task,
         condition: &Condition,
@@ -45,6 +47,58 @@ impl Lasting {
                 self.read_by_expression(task, left, found);
                 self.read_by_expression(task, right, found);
             }
+        }
+    }
+
+    /// Adds the valueless fluents that a condition mentions anywhere, also by way of rules.
+    pub(super) fn mentioned_by_condition(
+        &self,
+        task: &Task,
+        condition: &Condition,
+        found: &mut BTreeSet<FluentId>,
+    ) {
+        task.visit_fluents_of(condition, &mut |fluent| {
+            if self.is_valueless(task, fluent) {
+                found.insert(fluent);
+            }
+        });
+    }
+
+    /// Adds the valueless fluents that an action mentions anywhere. A plan may contain the action nevertheless.
+    pub(super) fn mentioned_by_action(
+        &self,
+        task: &Task,
+        action: &Action,
+        found: &mut BTreeSet<FluentId>,
+    ) {
+        self.read_by_action(task, action, found);
+        let (snaps, body) = match &action.body {
+            Body::Instantaneous(snap) => (vec![snap], None),
+            Body::Durative(body) => (vec![&*body.start, &*body.end], Some(body)),
+        };
+        for snap in snaps {
+            self.mentioned_by_condition(task, &snap.condition, found);
+            for effect in &snap.effects {
+                self.mentioned_by_guard(task, &effect.guard, found);
+                if let Change::Update { value, .. } = &effect.change {
+                    self.read_by_expression(task, value, found);
+                }
+            }
+        }
+        let Some(body) = body else { return };
+        self.mentioned_by_condition(task, &body.over_all, found);
+        for effect in &body.continuous {
+            self.mentioned_by_guard(task, &effect.guard, found);
+            self.read_by_expression(task, &effect.rate, found);
+            if self.is_valueless(task, effect.fluent) {
+                found.insert(effect.fluent);
+            }
+        }
+    }
+
+    fn mentioned_by_guard(&self, task: &Task, guard: &Guard, found: &mut BTreeSet<FluentId>) {
+        for condition in [&guard.at_start, &guard.over_all, &guard.now] {
+            self.mentioned_by_condition(task, condition, found);
         }
     }
 
