@@ -138,6 +138,65 @@ fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
     assert!(difference(&steady, "steady.jsonl").is_some());
 }
 
+/// A deadline that is met more often if the order of the actions changes. `policy` makes that plan itself, so the
+/// planner does not make the first of the plans in the trace.
+#[test]
+fn run_in_which_policy_has_the_likelier_plan_and_the_planner_makes_the_next_one() {
+    let domain = Temporary::new(
+        "shift-domain.pddl",
+        "(define (domain shift)
+  (:requirements :strips :durative-actions :timed-initial-literals :duration-inequalities)
+  (:predicates (free) (soft) (cut) (sanded) (open) (lit))
+  (:durative-action soak :parameters () :duration (and (>= ?duration 7) (<= ?duration 17))
+    :condition (at start (open)) :effect (at end (soft)))
+  (:durative-action cut :parameters () :duration (= ?duration 3)
+    :condition (and (at start (free)) (at start (soft)) (over all (lit)) (at end (lit)))
+    :effect (and (at start (not (free))) (at end (free)) (at end (cut))))
+  (:durative-action sand :parameters () :duration (= ?duration 3)
+    :condition (and (at start (free)) (at end (open)))
+    :effect (and (at start (not (free))) (at end (free)) (at end (sanded)))))",
+    );
+    let problem = Temporary::new(
+        "shift-problem.pddl",
+        "(define (problem late) (:domain shift)
+  (:init (free) (open) (lit) (at 14 (not (open))) (at 16.5 (not (lit))))
+  (:goal (and (soft) (cut) (sanded))))",
+    );
+    let plan = Temporary::new(
+        "shift.plan",
+        "0: (soak) [7]\n7.001: (cut) [3]\n10.002: (sand) [3]\n",
+    );
+    let world = Temporary::new(
+        "shift-world.toml",
+        "format = \"elbowroom-world\"\nversion = 1\n\
+         [[duration]]\naction = \"*\"\nuniform = { from = 0.5, to = 1.5 }\nrelative = true\n\
+         [[failure]]\naction = \"sand\"\nprobability = 0.5\nwhen = \"midway\"\nundone = true\n",
+    );
+    let [domain, problem, plan, world] = [&domain, &problem, &plan, &world].map(Temporary::name);
+    let mut plans = 0;
+    for seed in ["4", "5", "8"] {
+        let trace = played_back(
+            "policy",
+            &[
+                &domain,
+                &problem,
+                &plan,
+                "--executor",
+                "policy",
+                "--world",
+                &world,
+                "--seed",
+                seed,
+                "--planning-budget",
+                "0.5",
+            ],
+        );
+        assert!(causes(&trace).iter().any(|cause| cause == "likelier"));
+        plans += trace.matches("\"event\":\"planned\"").count();
+    }
+    assert!(plans > 3, "{plans}");
+}
+
 #[test]
 fn runs_by_likelihoods_in_which_starts_fail_and_the_door_locks() {
     for executor in ["adaptable", "lookahead", "esterel"] {

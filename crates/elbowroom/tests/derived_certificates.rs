@@ -16,6 +16,8 @@ mod networks;
 #[path = "derived_certificates/numbers.rs"]
 mod numbers_that_change;
 mod shared;
+#[path = "derived_certificates/windows.rs"]
+mod windows;
 
 use std::sync::Arc;
 

@@ -28,6 +28,12 @@ pub trait Planner: Send {
 
     /// What was begun is not needed any more.
     fn give_up(&mut self) {}
+
+    /// Returns `true` if the next answer is read from the record of a run. The planner must then be asked, even if the
+    /// caller has a plan already: each request in the record has one answer.
+    fn is_recorded(&self) -> bool {
+        false
+    }
 }
 
 impl<P: Planner + ?Sized> Planner for &mut P {
@@ -50,6 +56,10 @@ impl<P: Planner + ?Sized> Planner for &mut P {
     fn give_up(&mut self) {
         (**self).give_up();
     }
+
+    fn is_recorded(&self) -> bool {
+        (**self).is_recorded()
+    }
 }
 
 impl<P: Planner + ?Sized> Planner for Box<P> {
@@ -71,6 +81,10 @@ impl<P: Planner + ?Sized> Planner for Box<P> {
 
     fn give_up(&mut self) {
         (**self).give_up();
+    }
+
+    fn is_recorded(&self) -> bool {
+        (**self).is_recorded()
     }
 }
 

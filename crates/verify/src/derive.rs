@@ -264,18 +264,26 @@ fn assumed(
     Ok(())
 }
 
-/// Checks that a parameter can deviate as far as it naturally does, or as far as deviations are counted.
+/// Checks that a parameter can deviate as far as it naturally does, or as far as deviations are counted. In a symmetric
+/// box it deviates equally far in both directions.
 fn is_not_narrower(
     certificate: &Certificate,
     own: &Parameter,
     [below, above]: [Option<Rational>; 2],
 ) -> Result<(), NotDerived> {
     let counted = &own.scale * &certificate.counted;
-    let is_narrow = |most: &Option<crate::Exact>, natural: Option<Rational>| {
-        let natural = natural.map_or_else(|| counted.clone(), |own| own.min(counted.clone()));
-        most.as_ref().is_some_and(|most| most.0 < natural)
+    let limited = |natural: Option<Rational>| {
+        natural.map_or_else(|| counted.clone(), |own| own.min(counted.clone()))
     };
-    if is_narrow(&own.most_below, below) || is_narrow(&own.most_above, above) {
+    let [mut below, mut above] = [below, above].map(limited);
+    if certificate.symmetric {
+        below = below.min(above);
+        above = below.clone();
+    }
+    let is_narrow = |most: &Option<crate::Exact>, natural: &Rational| {
+        most.as_ref().is_some_and(|most| most.0 < *natural)
+    };
+    if is_narrow(&own.most_below, &below) || is_narrow(&own.most_above, &above) {
         let what = format!(
             "the range of {}, which is an option of the command",
             own.name

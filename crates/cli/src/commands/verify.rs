@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
                 output::print(&text)?;
             }
             Ok(match wrong {
-                AnswerError::NotDerivable(_) => Exit::Limit,
+                AnswerError::NotDerivable(_) | AnswerError::NoCertificate => Exit::Limit,
                 _ => Exit::No,
             })
         }

@@ -140,7 +140,7 @@ struct Chosen<'a> {
 impl Planner for Chosen<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let chosen = self.rehearse.get().chosen_for(task, situation);
-        match chosen {
+        match chosen.filter(|_| !self.planner.is_recorded()) {
             Some(plan) => PlannerAnswer::from(PlanAnswer::Plan(plan)),
             None => self.planner.plan(task, situation),
         }

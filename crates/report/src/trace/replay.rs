@@ -368,6 +368,10 @@ impl Planner for ReplayPlanner {
     fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         Self::answer(self.open.take(), task, situation)
     }
+
+    fn is_recorded(&self) -> bool {
+        !self.requests.is_empty()
+    }
 }
 
 /// A preparer of a run that is played back: where plans were made ready beside the run, the trace says

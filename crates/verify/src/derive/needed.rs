@@ -194,12 +194,15 @@ impl Reader<'_> {
             return false;
         };
         let are_timed = matches!((first.what, second.what), (What::Timed(_), What::Timed(_)));
-        let interfere = !are_timed
-            && first.time < second.time
-            && first.footprint.interferes_with(&second.footprint);
-        let epsilon = self.subject.task.epsilon();
+        let interfere =
+            first.time < second.time && first.footprint.interferes_with(&second.footprint);
+        // Timed initials may be as near to each other as in the problem.
+        let mut apart = self.subject.task.epsilon().clone();
+        if are_timed {
+            apart = apart.min(&second.time - &first.time);
+        }
         let keeps_apart = self.sides.contains(&(from, to)) || self.are_in_turn(first, second);
-        (interfere && least.0 <= *epsilon) || (keeps_apart && least.0 <= Rational::ZERO)
+        (interfere && least.0 <= apart) || (keeps_apart && least.0 <= Rational::ZERO)
     }
 
     /// Returns `true` if the first point ends an instance of an action, and the second one starts another instance

@@ -183,6 +183,10 @@ impl Planner for PastPlanner<'_> {
             self.present.expect(task, situation);
         }
     }
+
+    fn is_recorded(&self) -> bool {
+        self.asked.front() == Some(&true)
+    }
 }
 
 /// Ends the run where it was asked to end, and when it is asked to now, or cannot be written down.
