@@ -5,6 +5,7 @@ use std::sync::Arc;
 use elbowroom::answers::run::simulate;
 use elbowroom::answers::{RunAnswer, RunRequest, Unwatched};
 use elbowroom::execute::{NamedText, RunSpec, SpecError, Spoiler};
+use elbowroom::execution::run::Verdict;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::read_problem;
@@ -280,4 +281,43 @@ fn policy_says_why_it_has_no_table() {
     let reason = |world: &str, budget: &str| answer_of_policy(world, budget).no_table;
     assert!(reason(delayed, "10").is_some_and(|why| why.contains("delay")));
     assert!(reason(varied, "0.000001").is_some_and(|why| why.contains("--planning-budget")));
+}
+
+/// A failure of the first action makes the start of the second one impossible, and does not report that.
+#[test]
+fn policy_does_not_start_a_refused_action_without_end() {
+    let named = |name: &str, text: &str| NamedText {
+        name: name.to_owned(),
+        text: text.to_owned(),
+    };
+    let domain = "(define (domain pair) (:requirements :durative-actions)
+        (:predicates (hand) (ready) (done))
+        (:durative-action prepare :parameters () :duration (= ?duration 2)
+          :effect (at end (ready)))
+        (:durative-action work :parameters () :duration (= ?duration 3)
+          :condition (and (at start (ready)) (at start (hand))) :effect (at end (done))))";
+    let problem = "(define (problem p) (:domain pair) (:init (hand)) (:goal (done)))";
+    let world = "format = \"elbowroom-world\"\nversion = 1\n[[failure]]\naction = \"prepare\"\n\
+        probability = 0.5\nwhen = \"start\"\n[[failure.outcome]]\nprobability = 1\n\
+        becomes_false = [\"(hand)\"]\nreported = false\n";
+    let (domain, problem) = (named("domain", domain), named("problem", problem));
+    let mut limits = 0;
+    for seed in 0..8 {
+        let spec = RunSpec {
+            world: Some(world.to_owned()),
+            executor: "policy".parse().expect("a correct test"),
+            seed,
+            time_limit: Rational::from(100),
+            ..RunSpec::new(domain.clone(), problem.clone())
+        };
+        let (problem, _) =
+            read_problem(&spec.domain.source(), &spec.problem.source()).expect("a correct test");
+        let task = Arc::new(Task::new(problem));
+        let request = RunRequest::new(&spec, &task);
+        let report = simulate(request, &mut Unwatched).expect("a world").report;
+        limits += usize::from(report.verdict == Verdict::ReplanLimit);
+        assert_ne!(report.verdict, Verdict::TimeLimit, "{seed}");
+        assert!(report.starts < 300, "{seed}: {}", report.starts);
+    }
+    assert!(limits > 0, "else the test is about nothing");
 }

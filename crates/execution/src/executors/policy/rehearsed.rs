@@ -17,6 +17,10 @@ use crate::rehearsal::{Rehearsal, Rehearsing, Scene, SeenChange};
 
 use super::moves::wait;
 
+/// The greatest number of hand-overs in a row after the plan was given up, without any action that succeeds in between.
+/// Then a new plan is requested, and the number of new plans is limited.
+const MOST_HAND_OVERS: usize = 10;
+
 /// So often in the time that a plan takes it is looked ahead, whether or not something happens.
 const LOOKS: i64 = 8;
 
@@ -38,6 +42,8 @@ pub(super) struct Rehearsed {
     next_step: u32,
     /// The steps of the plan that were not begun, by the world's clock.
     left: Vec<Step>,
+    /// The number of hand-overs after the plan was given up, since an action last succeeded.
+    hand_overs: usize,
     /// The facts that may change by themselves, as they were last.
     watched: Option<BTreeMap<FactId, bool>>,
     seen: Vec<SeenChange>,
@@ -82,6 +88,7 @@ impl Rehearsed {
             steps: BTreeMap::new(),
             next_step: 0,
             left: Vec::new(),
+            hand_overs: 0,
             watched: None,
             seen: Vec::new(),
             plans: 0,
@@ -164,6 +171,9 @@ impl Rehearsed {
                 }
             }
             News::Ended { ending, .. } => {
+                if *ending == Ending::Succeeded {
+                    self.hand_overs = 0;
+                }
                 if let Some(commanded) = self.steps.remove(&step)
                     && *ending != Ending::Succeeded
                 {
@@ -272,7 +282,15 @@ impl Rehearsed {
                 let value = rehearsed.value.to_f64();
                 wait(Some(until), About::NextDecision(value))
             }
+            Rehearsing::HandsOver(..)
+                if kept.decision == Decision::Replan && self.hand_overs >= MOST_HAND_OVERS =>
+            {
+                self.outward(kept, moment.now)
+            }
             Rehearsing::HandsOver(executor, mission) => {
+                if kept.decision == Decision::Replan {
+                    self.hand_overs += 1;
+                }
                 match self.hand_over(moment, executor, &mission) {
                     Some(decided) => decided,
                     None => self.outward(kept, moment.now),
@@ -408,6 +426,7 @@ impl Executor for Rehearsed {
         self.next_step = u32::try_from(mission.plan.plan.instances.len()).unwrap_or(u32::MAX);
         self.plans += 1;
         self.is_new = true;
+        self.hand_overs = 0;
         self.is_settled = false;
         let ends = mission.time_triggered.steps.iter().map(Step::end);
         let length = ends.max().unwrap_or_default();
