@@ -17,8 +17,8 @@ use crate::rehearsal::{Rehearsal, Rehearsing, Scene, SeenChange};
 
 use super::moves::wait;
 
-/// The greatest number of hand-overs in a row after the plan was given up, without any action that succeeds in between.
-/// Then a new plan is requested, and the number of new plans is limited.
+/// The greatest number of consecutive hand-overs of an abandoned plan without any action that succeeds in between. Then
+/// a new plan is requested, and the number of new plans is limited.
 const MOST_HAND_OVERS: usize = 10;
 
 /// So often in the time that a plan takes it is looked ahead, whether or not something happens.
@@ -42,7 +42,7 @@ pub(super) struct Rehearsed {
     next_step: u32,
     /// The steps of the plan that were not begun, by the world's clock.
     left: Vec<Step>,
-    /// The number of hand-overs after the plan was given up, since an action last succeeded.
+    /// The number of hand-overs of an abandoned plan since an action last succeeded.
     hand_overs: usize,
     /// The facts that may change by themselves, as they were last.
     watched: Option<BTreeMap<FactId, bool>>,
