@@ -224,6 +224,7 @@ impl<'a> Run<'a> {
             && let Some(turn) = lasting.change.take()
         {
             lasting.rests_since = None;
+            self.lost.in_vain = None;
             self.replans = 0;
             self.turn_to(turn)?;
             return Ok(true);

@@ -313,6 +313,8 @@ impl Run<'_> {
 
     /// What the present plan would start is not started any more.
     pub(super) fn let_go_of_plan(&mut self) {
+        // It was for a better plan than this one.
+        self.give_up_optional_search();
         self.lost.plan = true;
         self.keep_foreseen();
         if let Some(search) = &mut self.search {

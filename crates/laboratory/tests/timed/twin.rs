@@ -137,7 +137,7 @@ impl SmallWorld {
         world
     }
 
-    /// A world without events, in which the goal can become unreachable: starts use up facts, and failures delete others.
+    /// A world without events. Its goal can become unreachable, because starts use up facts and failures delete others.
     #[allow(dead_code, reason = "not all tests that share this ask for it")]
     pub(crate) fn with_costly_failures(rng: &mut ChaCha8Rng) -> Self {
         let mut world = Self::with_outcomes(rng, false);

@@ -13,7 +13,7 @@ use super::symbols::Symbols;
 use super::{Action, Change, NONE, Rule, Snap, Timed, Update};
 use crate::embedded::formula::{Formula, Linear, Literal, Numeric, Test};
 
-/// The parts of the compiled problem in which exclusive fluents are found.
+/// The parts of the compiled problem that decide about exclusive fluents.
 #[derive(Clone, Copy)]
 pub(super) struct Parts<'a> {
     pub(super) actions: &'a [Action],
@@ -30,7 +30,7 @@ impl Parts<'_> {
     /// changes it. Plans may still read it in the goal.
     pub(super) fn exclusive_fluents(self) -> Vec<bool> {
         let count = self.symbols.fluents.len();
-        // For each fluent the facts that all of its actions so far take; `None` if it has no action yet.
+        // For each fluent, the facts that all its visited actions take; `None` before the first action.
         let mut taken: Vec<Option<Vec<u32>>> = vec![None; count];
         let mut used = Vec::new();
         for action in self.actions {
