@@ -180,8 +180,8 @@ def what_is_late_has_its_reason(stage):
     # The rest of the plan is executed without a guarantee; ROSPlan's interfaces cannot be cancelled, so that the last
     # inspection may succeed after the light has gone out.
     words = " ".join(stage.out.split())
-    # Whether it is the end that is late or the rest that lacks time is a matter of milliseconds.
-    assert stage.code in (0, *NO_PLAN) and "too little time is left" in words and "end of (inspect hull)" in words
+    # Milliseconds decide which of the two inspections is named, and whether its end is late or the rest lacks time.
+    assert stage.code in (0, *NO_PLAN) and "too little time is left" in words and "end of (inspect " in words
     assert '"cancel"' in stage.trace()
 
 
