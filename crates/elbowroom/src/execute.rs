@@ -14,6 +14,7 @@ mod first_plan;
 mod likeliest;
 mod memory;
 mod misfit;
+mod open_durations;
 mod planners;
 mod race;
 mod rehearse;

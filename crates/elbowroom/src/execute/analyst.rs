@@ -21,6 +21,7 @@ use elbowroom_plan::{
 use elbowroom_stn::ConsistentNetwork;
 
 use super::facts_only::{as_timed, facts_only};
+use super::open_durations;
 use super::vary::is_about_an_absent_action;
 use crate::answers::envelope::{PlannedBeyond, grow};
 use crate::flow::{self, FlowError};
@@ -166,8 +167,9 @@ impl Preparer for Analyst {
         if is_about_orders {
             return Self::orderings(task, plan, need);
         }
-        let nominal = freed.nominal.clone();
+        let mut nominal = freed.nominal.clone();
         let instances = freed.instances.clone();
+        let open = open_durations::of(&freed.plan);
         let plan = Arc::new(match need {
             Need::Orderings | Need::PartialOrder | Need::Network => flow::closed(task, freed),
             Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
@@ -182,8 +184,12 @@ impl Preparer for Analyst {
             Need::OpenNetwork => self.envelope(task, &plan, &nominal).ok(),
             Need::Orderings | Need::PartialOrder | Need::Network => None,
         };
+        let mut plan = Arc::unwrap_or_clone(plan);
+        if let Some(envelope) = envelope.as_ref().filter(|_| need == Need::OpenNetwork) {
+            open_durations::choose(task, &mut plan, &mut nominal, &open, envelope);
+        }
         Ok(Prepared {
-            plan: Arc::unwrap_or_clone(plan),
+            plan,
             instances,
             nominal,
             envelope,
