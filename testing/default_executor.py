@@ -133,6 +133,36 @@ def handover(deadline, name):
     return domain, problem, "0.000: (hold) [12]\n2.000: (pass) [8]\n10.001: (deliver) [6]\n"
 
 
+def kettles(kettles, shift, pause, gas, name):
+    """Kettles that are heated at any time, for as long as they need, and boiled and emptied in shifts. Burnt ones are lost."""
+    domain = f"""(define (domain {name})
+  (:requirements :typing :durative-actions :numeric-fluents :continuous-effects :duration-inequalities
+    :timed-initial-literals)
+  (:types kettle) (:predicates (free ?k - kettle) (ready) (shift) (boiled ?k - kettle) (bottled ?k - kettle))
+  (:functions (temperature ?k - kettle) (gas))
+  (:durative-action heat :parameters (?k - kettle) :duration (and (>= ?duration 2) (<= ?duration 40))
+    :condition (and (at start (free ?k)) (over all (>= (gas) 0)) (over all (<= (temperature ?k) 100)))
+    :effect (and (at start (not (free ?k))) (at end (free ?k)) (increase (temperature ?k) (* #t 4))
+      (decrease (gas) (* #t 1))))
+  (:durative-action boil :parameters (?k - kettle) :duration (= ?duration 7)
+    :condition (and (at start (free ?k)) (at start (>= (temperature ?k) 90)) (over all (shift)))
+    :effect (and (at start (not (free ?k))) (at end (free ?k)) (at end (boiled ?k))
+      (decrease (temperature ?k) (* #t 2))))
+  (:durative-action bottle :parameters (?k - kettle) :duration (= ?duration 5)
+    :condition (and (at start (free ?k)) (at start (ready)) (at start (boiled ?k)) (over all (shift)))
+    :effect (and (at start (not (ready))) (at end (ready)) (at start (not (free ?k))) (at end (bottled ?k)))))
+"""
+    names = [f"k{it}" for it in range(kettles)]
+    warm = " ".join(f"(= (temperature {it}) {20 + 20 * (place % 3)})" for place, it in enumerate(names))
+    opens = [10 + (shift + pause) * it for it in range(4)]
+    shifts = " ".join(f"(at {it} (shift)) (at {it + shift} (not (shift)))" for it in opens)
+    problem = f"""(define (problem p) (:domain {name}) (:objects {" ".join(names)} - kettle)
+  (:init (ready) (= (gas) {gas}) {" ".join(f"(free {it})" for it in names)} {warm} {shifts})
+  (:goal (and {" ".join(f"(bottled {it})" for it in names)})))
+"""
+    return domain, problem, None
+
+
 def own_worlds():
     worlds = {}
     torches = ((1, 10, 6), (2, 10, 4), (2, 9, 4), (2, 30, 10), (3, 10, 3), (3, 12, 3), (3, 40, 12), (4, 30, 5), (5, 18, 3))
@@ -155,6 +185,8 @@ def own_worlds():
         worlds[f"meeting-{robots}x{stops}-by-{deadline}"] = files
     for deadline in (17, 18, 22, 40):
         worlds[f"handover-by-{deadline}"] = handover(deadline, "handover")
+    for number, shift, pause, gas in ((2, 20, 10, 80), (3, 20, 10, 120), (3, 30, 20, 70), (2, 15, 30, 45)):
+        worlds[f"kettles-{number}-{shift}-{pause}-{gas}"] = kettles(number, shift, pause, gas, "kettles")
     return worlds
 
 

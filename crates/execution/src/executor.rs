@@ -80,7 +80,7 @@ pub trait Executor: Send {
     }
 
     /// Returns whether a better plan is to be searched for while the present one is executed. Asked before each wait;
-    /// the answer is `true` once for each loss of guarantee.
+    /// the answer is `true` once for each loss of guarantee, and after each end without any guarantee.
     fn seeks_better_plan(&mut self, _now: &Rational) -> bool {
         false
     }

@@ -93,7 +93,7 @@ pub enum Cause {
     NoOrder,
     /// Another plan is likelier to succeed.
     Likelier,
-    /// The guarantee has become weaker, and another plan may have more slack.
+    /// The guarantee has become weaker, and another plan may have a stronger one or more slack.
     MoreSlack,
     /// The plan came too late to be started.
     Late,
@@ -245,7 +245,7 @@ impl Reason {
             },
             Cause::Likelier => format!("there is a likelier plan: {about}"),
             Cause::MoreSlack => {
-                "the guarantee has become weaker, and another plan has more slack".to_owned()
+                "the guarantee has become weaker, and another plan is better".to_owned()
             }
             Cause::Late => format!("the plan came too late: {about}"),
             Cause::PlanDone => format!("the plan is done, but the goal is not reached: {about}"),

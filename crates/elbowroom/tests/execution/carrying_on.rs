@@ -1,7 +1,10 @@
 //! Plans that are abandoned because time or numbers fall short, where no other plan is found.
 
+use elbowroom::execution::Cause;
 use elbowroom::execution::executors::DEFAULT_EXECUTOR;
-use elbowroom::execution::run::Verdict;
+use elbowroom::execution::run::{PlanningTime, Report, Verdict};
+use elbowroom::flow;
+use elbowroom::num::Rational;
 
 use crate::scene::Scene;
 
@@ -211,4 +214,67 @@ fn default_is_never_below_the_baselines_in_windows() {
             "{baseline}: {baseline_reached} > {default}"
         );
     }
+}
+
+/// Glass is melted for as long as the domain leaves open, at most until it is too hot, and formed in a shift. Whatever breaks
+/// off is lost.
+const GLASS: &str = "(define (domain glass)
+    (:requirements :durative-actions :fluents :continuous-effects :duration-inequalities :timed-initial-literals)
+    (:predicates (raw) (melted) (warm) (rested) (formed) (shift)) (:functions (heat))
+    (:durative-action melt :parameters () :duration (and (>= ?duration 1) (<= ?duration 40))
+      :condition (and (at start (raw)) (over all (<= (heat) 20)))
+      :effect (and (at start (not (raw))) (at end (melted)) (increase (heat) (* #t 1))))
+    (:durative-action rest :parameters () :duration (= ?duration 2)
+      :condition (and (at start (melted)) (at start (>= (heat) 10)) (at start (warm)))
+      :effect (and (at start (not (melted))) (at end (rested))))
+    (:durative-action form :parameters () :duration (= ?duration 4)
+      :condition (and (at start (rested)) (over all (shift)))
+      :effect (and (at start (not (rested))) (at end (formed)))))";
+
+/// Runs with this duration of melting. The glass is warm until then, and the first shift ends at another time.
+fn form_glass(plan: &str, times: (u32, u32), world: &str, planning_time: Rational) -> Report {
+    let (cold, shift) = times;
+    let problem = format!(
+        "(define (problem p) (:domain glass)
+          (:init (raw) (warm) (shift) (= (heat) 0) (at {cold} (not (warm)))
+            (at {shift} (not (shift))) (at 40 (shift)) (at 60 (not (shift))))
+          (:goal (formed)))"
+    );
+    let mut scene = Scene::new(GLASS, &problem, Some(plan));
+    scene.flow = flow::Settings::default();
+    scene.settings.planning_time = PlanningTime::Seconds(planning_time);
+    scene.run("live", &scene.world(world), 0)
+}
+
+const FORMED: &str = "0: (melt) [10]\n10.001: (rest) [2]\n12.002: (form) [4]";
+
+#[test]
+fn plan_that_is_carried_on_gives_way_to_one_that_is_found_after_an_end() {
+    // From 14 on it is known that the first shift is too short. If melting took a quarter longer than that, the glass
+    // would be cold; but it ends in time, and can be formed in the second shift.
+    let world = "[[duration]]\naction = \"melt\"\nconstant = 16\n";
+    let report = form_glass(FORMED, (17, 21), world, Rational::ZERO);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+    let last = report.reasons.last().map(|reason| reason.cause);
+    assert_eq!(last, Some(Cause::MoreSlack), "{report:#?}");
+}
+
+#[test]
+fn overdue_action_is_not_expected_to_break_its_own_condition() {
+    // After 18 s, a quarter longer is too hot for the glass. Because planning takes time here, no better plan is searched
+    // for before.
+    let world = "[[duration]]\naction = \"melt\"\nconstant = 19\n";
+    let report = form_glass(FORMED, (35, 24), world, Rational::new(1, 10));
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+    assert_eq!(report.replans, 1, "{report:#?}");
+}
+
+#[test]
+fn open_duration_is_not_begun_at_the_end_of_its_interval() {
+    // The plan melts until the glass is nearly too hot.
+    let plan = "0: (melt) [20]\n20.001: (rest) [2]\n22.002: (form) [4]";
+    let world = "[[duration]]\naction = \"melt\"\nrelative = true\nconstant = 1.25\n";
+    let report = form_glass(plan, (100, 100), world, Rational::ZERO);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+    assert_eq!(report.replans, 0, "{report:#?}");
 }

@@ -150,12 +150,17 @@ impl Executor for Live {
     }
 
     fn seeks_better_plan(&mut self, now: &Rational) -> bool {
-        let is_carried_on = self.carried_on.is_some();
-        let rest = self.state.as_mut().filter(|_| !is_carried_on);
+        if let Some(carried_on) = &self.carried_on {
+            return carried_on.seeks_better_plan();
+        }
+        let rest = self.state.as_mut();
         rest.is_some_and(|rest| rest.seeks_better_plan(now))
     }
 
     fn prefers(&self, mission: &Mission, now: &Rational) -> bool {
+        if self.carried_on.is_some() {
+            return promise::begin(mission).is_ok_and(|(_, promise)| promise < Promise::Luck);
+        }
         let rest = self.state.as_ref();
         rest.is_some_and(|rest| rest.is_worse_than(mission, now))
     }

@@ -11,6 +11,7 @@ use super::here::Guess;
 use super::pending::Otherwise;
 use super::{PlanningTime, Run, RunningRule, Stop};
 use crate::executor::{Mission, Need};
+use crate::planning::PlanAnswer;
 use crate::reason::{Cause, Reason};
 use crate::record::Entry;
 
@@ -53,6 +54,7 @@ impl Run<'_> {
         };
         let can_continue = |ticket| self.belief.running().contains_key(&ticket);
         has_planner
+            && !self.lost.sought_in_vain
             && !self.lost.plan
             && self.settings.running == RunningRule::Keep
             && self.replans < self.settings.most_replans
@@ -61,6 +63,11 @@ impl Run<'_> {
             && !self.is_paused()
             && self.account.open_tickets().all(can_continue)
             && self.belief.breaking().is_empty()
+    }
+
+    /// Takes note of an answer without a better plan. It is cheap to search again where it is known that there is none.
+    pub(super) fn note_no_better_plan(&mut self, answer: &PlanAnswer) {
+        self.lost.sought_in_vain = *answer != PlanAnswer::Unsolvable;
     }
 
     /// Returns whether a prepared plan takes over from the present one, which is counted then.

@@ -13,7 +13,7 @@ use elbowroom_model::{Situation, Step};
 use elbowroom_num::{Interval, Rational};
 
 use super::Run;
-use super::here::{Guess, situation_at};
+use super::here::{Guess, a_quarter_longer, situation_at};
 use super::waits::Moment;
 use crate::event::Ticket;
 use crate::executor::{Need, StepId};
@@ -66,7 +66,7 @@ pub(super) struct Reach {
 /// What is expected of an action under way that should have ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Late {
-    /// It takes a quarter longer than it has taken.
+    /// As [`Guess::AQuarterLonger`].
     AQuarterLonger,
     /// It goes on, but for what is late by no more than [`Run::slack`] and was not warned of: that
     /// ends now.
@@ -174,9 +174,7 @@ impl Run<'_> {
         let soonest = &self.now + self.task.epsilon();
         match late {
             Late::AQuarterLonger => {
-                let elapsed = &self.now - &underway.start;
-                let end = &underway.start + elapsed * Rational::new(5, 4);
-                Some(end.max(soonest))
+                Some(a_quarter_longer(&self.belief, ticket, &self.now).max(soonest))
             }
             Late::GoesOn => {
                 let entry = self.account.get(ticket);

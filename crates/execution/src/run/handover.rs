@@ -182,8 +182,9 @@ impl Run<'_> {
         });
         self.heed()?;
         if attempt.is_optional {
-            if let PlanAnswer::Plan(plan) = planned.answer {
-                self.prepare_better_plan(attempt, &plan);
+            match planned.answer {
+                PlanAnswer::Plan(plan) => self.prepare_better_plan(attempt, &plan),
+                answer => self.note_no_better_plan(&answer),
             }
             return Ok(());
         }

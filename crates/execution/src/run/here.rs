@@ -12,8 +12,8 @@ use crate::progression::Progression;
 /// When something will end that should have ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guess {
-    /// After a quarter of the time that it has taken. Who guesses "any moment now" again and again
-    /// plans again and again.
+    /// After a quarter of the time that it has taken, or sooner where its own conditions over all do not hold for so
+    /// long. A guess that it ends at any moment would lead to a new plan at each moment.
     AQuarterLonger,
     /// As soon as it can: if there is no plan even then, there is none with it.
     AnyMoment,
@@ -42,12 +42,12 @@ pub fn situation_at(
     }
     let running = state
         .running()
-        .values()
-        .map(|underway| {
+        .iter()
+        .map(|(ticket, underway)| {
             let elapsed = &time - &underway.start;
             let expected = match guess {
                 _ if underway.planned > elapsed => underway.planned.clone(),
-                Guess::AQuarterLonger => elapsed * Rational::new(5, 4),
+                Guess::AQuarterLonger => a_quarter_longer(&state, *ticket, &time) - &underway.start,
                 Guess::AnyMoment | Guess::Cancelled => elapsed + epsilon,
             };
             state.running_action(underway, Interval::point(expected))
@@ -60,6 +60,27 @@ pub fn situation_at(
         running,
     };
     (situation, tickets)
+}
+
+/// Returns when a running action is expected to end that is overdue now: after a quarter of the time that it has taken,
+/// halved until its conditions over all hold until then if nothing else ends before. With a later end, no plan would be
+/// valid.
+pub fn a_quarter_longer(belief: &Progression, ticket: Ticket, now: &Rational) -> Rational {
+    let holds_until = |end: &Rational| {
+        let mut state = belief.clone();
+        let _ = state.advance(end);
+        let underway = state.running().get(&ticket);
+        underway.is_none_or(|it| it.broken_parts().is_empty())
+    };
+    let start = belief.running().get(&ticket).map(|it| &it.start);
+    let elapsed = now - start.unwrap_or(now);
+    let mut longer = elapsed / Rational::from(4);
+    if holds_until(now) {
+        while longer > *belief.task().epsilon() && !holds_until(&(now + &longer)) {
+            longer = longer / Rational::from(2);
+        }
+    }
+    now + longer
 }
 
 /// The plan that continues what is under way and then does what is left, all of it as much later as

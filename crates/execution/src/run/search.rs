@@ -145,6 +145,8 @@ pub(super) struct Lost {
     /// The time at which no plan was found and the executor carried on, and the verdict without it; `None` once
     /// something has happened since.
     pub(super) in_vain: Option<(Rational, Verdict)>,
+    /// `true` if a search for a better plan has used up its budget. Another one would most likely, too.
+    pub(super) sought_in_vain: bool,
     /// How many plans in a row were outdated when they came.
     outdated: usize,
     /// How many searches in a row were ended because goals were abandoned.
@@ -495,7 +497,10 @@ impl Run<'_> {
                 self.search = Some(search);
                 Ok(())
             }
-            _ if search.is_optional() => Ok(()),
+            answer if search.is_optional() => {
+                self.note_no_better_plan(&answer);
+                Ok(())
+            }
             // Another plan is needed anyway.
             _ if self.is_to_turn() => Ok(()),
             // There was none from there; from here, there may be.

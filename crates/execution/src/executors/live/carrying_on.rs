@@ -6,7 +6,7 @@ use elbowroom_stn::ConsistentNetwork;
 
 use super::{Rest, esterel, promise};
 use crate::dispatch::replan;
-use crate::executor::{Decided, Decision, Executor, Moment};
+use crate::executor::{Decided, Decision, Executor, Moment, News};
 use crate::preparation::Region;
 use crate::reason::{About, Cause, Promise, Reason};
 
@@ -39,6 +39,10 @@ pub(super) struct CarriedOn {
     hope: Hope,
     /// There is that much hope until then if nothing ends before; on the world's clock.
     until: Option<Rational>,
+    /// The time at which it was carried on. No other plan was found then.
+    since: Rational,
+    /// The observations that the executor has not received yet: before it decides, another plan is searched for.
+    unread: Vec<News>,
 }
 
 impl CarriedOn {
@@ -51,6 +55,35 @@ impl CarriedOn {
             executor: self.executor.fork()?,
             hope: self.hope,
             until: self.until.clone(),
+            since: self.since.clone(),
+            unread: self.unread.clone(),
+        })
+    }
+
+    /// Returns whether another plan is to be searched for: an action has ended.
+    pub(super) fn seeks_better_plan(&self) -> bool {
+        !self.unread.is_empty()
+    }
+
+    /// Returns whether another plan may exist since something has ended, while this one continues.
+    fn may_be_replaced(&self, moment: &Moment<'_>) -> bool {
+        let has_ended = |news: &News| matches!(news, News::Ended { .. });
+        let continues = || {
+            let mut executor = self.executor.fork()?;
+            Some(executor.decide(moment).decision != Decision::Replan)
+        };
+        self.since < *moment.now
+            && moment.news.iter().any(has_ended)
+            && continues().unwrap_or_default()
+    }
+
+    /// Decides with all observations.
+    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        let mut news = std::mem::take(&mut self.unread);
+        news.extend_from_slice(moment.news);
+        self.executor.decide(&Moment {
+            news: &news,
+            ..*moment
         })
     }
 }
@@ -112,6 +145,8 @@ impl Rest {
             executor,
             hope,
             until,
+            since: now.clone(),
+            unread: Vec::new(),
         })
     }
 
@@ -140,7 +175,16 @@ impl Rest {
         if let Some(reason) = self.outlived(now) {
             return replan(reason);
         }
-        let mut decided = carried_on.executor.decide(moment);
+        if carried_on.may_be_replaced(moment) {
+            carried_on.unread.extend_from_slice(moment.news);
+            return Decided {
+                decision: Decision::Wait {
+                    until: Some(now.clone()),
+                },
+                reason: Reason::new(Cause::MoreSlack),
+            };
+        }
+        let mut decided = carried_on.decide(moment);
         if let Decision::Wait { until } = &mut decided.decision {
             let epsilon = self.mission.task.epsilon();
             let hope = carried_on.until.as_ref().map(|until| until + epsilon);
