@@ -21,7 +21,7 @@ use std::time::Duration;
 use elbowroom::RoundingRule;
 use elbowroom::answers::run::{RunOutcome, run as execute};
 use elbowroom::answers::{Event, Halt, RunRequest, Watcher};
-use elbowroom::execute::{RunSpec, SpecError, check_vary};
+use elbowroom::execute::{NamedText, RunSpec, SpecError, check_vary};
 use elbowroom::execution::run::{MissingPlan, Verdict};
 use elbowroom::execution::{Planner, Progression, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -30,9 +30,10 @@ use elbowroom::report::trace;
 use elbowroom::sim::WorldModel;
 use elbowroom::text::Source;
 
-use crate::args::RunArgs;
+use crate::args::{CalendarArgs, RunArgs};
 use crate::attendance::{Attendance, Attended};
 use crate::bell::Bell;
+use crate::calendar::timed_problem;
 use crate::clock::Clock;
 use crate::desk::Desk;
 use crate::exit::{Answer, Exit, Failure};
@@ -66,7 +67,17 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
             "give domain and problem, in this order: elbowroom run DOMAIN PROBLEM",
         ));
     };
-    let problem = || Ok((&input::source(problem, "problem")?).into());
+    let mut since = None;
+    let problem = |domain: &NamedText| {
+        let problem = input::source(problem, "problem")?;
+        let factor = match &arguments.world_process {
+            Some(_) => Some(Rational::ONE),
+            None => arguments.realtime.clone(),
+        };
+        let (problem, at) = dated((&arguments.calendar, factor), domain, problem, output)?;
+        since = at;
+        Ok((&problem).into())
+    };
     let (mut spec, world) = spec::of(arguments, domain, problem)?;
     spec.is_attended = arguments.control.is_some();
     let (task, first) = checked(arguments, &spec, world.as_ref(), output)?;
@@ -75,6 +86,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let job = Job {
         journal: journal(arguments, RESUME)?,
         begun: &|| (),
+        since,
         aside: aside(arguments, &interrupt),
         spec: &spec,
         task: &task,
@@ -83,6 +95,23 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         attendance: &attendance,
     };
     job.execute(arguments, output)
+}
+
+/// Returns the problem with the timed initials of its calendar, and the clock that runs from time 0 if
+/// the calendar begins now. `factor` is the speed of time, if it passes on a wall clock.
+pub(super) fn dated(
+    (arguments, factor): (&CalendarArgs, Option<Rational>),
+    domain: &NamedText,
+    problem: Source,
+    output: &mut Output,
+) -> Result<(Source, Option<Clock>), Failure> {
+    let timed = timed_problem(arguments, &domain.source(), &problem, factor.is_some())?;
+    let Some(timed) = timed else {
+        return Ok((problem, None));
+    };
+    input::warn(&timed.warnings, output);
+    timed.announce(factor.as_ref());
+    Ok((timed.problem, timed.since))
 }
 
 /// What goes on with the journal of a run that ends with its goal.
@@ -236,6 +265,8 @@ pub(super) struct Job<'a> {
     pub(super) journal: Option<JournalFile>,
     /// Told when the run begins, and its first record is on the disk if there is a journal.
     pub(super) begun: &'a dyn Fn(),
+    /// Runs from time 0, where that is a date and not the beginning of the run.
+    pub(super) since: Option<Clock>,
 }
 
 impl Job<'_> {
@@ -394,7 +425,7 @@ impl Job<'_> {
         let Some(factor) = &spec.realtime else {
             return self.run(world.as_mut(), recorder, |_: &Progression| {});
         };
-        let pace = Pace::new(factor);
+        let pace = Pace::new(factor, self.since);
         let begun = Clock::start();
         let clock = || begun.seconds();
         let goes_on = || !self.interrupt.is_requested();
