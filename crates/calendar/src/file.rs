@@ -53,7 +53,7 @@ pub(crate) fn text(value: &Value) -> Option<String> {
 /// Returns the texts of a list, or the only text.
 ///
 /// # Errors
-/// When something else than texts stands there, or nothing at all.
+/// When the value is no text and no list of texts, or an empty list.
 pub(crate) fn texts(value: &Spanned<Value>) -> Result<(Span, Vec<String>), Objection> {
     let all: Option<Vec<String>> = match value.get_ref() {
         Value::Array(elements) => elements.iter().map(text).collect(),

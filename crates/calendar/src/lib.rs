@@ -12,7 +12,7 @@
 //! 3. `zone`: instants and local times. `rule`, `ranges`: the windows of a rule.
 //! 4. `initials`, `plan_text`: the texts that come out.
 //!
-//! Windows are exact to the millisecond. The crate looks at no clock: the caller gives the current
+//! Windows are exact to the millisecond. The crate reads no clock: the caller gives the current
 //! time.
 //!
 //! ```
@@ -111,7 +111,7 @@ struct CalendarFluent {
     values: Vec<(i64, Rational)>,
 }
 
-/// An interval in which a fact holds, in the problem's time.
+/// Interval during which a fact holds, in the problem's time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Window {
     /// The first time; 0 if the fact holds at the beginning.
@@ -145,7 +145,7 @@ impl Calendar {
         })
     }
 
-    /// Returns each fluent with its values and the times from which on it has them, the first at 0.
+    /// Returns each fluent with its values and the times at which it gets them, the first at 0.
     pub fn values(&self) -> impl Iterator<Item = (&str, Vec<(Rational, Rational)>)> {
         self.fluents.iter().map(|fluent| {
             let values = fluent.values.iter();

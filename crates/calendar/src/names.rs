@@ -13,8 +13,8 @@ pub(crate) enum Kind {
     Fluent,
 }
 
-/// Returns the ground names, such as `(open bakery)`, of a pattern in which `_` stands for any object of
-/// the type.
+/// Returns the ground names, such as `(open bakery)`, of a pattern. `_` matches any object of the
+/// type.
 ///
 /// # Errors
 /// When the problem has no such fact or fluent, or when it is derived.
@@ -120,7 +120,7 @@ fn unknown<'n>(what: &str, name: &str, known: impl Iterator<Item = &'n str> + Cl
     (message, advice)
 }
 
-/// Returns the objects that an argument stands for.
+/// Returns the objects that an argument matches.
 fn objects(
     argument: &str,
     parameter: &Variable,

@@ -1,5 +1,7 @@
 //! Plans with the dates of their times.
 
+use std::fmt::Write as _;
+
 use elbowroom_num::Rational;
 
 use crate::Calendar;
@@ -20,12 +22,17 @@ impl Calendar {
             .map(|(line, _)| line.chars().count())
             .max()
             .unwrap_or(0);
-        let mut text = format!("; {}\n", self.origin());
+        let mut text = format!(
+            "; {}
+",
+            self.origin()
+        );
         for (line, date) in lines {
-            match date {
-                Some(date) => text.push_str(&format!("{line:width$} ; {date}\n")),
-                None => text.push_str(&format!("{line}\n")),
-            }
+            // Writing to a string cannot fail.
+            let _ = match date {
+                Some(date) => writeln!(text, "{line:width$} ; {date}"),
+                None => writeln!(text, "{line}"),
+            };
         }
         text
     }

@@ -15,7 +15,7 @@ use crate::unit::{Length, Unit, length};
 use crate::zone::{Objection, Zone};
 use crate::{Calendar, Origin};
 
-/// The text that stands for the current time.
+/// The text for the current time.
 const NOW: &str = "now";
 
 /// The parts of a calendar file that all its sections need.
@@ -24,6 +24,8 @@ pub(crate) struct Frame {
     /// The instants from time 0 to the horizon; [`i64::MAX`] where there is none.
     pub(crate) within: Range<i64>,
     pub(crate) named: NamedDays,
+    /// The facts and fluents that the problem sets itself, and when.
+    pub(crate) set_by_problem: BTreeMap<String, &'static str>,
 }
 
 impl Frame {
@@ -86,6 +88,7 @@ fn calendar(
         zone,
         within: begin..end,
         named,
+        set_by_problem: set_by(problem),
     };
     let facts = sections::facts(file, problem, &frame, report);
     let fluents = sections::fluents(file, problem, &frame, report);
@@ -113,7 +116,7 @@ pub(crate) fn noted<T>(
         .ok()
 }
 
-/// Returns the instant that a value stands for, or notes why it stands for none.
+/// Returns the instant of a date, or notes why there is none.
 pub(crate) fn instant(value: &Spanned<Value>, zone: &Zone, report: &mut Report) -> Option<i64> {
     let written = text(value.get_ref()).unwrap_or_else(|| value.get_ref().to_string());
     noted(zone.instant(&written), &value.span(), report)
@@ -189,6 +192,11 @@ fn horizon(value: &Spanned<Value>, begin: i64, zone: &Zone, report: &mut Report)
             }
         },
     };
+    if end == i64::MAX {
+        let error = report.error(value.span(), "the horizon is too far away");
+        error.advise("leave it out where nothing recurs");
+        return None;
+    }
     if end <= begin {
         let error = report.error(value.span(), "the horizon is not after the beginning");
         error.advise(format!("time 0 is {}", zone.date(begin)));
@@ -197,8 +205,8 @@ fn horizon(value: &Spanned<Value>, begin: i64, zone: &Zone, report: &mut Report)
     Some(end)
 }
 
-/// The names of facts and fluents that the problem sets itself.
-pub(crate) fn set_by(problem: &Problem) -> BTreeMap<String, &'static str> {
+/// Returns the names of the facts and fluents that the problem sets itself, and when.
+fn set_by(problem: &Problem) -> BTreeMap<String, &'static str> {
     use elbowroom_model::problem::TimedChange;
     let name = |function: elbowroom_model::problem::FunctionId| {
         problem.functions[function.index()].name.as_str()

@@ -6,6 +6,9 @@ use crate::days::Days;
 use crate::ranges::Ranges;
 use crate::zone::{DAY, Zone};
 
+/// Midnight to midnight.
+const WHOLE_DAY: Range<i64> = 0..DAY;
+
 /// The instants from `from` to `to` whose local time lies in the hours of a day that is in `days` and
 /// not in `except`. Hours that pass midnight belong to the day on which they begin.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -52,9 +55,8 @@ impl Rule {
         if self.is_plain() {
             return Ranges::union(vec![within]);
         }
-        let whole_day = [0..DAY];
         let hours = if self.hours.is_empty() {
-            &whole_day[..]
+            std::slice::from_ref(&WHOLE_DAY)
         } else {
             &self.hours
         };

@@ -13,12 +13,15 @@ use crate::file::{File, Section, texts};
 use crate::hours;
 use crate::names::{Kind, ground};
 use crate::ranges::Ranges;
-use crate::read::{Frame, instant, noted, set_by};
+use crate::read::{Frame, instant, noted};
 use crate::rule::Rule;
 use crate::{CalendarFact, CalendarFluent};
 
 /// A rule over more days than this is a mistake: a hundred years.
 const MOST_DAYS: i64 = 36_600;
+
+/// Limit on the windows of all facts, and on those of all values. No planner can use so many.
+const MOST_WINDOWS: usize = 200_000;
 
 /// Returns the facts of the `[[window]]` sections with their windows, in the order of the file.
 pub(crate) fn facts(
@@ -29,11 +32,12 @@ pub(crate) fn facts(
 ) -> Vec<CalendarFact> {
     let mut order = Vec::new();
     let mut windows: BTreeMap<String, (Span, Vec<Range<i64>>)> = BTreeMap::new();
+    let mut count = 0;
     for section in &file.window {
         let given = section.get_ref();
         let excess = [("fluent", &given.fluent), ("value", &given.value)];
         refuse("[[window]]", &excess, report);
-        let names = names("fact", given.fact.as_ref(), section, problem, report);
+        let names = names("fact", given.fact.as_ref(), section, problem, frame, report);
         let Some(rule) = rule(section, frame, report) else {
             continue;
         };
@@ -43,6 +47,10 @@ pub(crate) fn facts(
             continue;
         }
         let found = rule.windows(&frame.zone, &frame.within);
+        count += found.len() * names.len();
+        if too_many(count, section, report) {
+            return Vec::new();
+        }
         for (name, span) in names {
             let (_, all) = windows.entry(name.clone()).or_insert_with(|| {
                 order.push(name);
@@ -79,15 +87,27 @@ pub(crate) fn fluents(
 ) -> Vec<CalendarFluent> {
     let mut order = Vec::new();
     let mut layers: BTreeMap<String, Vec<(Rational, Ranges)>> = BTreeMap::new();
+    let mut count = 0;
     for section in &file.value {
         let given = section.get_ref();
         refuse("[[value]]", &[("fact", &given.fact)], report);
-        let names = names("fluent", given.fluent.as_ref(), section, problem, report);
+        let names = names(
+            "fluent",
+            given.fluent.as_ref(),
+            section,
+            problem,
+            frame,
+            report,
+        );
         let value = number(section, report);
         let (Some(rule), Some(value)) = (rule(section, frame, report), value) else {
             continue;
         };
         let windows = rule.windows(&frame.zone, &frame.within);
+        count += windows.len() * names.len();
+        if too_many(count, section, report) {
+            return Vec::new();
+        }
         for (name, span) in names {
             let below = layers.entry(name.clone()).or_default();
             if below.is_empty() {
@@ -139,6 +159,16 @@ fn values(layers: &[(Rational, Ranges)], begin: i64) -> Vec<(i64, Rational)> {
     values
 }
 
+/// Returns `true`, and notes it, if there are more windows than [`MOST_WINDOWS`].
+fn too_many(count: usize, section: &Spanned<Section>, report: &mut Report) -> bool {
+    if count > MOST_WINDOWS {
+        let message = format!("up to here, the calendar has more than {MOST_WINDOWS} windows");
+        let error = report.error(section.span(), message);
+        error.advise("choose a nearer `horizon`, or name fewer objects");
+    }
+    count > MOST_WINDOWS
+}
+
 /// Notes keys that have no meaning in a section.
 fn refuse(section: &str, excess: &[(&str, &Option<Spanned<Value>>)], report: &mut Report) {
     for (key, value) in excess {
@@ -155,6 +185,7 @@ fn names(
     value: Option<&Spanned<Value>>,
     section: &Spanned<Section>,
     problem: &Problem,
+    frame: &Frame,
     report: &mut Report,
 ) -> Vec<(String, Span)> {
     let Some(value) = value else {
@@ -170,14 +201,13 @@ fn names(
     let Some((span, patterns)) = noted(texts(value), &value.span(), report) else {
         return Vec::new();
     };
-    let set = set_by(problem);
     let mut names = BTreeSet::new();
     for pattern in patterns {
         for name in noted(ground(&pattern, kind, problem), &span, report)
             .into_iter()
             .flatten()
         {
-            if let Some(when) = set.get(&name) {
+            if let Some(when) = frame.set_by_problem.get(&name) {
                 let message = format!("the problem itself sets {name} {when}");
                 let error = report.error(span.clone(), message);
                 error.advise("remove it from the problem's `:init`, or from the calendar");

@@ -34,7 +34,7 @@ const UNITS: [Unit; 4] = [
 /// Times are written with at most this many decimals.
 pub(crate) const DECIMALS: u32 = 6;
 
-/// The direction in which a time without a short decimal is rounded.
+/// Rounding direction of times without a short decimal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rounding {
     Up,

@@ -1,4 +1,4 @@
-//! What is wrong with calendar files, each with its line.
+//! Mistakes in calendar files, each reported with its line.
 
 use std::time::{Duration, UNIX_EPOCH};
 
@@ -73,14 +73,28 @@ c.toml:7:1: error: the window has neither begin nor end; add `days`, `hours`, `f
 c.toml:9:9: error: `8-17` are no hours; write them like `8 to 17` or `8:30 to 12`
 "#);
     insta::assert_snapshot!(window("days = [\"monday\", \"holidys\"]"), @"c.toml:9:8: error: `holidys` is not a day; write `weekdays`, `monday to thursday`, `2026-12-24`, `2026-12-24 to 2027-01-06`, or a name from `[dates]`");
-    insta::assert_snapshot!(window("days = 7"), @r#"
-c.toml:8:8: warning: (open bakery) is never true before the horizon
-c.toml:9:8: error: expected a text in quotes, or a list of texts
-"#);
+    insta::assert_snapshot!(window("days = 7"), @"c.toml:9:8: error: expected a text in quotes, or a list of texts");
     insta::assert_snapshot!(window(""), @"c.toml:7:1: error: the window has neither begin nor end; add `days`, `hours`, `from` or `to`");
     insta::assert_snapshot!(window("from = \"2026-12-01T10:00\"\nto = \"2026-12-01T09:00\""), @"c.toml:10:6: error: a window without length; `to` must be later than `from`");
     insta::assert_snapshot!(window("value = 3\nhours = \"8 to 9\""), @"c.toml:9:9: error: [[window]] has no `value`; leave it out");
     insta::assert_snapshot!(window("hour = \"8 to 9\""), @"c.toml:9:1: error: unknown key `hour`; did you mean `hours`?");
+}
+
+#[test]
+fn calendars_without_measure_are_refused() {
+    let long = |horizon: &str| {
+        let window = "[[window]]\nfact = \"(open bakery)\"\nhours = [\"8 to 9\", \"10 to 11\"]\n";
+        read_with(
+            &format!("{}{window}", HEAD.replace("3 days", horizon)),
+            None,
+        )
+    };
+    insta::assert_snapshot!(long("99999999999 weeks").expect_err("a mistake"), @"c.toml:6:11: error: the horizon is too far away; leave it out where nothing recurs");
+    let many =
+        "[[window]]\nfact = \"(open bakery)\"\nhours = [\"8 to 9\", \"10 to 11\", \"12 to 13\"]\n";
+    let text = HEAD.replace("3 days", "36000 days") + &many.repeat(3);
+    insta::assert_snapshot!(read_with(&text, None).expect_err("a mistake"), @"c.toml:10:1: error: up to here, the calendar has more than 200000 windows; choose a nearer `horizon`, or name fewer objects");
+    assert!(long("9000 days").is_ok());
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Random calendars: the windows are those that are found by asking for each minute whether a rule
 //! holds.
 
+use std::fmt::Write as _;
 use std::ops::Range;
 use std::time::UNIX_EPOCH;
 
@@ -70,11 +71,11 @@ impl Rule {
         }
         let mut text = String::new();
         if self.is_dated() {
-            text.push_str(&format!("days = [{}]\n", days.join(", ")));
+            writeln!(text, "days = [{}]", days.join(", ")).expect("a string");
         }
         let except: Vec<String> = self.except.iter().map(day).collect();
         if !except.is_empty() {
-            text.push_str(&format!("except = [{}]\n", except.join(", ")));
+            writeln!(text, "except = [{}]", except.join(", ")).expect("a string");
         }
         let time = |minute: i16| format!("{}:{:02}", minute / 60, minute % 60);
         let hours = self
@@ -83,12 +84,12 @@ impl Rule {
             .map(|(a, b)| format!("\"{} to {}\"", time(*a), time(*b)));
         let hours: Vec<String> = hours.collect();
         if !hours.is_empty() {
-            text.push_str(&format!("hours = [{}]\n", hours.join(", ")));
+            writeln!(text, "hours = [{}]", hours.join(", ")).expect("a string");
         }
         for (key, minutes) in [("from", self.from), ("to", self.to)] {
             if let Some(minutes) = minutes {
                 let at = start + jiff::SignedDuration::from_mins(minutes);
-                text.push_str(&format!("{key} = \"{at}\"\n"));
+                writeln!(text, "{key} = \"{at}\"").expect("a string");
             }
         }
         text
@@ -106,7 +107,7 @@ impl Rule {
             && self.to.is_none()
     }
 
-    /// Returns `true` if the rule holds at a local time, so many minutes after the beginning.
+    /// Returns `true` if the rule holds at a local time, `minute` minutes after the beginning.
     fn holds(&self, begin: Date, local: DateTime, minute: i64) -> bool {
         if self.from.is_some_and(|from| minute < from) || self.to.is_some_and(|to| minute >= to) {
             return false;
@@ -204,10 +205,12 @@ fn calendar(rules: &[Rule], values: &[Rule], begin: Date, zone: &TimeZone) -> (S
         DAYS * 24
     );
     for rule in rules {
-        text.push_str(&format!(
+        write!(
+            text,
             "[[window]]\nfact = \"(open a)\"\n{}",
             rule.file(begin, start)
-        ));
+        )
+        .expect("a string");
     }
     if !values.is_empty() {
         text.push_str("[[value]]\nfluent = \"(price)\"\nvalue = 0\n");
@@ -215,9 +218,11 @@ fn calendar(rules: &[Rule], values: &[Rule], begin: Date, zone: &TimeZone) -> (S
     for (index, rule) in values.iter().enumerate() {
         let rule = rule.file(begin, start);
         let value = index % 2 + 1;
-        text.push_str(&format!(
+        write!(
+            text,
             "[[value]]\nfluent = \"(price)\"\nvalue = {value}\n{rule}"
-        ));
+        )
+        .expect("a string");
     }
     (text, start)
 }

@@ -137,3 +137,9 @@ fn plans_are_dated() {
 ; metric 3
 "#);
 }
+
+#[test]
+fn document_shows_the_calendar_of_the_case() {
+    let document = include_str!("../../../docs/calendars.md");
+    assert!(document.contains(include_str!("../../../cases/market/calendar.toml")));
+}

@@ -18,7 +18,7 @@ text, and to one that ends in .json, as Elbowroom JSON, exactly. The others are 
 that takes another unit of time, it is told.\n\n\
 docs/second-witness.md says what each text means and how to ask others about it.")]
 pub(crate) struct ExportArgs {
-    /// What to write: the network as an STNU, the box or region as SMT-LIB 2, what the best
+    /// The output: the network as an STNU, the box or region as SMT-LIB 2, what the best
     /// executor can reach as a process of PRISM, or the problem with its calendar as PDDL
     #[arg(value_name = "FORMAT", value_enum)]
     pub(crate) format: ExportFormat,
