@@ -70,6 +70,7 @@ fn replay_needs_no_calendar() {
     assert_eq!(code, Some(0), "{text}");
     let replayed = elbowroom(&["run", "--replay", &trace]);
     assert!(replayed.status.success(), "{replayed:?}");
-    let refused = elbowroom(&["run", "--replay", &trace, "--begin", "now"]);
+    let file = file.display().to_string();
+    let refused = elbowroom(&["run", "--replay", &trace, "--calendar", &file]);
     assert_eq!(refused.status.code(), Some(2));
 }

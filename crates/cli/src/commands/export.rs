@@ -104,15 +104,7 @@ fn timed_problem(arguments: &ExportArgs, output: &mut Output) -> Answer {
             "give one with --calendar (docs/calendars.md)",
         ));
     }
-    if let Some(plan) = &arguments.plan {
-        return Err(Failure::new(
-            format!(
-                "{} is about a plan, and this is about a problem",
-                plan.display()
-            ),
-            "leave it out",
-        ));
-    }
+    prism::refuse_what_is_about_plans(arguments, "is about plans, and this is about a problem")?;
     let (read, warnings) = input::read(&arguments.problem, &arguments.epsilon)?;
     input::warn(&warnings, output);
     write(arguments, read.problem.text())?;
