@@ -1,5 +1,6 @@
 //! Problems with a calendar file: `docs/calendars.md`.
 
+use elbowroom::execute::NamedText;
 use elbowroom::num::Rational;
 use elbowroom::pddl;
 use elbowroom::text::{Diagnostic, Source};
@@ -10,7 +11,7 @@ use crate::clock::{self, Clock};
 use crate::exit::Failure;
 use crate::input;
 use crate::look::{HINT, styled};
-use crate::output;
+use crate::output::{self, Output};
 
 /// A problem with the timed initials of a calendar.
 pub(crate) struct TimedProblem {
@@ -54,10 +55,27 @@ pub(crate) fn timed_problem(
     }))
 }
 
+/// Returns the problem with the timed initials of its calendar, and the clock that runs from time 0 if
+/// the calendar begins now. `factor` is the speed of time, if it passes on a wall clock.
+pub(crate) fn dated(
+    (arguments, factor): (&CalendarArgs, Option<Rational>),
+    domain: &NamedText,
+    problem: Source,
+    output: &mut Output,
+) -> Result<(Source, Option<Clock>), Failure> {
+    let timed = timed_problem(arguments, &domain.source(), &problem, factor.is_some())?;
+    let Some(timed) = timed else {
+        return Ok((problem, None));
+    };
+    input::warn(&timed.warnings, output);
+    timed.announce(factor.as_ref());
+    Ok((timed.problem, timed.since))
+}
+
 impl TimedProblem {
     /// Reports the date of time 0 on standard error. `pace` is the number of the problem's time units
     /// that pass in a second, if they pass on a wall clock.
-    pub(crate) fn announce(&self, pace: Option<&Rational>) {
+    fn announce(&self, pace: Option<&Rational>) {
         let note = styled(HINT, "note");
         output::tell(&format!("{note}: {}", self.calendar.origin()));
         let Some(pace) = pace.filter(|_| self.calendar.begins_now()) else {

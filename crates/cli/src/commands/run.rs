@@ -30,10 +30,10 @@ use elbowroom::report::trace;
 use elbowroom::sim::WorldModel;
 use elbowroom::text::Source;
 
-use crate::args::{CalendarArgs, RunArgs};
+use crate::args::RunArgs;
 use crate::attendance::{Attendance, Attended};
 use crate::bell::Bell;
-use crate::calendar::timed_problem;
+use crate::calendar::dated;
 use crate::clock::Clock;
 use crate::desk::Desk;
 use crate::exit::{Answer, Exit, Failure};
@@ -95,23 +95,6 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         attendance: &attendance,
     };
     job.execute(arguments, output)
-}
-
-/// Returns the problem with the timed initials of its calendar, and the clock that runs from time 0 if
-/// the calendar begins now. `factor` is the speed of time, if it passes on a wall clock.
-pub(super) fn dated(
-    (arguments, factor): (&CalendarArgs, Option<Rational>),
-    domain: &NamedText,
-    problem: Source,
-    output: &mut Output,
-) -> Result<(Source, Option<Clock>), Failure> {
-    let timed = timed_problem(arguments, &domain.source(), &problem, factor.is_some())?;
-    let Some(timed) = timed else {
-        return Ok((problem, None));
-    };
-    input::warn(&timed.warnings, output);
-    timed.announce(factor.as_ref());
-    Ok((timed.problem, timed.since))
 }
 
 /// What goes on with the journal of a run that ends with its goal.

@@ -20,9 +20,10 @@ use elbowroom::report::trace::TraceWriter;
 
 use super::run::resume::{self, Host};
 use super::run::spec;
-use super::run::{Job, RESUME_SERVE, aside, checked, dated, journal};
+use super::run::{Job, RESUME_SERVE, aside, checked, journal};
 use crate::args::ServeArgs;
 use crate::attendance::Attendance;
+use crate::calendar::dated;
 use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
 use crate::http::{self, Listener};
