@@ -1,5 +1,6 @@
 //! What can be said on the command line.
 
+mod calendar;
 mod compare;
 mod envelope;
 mod export;
@@ -19,6 +20,7 @@ use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, V
 use clap_complete::Shell;
 use elbowroom::num::Rational;
 
+pub(crate) use calendar::CalendarArgs;
 pub(crate) use compare::CompareArgs;
 pub(crate) use envelope::{EnvelopeArgs, Growth, Order, controllable};
 pub(crate) use export::{Bound, ExportArgs, ExportFormat};
@@ -266,6 +268,19 @@ pub(crate) struct ProblemArgs {
     /// The problem, in PDDL
     #[arg(value_name = "PROBLEM")]
     pub(crate) problem: PathBuf,
+    #[command(flatten)]
+    pub(crate) calendar: CalendarArgs,
+}
+
+impl ProblemArgs {
+    /// The files without a calendar.
+    pub(crate) fn new(domain: PathBuf, problem: PathBuf) -> Self {
+        Self {
+            domain,
+            problem,
+            calendar: CalendarArgs::default(),
+        }
+    }
 }
 
 #[derive(Args, Debug)]

@@ -1,8 +1,17 @@
 //! The one place that looks at a clock.
 
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use elbowroom::num::Rational;
+
+/// Returns the current date and time.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "the command line is where dates come from"
+)]
+pub(crate) fn now() -> SystemTime {
+    SystemTime::now()
+}
 
 /// Measures the time since it was started.
 #[derive(Clone, Copy, Debug)]

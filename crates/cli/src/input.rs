@@ -9,10 +9,12 @@ use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
 use elbowroom::plan::format;
 use elbowroom::{PlanKind, RoundingRule};
+use elbowroom_calendar::Calendar;
 
 pub(crate) use elbowroom::AnyPlan;
 
 use crate::args::ProblemArgs;
+use crate::calendar::timed_problem;
 use crate::exit::Failure;
 use crate::journal::Journal;
 use crate::look::{HINT, styled};
@@ -28,46 +30,47 @@ pub(crate) fn task(
     epsilon: &Rational,
     output: &mut Output,
 ) -> Result<Task, Failure> {
-    Ok(task_with_sources(arguments, epsilon, output)?.0)
+    let (read, warnings) = read(arguments, epsilon)?;
+    warn(&warnings, output);
+    Ok(read.task)
 }
 
-/// The same, with the texts of domain and problem.
-pub(crate) fn task_with_sources(
+/// Domain and problem as they were read.
+pub(crate) struct ReadProblem {
+    pub(crate) task: Task,
+    pub(crate) domain: Source,
+    /// The text of the problem, with the timed initials of its calendar.
+    pub(crate) problem: Source,
+    pub(crate) calendar: Option<Calendar>,
+}
+
+/// Reads domain, problem and calendar file. Returns them with the warnings.
+pub(crate) fn read(
     arguments: &ProblemArgs,
     epsilon: &Rational,
-    output: &mut Output,
-) -> Result<(Task, Source, Source), Failure> {
-    Ok(silently(arguments, epsilon)?.told(output))
-}
-
-/// Domain and problem as they were read, of which nobody was told yet.
-pub(crate) struct Untold {
-    read: (Task, Source, Source),
-    warnings: Vec<Diagnostic>,
-}
-
-impl Untold {
-    /// What was read, with the texts. Warnings go to standard error.
-    pub(crate) fn told(self, output: &mut Output) -> (Task, Source, Source) {
-        warn(&self.warnings, output);
-        self.read
-    }
-}
-
-/// Reads domain and problem, and says nothing.
-pub(crate) fn silently(arguments: &ProblemArgs, epsilon: &Rational) -> Result<Untold, Failure> {
+) -> Result<(ReadProblem, Vec<Diagnostic>), Failure> {
     let domain = source(&arguments.domain, "domain")?;
-    let problem = source(&arguments.problem, "problem")?;
-    let (read, warnings) = pddl::read_problem(&domain, &problem)?;
+    let mut problem = source(&arguments.problem, "problem")?;
+    let (mut calendar, mut warnings) = (None, Vec::new());
+    if let Some(timed) = timed_problem(&arguments.calendar, &domain, &problem, false)? {
+        problem = timed.problem;
+        warnings = timed.warnings;
+        calendar = Some(timed.calendar);
+    }
+    let (read, others) = pddl::read_problem(&domain, &problem)?;
+    warnings.extend(others);
     let task = Task::new(read).with_epsilon(epsilon.clone());
-    Ok(Untold {
-        read: (task, domain, problem),
-        warnings,
-    })
+    let read = ReadProblem {
+        task,
+        domain,
+        problem,
+        calendar,
+    };
+    Ok((read, warnings))
 }
 
 /// Writes warnings to standard error.
-fn warn(warnings: &[Diagnostic], output: &mut Output) {
+pub(crate) fn warn(warnings: &[Diagnostic], output: &mut Output) {
     for warning in warnings {
         output.warn_about(warning);
     }

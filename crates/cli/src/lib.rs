@@ -9,6 +9,7 @@ mod attendance;
 mod bell;
 mod board;
 mod bug;
+mod calendar;
 mod clock;
 mod commands;
 mod conversation;

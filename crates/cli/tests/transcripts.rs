@@ -1,4 +1,5 @@
-//! The transcripts in `tests/cmd` are the manual of the command, and are run as they stand.
+//! The transcripts in `tests/cmd` and in `docs/calendars.md` are the manual of the command, and are run as they
+//! stand.
 
 use std::path::Path;
 
@@ -11,5 +12,6 @@ fn the_transcripts_are_true() {
         .default_bin_path(env!("CARGO_BIN_EXE_elbowroom"))
         .env("NO_COLOR", "1")
         .env("LC_ALL", "C")
-        .case("crates/cli/tests/cmd/*.md");
+        .case("crates/cli/tests/cmd/*.md")
+        .case("docs/calendars.md");
 }

@@ -33,6 +33,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("sim", &["text", "num", "model", "probability", "execution"]),
     ("report", &["num", "model", "plan", "execution"]),
     ("learning", &["text", "num", "sim", "report"]),
+    // Time zones, which only the command knows.
+    ("calendar", &["text", "num", "model", "pddl"]),
     (
         "elbowroom",
         &[
@@ -73,7 +75,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ),
     ("page", &["elbowroom", "laboratory"]),
     ("web", &["elbowroom", "page"]),
-    ("cli", &["elbowroom", "laboratory", "page"]),
+    ("cli", &["calendar", "elbowroom", "laboratory", "page"]),
     ("python", &["elbowroom", "laboratory", "cli"]),
     // A program beside the command, which it knows by the protocol of worlds alone.
     ("plansys2", &[]),

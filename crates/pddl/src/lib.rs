@@ -57,4 +57,4 @@ pub use plan_text::{
     LineKind, PrintedPlan, PrintedStep, read_plan, read_printed_plan, write_plan,
     write_rounded_plan,
 };
-pub use problem_text::{ProblemText, WriteProblemError, end_times, write_problem};
+pub use problem_text::{ProblemText, WriteProblemError, end_times, with_initials, write_problem};

@@ -5,6 +5,7 @@
 //! under way becomes timed initials that do at its end what the action would do. What those cannot
 //! say, that nobody may break the conditions of an action under way, is left to the judge.
 
+mod insertion;
 mod running;
 mod term;
 
@@ -15,6 +16,7 @@ use elbowroom_model::problem::{self, Constraint, Modal, Object, TypeId};
 use elbowroom_model::{Situation, State, Task, TimedHappening};
 use elbowroom_num::Rational;
 
+pub use insertion::with_initials;
 pub use running::end_times;
 use running::ends_of_running;
 

@@ -156,7 +156,9 @@ fn planned(
         self_overlap: question.self_overlap,
         threads: 1,
     };
-    let outcome = plan(&mut request, &mut Watch::start(clock, limit)).map_err(Failure::new)?;
+    let mut outcome = plan(&mut request, &mut Watch::start(clock, limit)).map_err(Failure::new)?;
+    let files = [&question.domain.name[..], &question.problem.name];
+    outcome.answer.name_files(files);
     Ok(Reply {
         exit: match &outcome.answer.finding {
             PlanFinding::Plan { .. } => YES,

@@ -18,14 +18,14 @@ text, and to one that ends in .json, as Elbowroom JSON, exactly. The others are 
 that takes another unit of time, it is told.\n\n\
 docs/second-witness.md says what each text means and how to ask others about it.")]
 pub(crate) struct ExportArgs {
-    /// What to write: the network as an STNU, the box or region as SMT-LIB 2, or what the best
-    /// executor can reach as a process of PRISM
+    /// The output: the network as an STNU, the box or region as SMT-LIB 2, what the best
+    /// executor can reach as a process of PRISM, or the problem with its calendar as PDDL
     #[arg(value_name = "FORMAT", value_enum)]
     pub(crate) format: ExportFormat,
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
-    /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file; not for `prism`,
-    /// which is about all that can be done
+    /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file; not for `prism`
+    /// and `pddl`, which are about all that can be done
     #[arg(value_name = "PLAN|FILE.stn")]
     pub(crate) plan: Option<PathBuf>,
     /// The box: `"dur_0=[7/4,12] (drive a b)=12 all=±10%"`; parameters that are not named keep
@@ -125,4 +125,6 @@ pub(crate) enum ExportFormat {
     Smt2,
     /// What the best of all executors can reach, as a Markov decision process
     Prism,
+    /// The problem with the timed initials of its calendar file, as PDDL
+    Pddl,
 }

@@ -9,6 +9,7 @@ use elbowroom::execution::executors::DEFAULT_EXECUTOR;
 use elbowroom::execution::run::TimeoutRule;
 use elbowroom::num::Rational;
 
+use super::CalendarArgs;
 use super::envelope::{BoxMethod, Guarantee, Objective, controllable};
 use super::number::{count, factor, positive, positive_or_zero, timeout, whole};
 use super::plan::EMBEDDED;
@@ -26,6 +27,8 @@ pub(crate) struct RunArgs {
     /// The problem, in PDDL
     #[arg(value_name = "PROBLEM")]
     pub(crate) problem: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) calendar: CalendarArgs,
     /// The plan to begin with; without it, the planner makes one
     #[arg(value_name = "PLAN", conflicts_with = "plan")]
     pub(crate) first_plan: Option<PathBuf>,
@@ -268,6 +271,8 @@ pub(crate) enum FirstPlanChoice {
 const IN_THE_TRACE: &[&str] = &[
     "domain",
     "problem",
+    "calendar",
+    "begin",
     "first_plan",
     "plan",
     "planner",

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use elbowroom::num::Rational;
 
+use super::CalendarArgs;
 use super::run::RunArgs;
 use crate::http::Target;
 use crate::serve::Address;
@@ -50,6 +51,14 @@ pub(crate) struct ServeArgs {
     /// is given
     #[arg(long, value_name = "COUNT")]
     pub(crate) journal_segments: Option<usize>,
+}
+
+impl ServeArgs {
+    /// The calendar, and the speed of time.
+    pub(crate) fn calendar(&self) -> (&CalendarArgs, Option<Rational>) {
+        let factor = self.run.realtime.clone().unwrap_or(Rational::ONE);
+        (&self.run.calendar, Some(factor))
+    }
 }
 
 /// Reads a length in bytes.

@@ -31,6 +31,9 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
         return Ok(Exit::Yes);
     }
     refuse_what_is_about_processes(arguments)?;
+    if arguments.format == ExportFormat::Pddl {
+        return timed_problem(arguments, output);
+    }
     if arguments.format == ExportFormat::Stnu {
         refuse_what_networks_do_not_have(arguments)?;
     }
@@ -93,6 +96,21 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
     Ok(Exit::Yes)
 }
 
+/// Writes the problem with the timed initials of its calendar.
+fn timed_problem(arguments: &ExportArgs, output: &mut Output) -> Answer {
+    if arguments.problem.calendar.calendar.is_none() {
+        return Err(Failure::new(
+            "without a calendar, this would be the problem as it is",
+            "give one with --calendar (docs/calendars.md)",
+        ));
+    }
+    prism::refuse_what_is_about_plans(arguments, "is about plans, and this is about a problem")?;
+    let (read, warnings) = input::read(&arguments.problem, &arguments.epsilon)?;
+    input::warn(&warnings, output);
+    write(arguments, read.problem.text())?;
+    Ok(Exit::Yes)
+}
+
 fn write(arguments: &ExportArgs, text: &str) -> Result<(), Failure> {
     match &arguments.output {
         Some(path) => output::write_file(path, text),
@@ -112,7 +130,7 @@ fn refuse_what_is_about_processes(arguments: &ExportArgs) -> Result<(), Failure>
             ("--cells", process.cells.is_some()),
             ("--bound", process.bound.is_some()),
         ],
-        "is about processes (export prism), and this is about a plan",
+        "is about processes (export prism)",
     )
 }
 

@@ -92,10 +92,7 @@ fn inside(arguments: &LearnArgs, output: &mut Output) -> Result<Option<InsideReq
             "write --inside 0.95, for instance",
         ));
     }
-    let problem = ProblemArgs {
-        domain: domain.clone(),
-        problem: problem.clone(),
-    };
+    let problem = ProblemArgs::new(domain.clone(), problem.clone());
     let task = Arc::new(input::task(&problem, &arguments.epsilon, output)?);
     let plan = input::any_plan(&task, plan, &RoundingRule::default(), output)?;
     Ok(Some(InsideRequest {

@@ -16,11 +16,13 @@ use elbowroom::external::Planner;
 use elbowroom::model::Task;
 use elbowroom::pddl::write_plan;
 use elbowroom::sim::WorldModel;
+use elbowroom_calendar::Calendar;
 
 use super::run::spec::contradiction;
 use super::threads::{self, EVERY_PROCESSOR};
 use crate::args::{EMBEDDED, PlanArgs, PlanObjectiveChoice};
 use crate::exit::{Answer, Exit, Failure};
+use crate::input::ReadProblem;
 use crate::look::Look;
 use crate::output::Output;
 use crate::{input, output};
@@ -43,21 +45,24 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
         return Err(contradiction(error));
     }
     let mut watch = Watch::start(arguments);
-    let (task, domain, problem) = match reading::read(arguments, &mut watch, output)? {
+    let read = match reading::read(arguments, &mut watch, output)? {
         Ok(read) => read,
         Err(halt) => {
             let name = planner.as_ref().map_or(EMBEDDED, |planner| &planner.name);
             let outcome = unread(name, halt, watch.elapsed());
             drop(watch);
-            return print(arguments, &outcome, output);
+            return print(arguments, &outcome, None, output);
         }
     };
-    let files = [domain.name(), problem.name()];
     if let Some(objective) = arguments.objective {
-        let task = Arc::new(task);
-        let planner = planner.as_ref();
-        return best(arguments, objective, planner, (&task, files), watch, output);
+        return best(arguments, objective, planner.as_ref(), read, watch, output);
     }
+    let ReadProblem {
+        task,
+        domain,
+        problem,
+        calendar,
+    } = read;
     let mut request = PlanRequest {
         task: &task,
         first_plan_only: arguments.first || watch.limit().is_none(),
@@ -74,11 +79,11 @@ pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
             plan_with(planner, &mut request, sources, limit, &mut watch).map_err(text::failure)?
         }
     };
-    outcome.answer.name_files(files);
+    outcome.answer.name_files([domain.name(), problem.name()]);
     write_exactly(arguments, &task, &mut outcome);
     // The line on the terminal goes before the answer comes.
     drop(watch);
-    print(arguments, &outcome, output)
+    print(arguments, &outcome, calendar.as_ref(), output)
 }
 
 /// Writes the plan's numbers exactly, if that is asked for.
@@ -96,7 +101,7 @@ fn best(
     arguments: &PlanArgs,
     objective: PlanObjectiveChoice,
     planner: Option<&Planner>,
-    (task, files): (&Arc<Task>, [&str; 2]),
+    read: ReadProblem,
     mut watch: Watch,
     output: &mut Output,
 ) -> Answer {
@@ -106,6 +111,7 @@ fn best(
             "leave out --planner, or --objective",
         ));
     }
+    let task = &Arc::new(read.task);
     let world;
     let aim = match (objective, &arguments.world) {
         (PlanObjectiveChoice::Room, None) => PlanAim::Room,
@@ -136,10 +142,12 @@ fn best(
         most_memory: arguments.memory.map(|megabytes| megabytes << 20),
     };
     let mut outcome = best_plan(&request, &mut watch).map_err(unsupported)?;
-    outcome.answer.name_files(files);
+    outcome
+        .answer
+        .name_files([read.domain.name(), read.problem.name()]);
     write_exactly(arguments, task, &mut outcome);
     drop(watch);
-    print(arguments, &outcome, output)
+    print(arguments, &outcome, read.calendar.as_ref(), output)
 }
 
 /// The planner that the command line asks for.
@@ -159,7 +167,12 @@ fn unsupported(error: RequestError) -> Failure {
     )
 }
 
-fn print(arguments: &PlanArgs, outcome: &PlanOutcome, output: &mut Output) -> Answer {
+fn print(
+    arguments: &PlanArgs,
+    outcome: &PlanOutcome,
+    calendar: Option<&Calendar>,
+    output: &mut Output,
+) -> Answer {
     let answer = &outcome.answer;
     if let PlanFinding::Plan {
         repaired: Some(objection),
@@ -169,6 +182,10 @@ fn print(arguments: &PlanArgs, outcome: &PlanOutcome, output: &mut Output) -> An
         output::tell(&text::repaired(&answer.planner, objection));
     }
     let plan = text::plan(&answer.finding);
+    let plan = match calendar {
+        Some(calendar) => plan.map(|plan| calendar.dated_plan(&plan)),
+        None => plan,
+    };
     if let (Some(plan), Some(path)) = (&plan, &arguments.output) {
         output::write_file(path, plan)?;
     }

@@ -21,7 +21,7 @@ use std::time::Duration;
 use elbowroom::RoundingRule;
 use elbowroom::answers::run::{RunOutcome, run as execute};
 use elbowroom::answers::{Event, Halt, RunRequest, Watcher};
-use elbowroom::execute::{RunSpec, SpecError, check_vary};
+use elbowroom::execute::{NamedText, RunSpec, SpecError, check_vary};
 use elbowroom::execution::run::{MissingPlan, Verdict};
 use elbowroom::execution::{Planner, Progression, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -33,6 +33,7 @@ use elbowroom::text::Source;
 use crate::args::RunArgs;
 use crate::attendance::{Attendance, Attended};
 use crate::bell::Bell;
+use crate::calendar::dated;
 use crate::clock::Clock;
 use crate::desk::Desk;
 use crate::exit::{Answer, Exit, Failure};
@@ -66,7 +67,17 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
             "give domain and problem, in this order: elbowroom run DOMAIN PROBLEM",
         ));
     };
-    let problem = || Ok((&input::source(problem, "problem")?).into());
+    let mut since = None;
+    let problem = |domain: &NamedText| {
+        let problem = input::source(problem, "problem")?;
+        let factor = match &arguments.world_process {
+            Some(_) => Some(Rational::ONE),
+            None => arguments.realtime.clone(),
+        };
+        let (problem, at) = dated((&arguments.calendar, factor), domain, problem, output)?;
+        since = at;
+        Ok((&problem).into())
+    };
     let (mut spec, world) = spec::of(arguments, domain, problem)?;
     spec.is_attended = arguments.control.is_some();
     let (task, first) = checked(arguments, &spec, world.as_ref(), output)?;
@@ -75,6 +86,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let job = Job {
         journal: journal(arguments, RESUME)?,
         begun: &|| (),
+        since,
         aside: aside(arguments, &interrupt),
         spec: &spec,
         task: &task,
@@ -236,6 +248,8 @@ pub(super) struct Job<'a> {
     pub(super) journal: Option<JournalFile>,
     /// Told when the run begins, and its first record is on the disk if there is a journal.
     pub(super) begun: &'a dyn Fn(),
+    /// Runs from time 0, where that is a date and not the beginning of the run.
+    pub(super) since: Option<Clock>,
 }
 
 impl Job<'_> {
@@ -394,7 +408,7 @@ impl Job<'_> {
         let Some(factor) = &spec.realtime else {
             return self.run(world.as_mut(), recorder, |_: &Progression| {});
         };
-        let pace = Pace::new(factor);
+        let pace = Pace::new(factor, self.since);
         let begun = Clock::start();
         let clock = || begun.seconds();
         let goes_on = || !self.interrupt.is_requested();

@@ -23,6 +23,8 @@ use super::run::spec;
 use super::run::{Job, RESUME_SERVE, aside, checked, journal};
 use crate::args::ServeArgs;
 use crate::attendance::Attendance;
+use crate::calendar::dated;
+use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
 use crate::http::{self, Listener};
 use crate::input;
@@ -36,6 +38,9 @@ use front::{Front, Refused};
 
 /// The length of a journal from which on it is begun anew, in bytes.
 const LONG: u64 = 10_000_000;
+
+/// The name of a problem that a client gives.
+const GIVEN: &str = "the problem that was given";
 
 /// Executes what is asked for, until it is asked to end.
 pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
@@ -61,10 +66,16 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         ));
     };
     let domain_text: NamedText = (&input::source(domain, "domain")?).into();
-    let problem = || match &arguments.run.problem {
-        Some(problem) => Ok((&input::source(problem, "problem")?).into()),
+    let mut since = None;
+    let problem = |domain: &NamedText| match &arguments.run.problem {
+        Some(problem) => {
+            let problem = input::source(problem, "problem")?;
+            let (problem, at) = dated(arguments.calendar(), domain, problem, output)?;
+            since = at;
+            Ok((&problem).into())
+        }
         None => Ok(NamedText {
-            name: "the problem that was given".to_owned(),
+            name: GIVEN.to_owned(),
             text: String::new(),
         }),
     };
@@ -84,11 +95,12 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         (task, first, None)
     } else {
         let of = (&mut spec, world.as_ref());
-        let Some(((task, first), client)) = await_problem(&front, arguments, of, output) else {
+        let Some(((task, first), at, client)) = await_problem(&front, arguments, of, output) else {
             // It was asked to end before there was a problem.
             front.close();
             return Ok(Exit::Yes);
         };
+        since = at;
         (task, first, Some(client))
     };
     let begun = || {
@@ -106,6 +118,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
             attendance: &attendance,
             journal,
             begun: &begun,
+            since,
         };
         job.execute(&arguments.run, output)
     });
@@ -126,13 +139,18 @@ fn await_problem(
     arguments: &ServeArgs,
     (spec, world): (&mut RunSpec, Option<&Source>),
     output: &mut Output,
-) -> Option<(Begun, Client)> {
+) -> Option<(Begun, Option<Clock>, Client)> {
     let interrupt = Interrupt::listen();
     loop {
         let (text, client) = front.first.wait(&interrupt)?.parts();
-        spec.problem.text = text;
-        match checked(&arguments.run, spec, world, output) {
-            Ok(begun) => return Some((begun, client)),
+        let given = Source::new(GIVEN, text);
+        let begun =
+            dated(arguments.calendar(), &spec.domain, given, output).and_then(|(problem, at)| {
+                spec.problem = (&problem).into();
+                Ok((checked(&arguments.run, spec, world, output)?, at))
+            });
+        match begun {
+            Ok((begun, at)) => return Some((begun, at, client)),
             Err(failure) => {
                 output::warn(&format!("a problem was refused: {}", failure.sentence()));
                 front.first.reopen();

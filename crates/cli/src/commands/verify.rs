@@ -83,8 +83,8 @@ fn files(arguments: &VerifyArgs) -> Result<Option<(ProblemArgs, &Path)>, Failure
     match (&arguments.domain, &arguments.problem, &arguments.plan) {
         (None, ..) => Ok(None),
         (Some(domain), Some(problem), Some(plan)) => {
-            let (domain, problem) = (domain.clone(), problem.clone());
-            Ok(Some((ProblemArgs { domain, problem }, plan)))
+            let files = ProblemArgs::new(domain.clone(), problem.clone());
+            Ok(Some((files, plan)))
         }
         _ => Err(Failure::new(
             "the answer is about a box, and the plan is missing",

@@ -112,10 +112,7 @@ fn script(
         let task = Task::new(input::with_warnings(read, output)?);
         return Ok((task, vec![(ACTION.to_owned(), Rational::ONE)]));
     };
-    let files = ProblemArgs {
-        domain: domain.clone(),
-        problem: problem.clone(),
-    };
+    let files = ProblemArgs::new(domain.clone(), problem.clone());
     let task = input::task(&files, &Rational::new(1, 1000), output)?;
     let steps = input::time_triggered(
         &task,

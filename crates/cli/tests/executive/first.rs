@@ -138,3 +138,38 @@ fn an_executive_without_a_problem_ends_when_it_is_told_to() {
     assert_eq!(own.post("/v1/stop", &Value::Null).0, 200);
     assert_eq!(own.end().status.code(), Some(0));
 }
+
+/// The calendar of the command line is about the problem that a client gives; its windows stay when a further
+/// problem comes.
+#[test]
+fn calendar_is_applied_to_first_problem_and_kept_for_further_ones() {
+    let place = folder("first-dated");
+    let calendar = place.join("calendar.toml");
+    let text = "format = \"elbowroom-calendar\"\nversion = 1\ntime_zone = \"UTC\"\n\
+        unit = \"seconds\"\nhorizon = \"7 days\"\n\
+        [[window]]\nfact = \"(open b3)\"\nhours = \"0 to 24\"\n";
+    fs::write(&calendar, text).expect("written");
+    let calendar = calendar.display().to_string();
+    let line = [DOMAIN, "--realtime", "10", "--calendar", &calendar];
+    let mut own = Executive::start(&place, &line);
+    let problem = problem();
+    let without = problem["problem"]
+        .as_str()
+        .expect("a text")
+        .replace("(open b3)", "");
+    let is_open = |state: &Value| {
+        let facts = state["facts"].as_array().expect("facts");
+        facts.contains(&json!("(open b3)"))
+    };
+    for _ in 0..2 {
+        let (status, taken) = own.put("/v1/problem", &json!({ "problem": without }));
+        assert_eq!((status, &taken["taken"]), (200, &json!(true)), "{taken}");
+        own.await_state(|state| state["why"] == "reached: problem" && is_open(state));
+    }
+    own.post("/v1/stop", &Value::Null);
+    let output = own.end();
+    assert_eq!(output.status.code(), Some(0));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("note: time 0 is "), "{said}");
+    fs::remove_dir_all(&place).expect("the folder is there");
+}

@@ -17,7 +17,10 @@ const CELLS: usize = 32;
 
 /// The text of the process that is asked for.
 pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String, Failure> {
-    refuse_what_is_about_plans(arguments)?;
+    refuse_what_is_about_plans(
+        arguments,
+        "is about plans, and a process is about all that can be done",
+    )?;
     let process = &arguments.process;
     match (&process.likelihoods, &process.world) {
         (Some(_), _) => {
@@ -86,7 +89,8 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
     })
 }
 
-fn refuse_what_is_about_plans(arguments: &ExportArgs) -> Result<(), Failure> {
+/// Refuses the first option that only outputs about a plan have.
+pub(super) fn refuse_what_is_about_plans(arguments: &ExportArgs, why: &str) -> Result<(), Failure> {
     let is_default = arguments.epsilon == elbowroom::num::Rational::new(1, 1000);
     refuse(
         &[
@@ -99,7 +103,7 @@ fn refuse_what_is_about_plans(arguments: &ExportArgs) -> Result<(), Failure> {
             ("--controllable", !arguments.controllable.is_empty()),
             ("--epsilon", !is_default),
         ],
-        "is about plans, and a process is about all that can be done",
+        why,
     )
 }
 

@@ -6,13 +6,11 @@ use std::thread;
 use std::time::Duration;
 
 use elbowroom::answers::{Halt, Watcher};
-use elbowroom::model::Task;
-use elbowroom::pddl::Source;
 
 use super::watch::Watch;
 use crate::args::PlanArgs;
 use crate::exit::Failure;
-use crate::input;
+use crate::input::{self, ReadProblem};
 use crate::output::Output;
 
 /// As much as the main thread has: files nest.
@@ -21,7 +19,7 @@ const STACK: usize = 16 << 20;
 /// How often the watch is asked.
 const QUESTION: Duration = Duration::from_millis(10);
 
-/// Reads domain and problem, as long as the watch says so. Warnings go to standard error.
+/// Reads domain, problem and calendar, as long as the watch says so. Warnings go to standard error.
 ///
 /// It is done on a thread of its own, which ends with the process: so a limit holds whatever takes
 /// its time, also a file that never comes to its end.
@@ -32,12 +30,12 @@ pub(super) fn read(
     arguments: &PlanArgs,
     watch: &mut Watch,
     output: &mut Output,
-) -> Result<Result<(Task, Source, Source), Halt>, Failure> {
+) -> Result<Result<ReadProblem, Halt>, Failure> {
     let (sender, receiver) = mpsc::channel();
     let (files, epsilon) = (arguments.problem.clone(), arguments.epsilon.clone());
     let read = move || {
         // Nobody listens any longer once time is up.
-        let _ = sender.send(input::silently(&files, &epsilon));
+        let _ = sender.send(input::read(&files, &epsilon));
     };
     thread::Builder::new()
         .stack_size(STACK)
@@ -46,7 +44,9 @@ pub(super) fn read(
     loop {
         match receiver.recv_timeout(QUESTION) {
             Ok(read) => {
-                return Ok(Ok(read?.told(output)));
+                let (read, warnings) = read?;
+                input::warn(&warnings, output);
+                return Ok(Ok(read));
             }
             Err(RecvTimeoutError::Timeout) => {
                 if let ControlFlow::Break(halt) = watch.flow() {

@@ -1,6 +1,7 @@
 //! A world on a wall clock.
 //!
-//! Its time 0 is the moment at which the first plan is ready and the executor has prepared for it.
+//! Its time 0 is the moment at which the first plan is ready and the executor has prepared for it; with
+//! a calendar that begins now, the moment at which the calendar is read.
 //! What is decided takes no time in the world, but making further plans does: as long as it takes on
 //! the wall clock, times the factor. What happens meanwhile is reported afterwards, with the times
 //! at which it happened.
@@ -29,10 +30,11 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// The world's time is 0 until [`Pace::begin`].
-    pub(super) fn new(factor: &Rational) -> Self {
+    /// The world's time passes with the clock `since`, if there is one; otherwise it is 0 until
+    /// [`Pace::begin`].
+    pub(super) fn new(factor: &Rational, since: Option<Clock>) -> Self {
         Self {
-            clock: OnceLock::new(),
+            clock: since.map_or_else(OnceLock::new, OnceLock::from),
             factor: factor.clone(),
             stopped: Mutex::new(Duration::ZERO),
         }
@@ -191,7 +193,7 @@ mod tests {
 
     #[test]
     fn the_clock_stands_still_while_planning_takes_longer_than_it_may() {
-        let pace = Pace::new(&Rational::from(10));
+        let pace = Pace::new(&Rational::from(10), None);
         pace.stop(Duration::from_secs(5), &Rational::ONE);
         assert_eq!(pace.stopped(), Duration::ZERO, "it does not go yet");
         pace.begin();

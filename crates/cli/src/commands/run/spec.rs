@@ -20,7 +20,7 @@ use crate::input;
 pub(in crate::commands) fn of(
     arguments: &RunArgs,
     domain: &Path,
-    problem: impl FnOnce() -> Result<NamedText, Failure>,
+    problem: impl FnOnce(&NamedText) -> Result<NamedText, Failure>,
 ) -> Result<(RunSpec, Option<Source>), Failure> {
     let empty = || NamedText {
         name: String::new(),
@@ -81,7 +81,7 @@ pub(in crate::commands) fn of(
         spec.world = Some(source.text().to_owned());
         world = Some(source);
     }
-    spec.problem = problem()?;
+    spec.problem = problem(&spec.domain)?;
     spec.first_plan = match arguments.first_plan_by {
         Some(FirstPlanChoice::Shortest) => FirstPlan::Shortest,
         Some(FirstPlanChoice::Likeliest) => FirstPlan::Likeliest,

@@ -12,6 +12,7 @@ use elbowroom::executive::documents::{
     Activity, NewFact, NewGoal, NewNumber, NewProblem, State, Taken,
 };
 use elbowroom::executive::goal_text;
+use elbowroom::model::ground::{Change, FactId};
 use elbowroom::model::{Problem, Task};
 use elbowroom::pddl::{self, Source};
 use serde::de::DeserializeOwned;
@@ -230,12 +231,14 @@ fn turned(new: &Task, task: &Task, state: &State) -> Vec<Ask> {
     let mut asks = Vec::new();
     let named = |fact: &_| new.fact_name(*fact);
     let facts: BTreeSet<String> = new.initial().facts.iter().map(named).collect();
-    let is_derived = |fact: &str| {
+    let timed: BTreeSet<FactId> = timed_facts(task).collect();
+    // Timed initials, such as those of a calendar, stay in force: they say when their facts hold.
+    let is_given = |fact: &str| {
         task.fact_named(fact)
-            .is_none_or(|fact| task.is_derived(fact))
+            .is_none_or(|fact| task.is_derived(fact) || timed.contains(&fact))
     };
     let gone = state.facts.iter().filter(|fact| !facts.contains(*fact));
-    for fact in gone.filter(|fact| !is_derived(fact)) {
+    for fact in gone.filter(|fact| !is_given(fact)) {
         let (fact, becomes) = (fact.clone(), false);
         asks.push(Ask::Fact { fact, becomes });
     }
@@ -254,6 +257,15 @@ fn turned(new: &Task, task: &Task, state: &State) -> Vec<Ask> {
     let (name, goal) = (FIRST_GOAL.to_owned(), goal_text(new));
     asks.push(Ask::Request(Request::Pursue { name, goal }));
     asks
+}
+
+/// Returns the facts that timed initials of the running problem change.
+fn timed_facts(task: &Task) -> impl Iterator<Item = FactId> {
+    let changes = task.timed().iter().flat_map(|happening| &happening.changes);
+    changes.filter_map(|change| match change {
+        Change::Add(fact) | Change::Delete(fact) => Some(*fact),
+        Change::Update { .. } => None,
+    })
 }
 
 /// A name that can stand in a path.

@@ -127,8 +127,7 @@ fn why(certificate: &NoPlan) -> String {
 /// The files of the problem: those that were given, or those that the answer names.
 fn files(arguments: &VerifyArgs, certificate: &NoPlan) -> Result<ProblemArgs, Failure> {
     if let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) {
-        let (domain, problem) = (domain.clone(), problem.clone());
-        return Ok(ProblemArgs { domain, problem });
+        return Ok(ProblemArgs::new(domain.clone(), problem.clone()));
     }
     let [domain, problem] = &certificate.files[..] else {
         return Err(Failure::new(
@@ -136,8 +135,6 @@ fn files(arguments: &VerifyArgs, certificate: &NoPlan) -> Result<ProblemArgs, Fa
             "give them: `elbowroom verify ANSWER.json DOMAIN PROBLEM`",
         ));
     };
-    Ok(ProblemArgs {
-        domain: PathBuf::from(domain),
-        problem: PathBuf::from(problem),
-    })
+    let (domain, problem) = (PathBuf::from(domain), PathBuf::from(problem));
+    Ok(ProblemArgs::new(domain, problem))
 }

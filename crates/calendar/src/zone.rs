@@ -1,0 +1,261 @@
+//! A time zone: which instant a local time is, and the other way round.
+//!
+//! Instants are milliseconds since 1970-01-01T00:00Z. Local times are milliseconds since 1970-01-01T00:00
+//! on the clocks of the zone.
+
+use std::ops::Range;
+
+use elbowroom_text::nearest;
+use jiff::Timestamp;
+use jiff::civil::DateTime;
+use jiff::tz::{AmbiguousOffset, Offset, TimeZone, TimeZoneDatabase};
+
+/// One second, in milliseconds.
+pub(crate) const SECOND: i64 = 1000;
+/// One day on the clock, in milliseconds.
+pub(crate) const DAY: i64 = 24 * 60 * 60 * SECOND;
+
+/// A time zone of the IANA database that is compiled into the program.
+#[derive(Clone, Debug)]
+pub(crate) struct Zone {
+    rules: TimeZone,
+    name: String,
+}
+
+/// The message about a text that gives no instant, and advice.
+pub(crate) type Objection = (String, String);
+
+impl Zone {
+    /// Returns the zone of that name, such as `Europe/Berlin` or `UTC`.
+    ///
+    /// # Errors
+    /// When there is no such zone, with the most similar names as advice.
+    pub(crate) fn named(name: &str) -> Result<Self, Objection> {
+        let database = TimeZoneDatabase::bundled();
+        if let Ok(rules) = database.get(name) {
+            let name = rules.iana_name().unwrap_or(name).to_owned();
+            return Ok(Self { rules, name });
+        }
+        let message = format!("there is no time zone `{name}`");
+        let known: Vec<String> = database
+            .available()
+            .map(|known| known.as_str().to_owned())
+            .collect();
+        let advice = match nearest(name, known.iter().map(String::as_str)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => {
+                "write a name of the IANA database, such as `Europe/Berlin` or `UTC`".to_owned()
+            }
+        };
+        Err((message, advice))
+    }
+
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Reads a date with a time of day; an offset such as `+01:00` or `Z` may follow.
+    ///
+    /// # Errors
+    /// When the text has another form, or when the local time does not exist or exists twice.
+    pub(crate) fn instant(&self, text: &str) -> Result<i64, Objection> {
+        let text = text.trim();
+        if let Ok(instant) = text.parse::<Timestamp>() {
+            return Ok(instant.as_millisecond());
+        }
+        let has_time = text.contains(':') && !text.contains('[');
+        let local: DateTime = match text.parse() {
+            Ok(local) if has_time => local,
+            _ => {
+                let message = format!("`{text}` is not a date with a time of day");
+                let advice = "write it like 2026-11-30T07:30, or 2026-11-30T07:30+01:00".to_owned();
+                return Err((message, advice));
+            }
+        };
+        let ambiguous = self.rules.to_ambiguous_timestamp(local);
+        match ambiguous.offset() {
+            AmbiguousOffset::Unambiguous { .. } => {}
+            AmbiguousOffset::Gap { .. } => {
+                let message = format!("{text} does not exist in {}", self.name);
+                let advice = "the clocks are set forward over this time; choose another one";
+                return Err((message, advice.to_owned()));
+            }
+            AmbiguousOffset::Fold { before, after } => {
+                let message = format!("{text} exists twice in {}", self.name);
+                let advice = format!(
+                    "the clocks are set back over this time; write {text}{} for the first time or \
+                     {text}{} for the second",
+                    offset_text(before),
+                    offset_text(after),
+                );
+                return Err((message, advice));
+            }
+        }
+        let instant = ambiguous.compatible();
+        let out_of_range = |_| {
+            let message = format!("{text} is outside of the calendar");
+            (message, "choose a year from 1 to 9999".to_owned())
+        };
+        instant.map(Timestamp::as_millisecond).map_err(out_of_range)
+    }
+
+    /// Returns the instant `days` days later at the same local time, or the first instant after it
+    /// where that local time does not exist.
+    pub(crate) fn days_later(&self, instant: i64, days: i64) -> i64 {
+        let local = self.local(instant).saturating_add(days.saturating_mul(DAY));
+        let day = local.saturating_add(2 * DAY);
+        let later = self.instants(local..day);
+        later.first().map_or(day, |first| first.start)
+    }
+
+    /// Returns the local time at an instant.
+    pub(crate) fn local(&self, instant: i64) -> i64 {
+        instant.saturating_add(milliseconds(self.rules.to_offset(timestamp(instant))))
+    }
+
+    /// Returns all instants whose local time lies in the range, as disjoint ranges in order. A change
+    /// of the clocks can shorten, split or repeat the local time.
+    pub(crate) fn instants(&self, local: Range<i64>) -> Vec<Range<i64>> {
+        // No offset is larger than a day and a bit.
+        let first = local.start.saturating_sub(2 * DAY);
+        let last = local.end.saturating_add(2 * DAY);
+        let mut found = Vec::new();
+        let mut add = |since: i64, until: i64, offset: i64| {
+            let start = local.start.saturating_sub(offset).max(since);
+            let end = local.end.saturating_sub(offset).min(until);
+            if start < end {
+                found.push(start..end);
+            }
+        };
+        let begin = timestamp(first);
+        let mut since = first;
+        let mut offset = milliseconds(self.rules.to_offset(begin));
+        for transition in self.rules.following(begin) {
+            let at = transition.timestamp().as_millisecond();
+            if at >= last {
+                break;
+            }
+            add(since, at, offset);
+            since = at;
+            offset = milliseconds(transition.offset());
+        }
+        add(since, last, offset);
+        found
+    }
+
+    /// Returns the local date and time of an instant, to the minute where it is a full one, such as
+    /// `Mon 2026-11-30 07:30`.
+    pub(crate) fn date(&self, instant: i64) -> String {
+        let local = self.rules.to_datetime(timestamp(instant));
+        let format = if instant.rem_euclid(60 * SECOND) == 0 {
+            "%a %Y-%m-%d %H:%M"
+        } else {
+            "%a %Y-%m-%d %H:%M:%S"
+        };
+        local.strftime(format).to_string()
+    }
+
+    /// Returns the offset from UTC at an instant, such as `+01:00`.
+    pub(crate) fn offset(&self, instant: i64) -> String {
+        offset_text(self.rules.to_offset(timestamp(instant)))
+    }
+}
+
+/// Returns the number of the day since 1970-01-01.
+pub(crate) fn day_number(date: jiff::civil::Date) -> i64 {
+    let midnight = date.to_datetime(jiff::civil::Time::midnight());
+    let instant = TimeZone::UTC.to_timestamp(midnight);
+    // Only dates at the very ends of the calendar have no instant.
+    instant.map_or(0, |it| it.as_millisecond().div_euclid(DAY))
+}
+
+fn timestamp(instant: i64) -> Timestamp {
+    Timestamp::from_millisecond(instant).unwrap_or(if instant < 0 {
+        Timestamp::MIN
+    } else {
+        Timestamp::MAX
+    })
+}
+
+fn milliseconds(offset: Offset) -> i64 {
+    i64::from(offset.seconds()) * SECOND
+}
+
+fn offset_text(offset: Offset) -> String {
+    let seconds = offset.seconds();
+    let sign = if seconds < 0 { '-' } else { '+' };
+    let minutes = seconds.abs() / 60;
+    format!("{sign}{:02}:{:02}", minutes / 60, minutes % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Zone;
+
+    const HOUR: i64 = 3_600_000;
+
+    fn berlin() -> Zone {
+        Zone::named("Europe/Berlin").expect("a zone")
+    }
+
+    #[test]
+    fn local_time_that_exists_twice_gives_two_instants() {
+        let zone = berlin();
+        let begin = zone.instant("2026-10-25T00:00").expect("an instant");
+        let midnight = zone.local(begin);
+        let half = midnight + 2 * HOUR..midnight + 2 * HOUR + HOUR / 2;
+        let found = zone.instants(half);
+        let first = begin + 2 * HOUR;
+        assert_eq!(
+            found,
+            [
+                first..first + HOUR / 2,
+                first + HOUR..first + HOUR + HOUR / 2
+            ]
+        );
+    }
+
+    #[test]
+    fn local_time_that_does_not_exist_gives_no_instant() {
+        let zone = berlin();
+        let midnight = zone.local(zone.instant("2026-03-29T00:00").expect("an instant"));
+        assert!(
+            zone.instants(midnight + 2 * HOUR..midnight + 3 * HOUR)
+                .is_empty()
+        );
+        assert!(
+            zone.instant("2026-03-29T02:30")
+                .is_err_and(|it| it.0.contains("does not exist"))
+        );
+        let twice = zone.instant("2026-10-25T02:30").unwrap_err();
+        assert!(twice.1.contains("2026-10-25T02:30+02:00"), "{twice:?}");
+        let second = zone.instant("2026-10-25T02:30+01:00").expect("an instant");
+        assert_eq!(zone.date(second), "Sun 2026-10-25 02:30");
+        assert_eq!(zone.offset(second), "+01:00");
+    }
+
+    #[test]
+    fn days_later_keeps_the_local_time() {
+        let zone = berlin();
+        let before = zone.instant("2026-03-28T02:30").expect("an instant");
+        assert_eq!(
+            zone.date(zone.days_later(before, 1)),
+            "Sun 2026-03-29 03:00"
+        );
+        assert_eq!(
+            zone.date(zone.days_later(before, 2)),
+            "Mon 2026-03-30 02:30"
+        );
+    }
+
+    #[test]
+    fn misspelt_zone_is_refused_with_the_nearest_name() {
+        let (message, advice) = Zone::named("Europe/Belrin").unwrap_err();
+        assert_eq!(message, "there is no time zone `Europe/Belrin`");
+        assert_eq!(advice, "did you mean `Europe/Berlin`?");
+        assert_eq!(
+            Zone::named("europe/berlin").expect("a zone").name(),
+            "Europe/Berlin"
+        );
+    }
+}
