@@ -7,7 +7,7 @@
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
-use super::super::compile::{Action, Compiled, NONE, Snap};
+use super::super::compile::{Action, Compiled, Macro, NONE, Snap};
 use super::super::formula::{Formula, Numeric};
 use super::super::tuning::Technique;
 use super::graph::Kind;
@@ -77,11 +77,16 @@ pub(super) fn changes<'c>(
 
 /// The changes of fluents by an operator. Continuous changes belong to the start.
 pub(super) fn changes_by(compiled: &Compiled, kind: Kind) -> Vec<(u32, f64)> {
+    if let Kind::Macro(number) = kind {
+        let Macro { envelope, content } = compiled.macros[number as usize];
+        let whole = |action| changes_by(compiled, Kind::Compressed(action));
+        return [whole(envelope), whole(content)].concat();
+    }
     let (action, is_part): (u32, fn(Moment) -> bool) = match kind {
         Kind::Compressed(action) => (action, |_| true),
         Kind::Start(action) => (action, |moment| moment != Moment::End),
         Kind::End(action) => (action, |moment| moment == Moment::End),
-        Kind::Timed(_) | Kind::Axiom => return Vec::new(),
+        Kind::Macro(_) | Kind::Timed(_) | Kind::Axiom => return Vec::new(),
     };
     changes(compiled, compiled.action(action))
         .filter(|change| is_part(change.moment))

@@ -16,6 +16,7 @@ use super::super::compressibility::{compressibility, readers};
 use super::super::directions::Shifts;
 use super::super::exclusive::{self, implied_tests};
 use super::super::interference::{Access, Annotations, Separations, TimedSeparations};
+use super::super::macros::Macro;
 use super::super::metric::{Metric, only_grows};
 use super::super::rules::stratified;
 use super::super::times::is_symbolic;
@@ -115,7 +116,7 @@ impl Builder<'_> {
         };
         let changes_have_values =
             has_values_to_change(&self.actions, beginning.running.len(), &beginning.values);
-        Some(Compiled {
+        let mut compiled = Compiled {
             scale,
             tuning: wanted.tuning.clone(),
             epsilon: scale.ceil(&Rational::ZERO).0.max(self.epsilon),
@@ -128,6 +129,7 @@ impl Builder<'_> {
             tests: self.symbols.tests,
             snaps: self.snaps,
             actions: self.actions,
+            macros: Vec::new(),
             annotation_count: annotations.count(),
             timed,
             calendars,
@@ -149,7 +151,9 @@ impl Builder<'_> {
             needs_joining: numbers.or(relaxation_incomplete_because).is_some(),
             starts_depend_on_each_other,
             is_symbolic,
-        })
+        };
+        compiled.macros = Macro::all(&compiled);
+        Some(compiled)
     }
 
     /// The rules of derived facts by stratum, and their heads.
