@@ -97,8 +97,18 @@ fn offers(compiled: &Compiled, action: &Action) -> Vec<Literal> {
 
 /// Returns the literals that the action needs.
 fn needs<'a>(compiled: &'a Compiled, action: &'a Action) -> impl Iterator<Item = Literal> + 'a {
-    let start = &compiled.snap(action.start).condition.literals;
-    start.iter().chain(&action.over_all.literals).copied()
+    let start = compiled.snap(action.start).condition.literals.iter();
+    start.copied().chain(needs_throughout(compiled, action))
+}
+
+/// Returns the literals that the action needs while it runs, and does not bring about itself.
+fn needs_throughout<'a>(
+    compiled: &'a Compiled,
+    action: &'a Action,
+) -> impl Iterator<Item = Literal> + 'a {
+    let start = compiled.snap(action.start);
+    let literals = action.over_all.literals.iter().copied();
+    literals.filter(move |&literal| !makes(start, literal))
 }
 
 /// Returns `true` if the content may run while the envelope runs.
@@ -109,7 +119,9 @@ fn fits(compiled: &Compiled, envelope: &Action, content: &Action) -> bool {
         .filter(|&snap| snap != NONE)
         .map(|snap| compiled.snap(snap));
     let mut held = envelope.over_all.literals.iter();
-    let most = envelope.duration.most.as_ref();
+    let after = compiled.snap(envelope.end);
+    let ends_within = needs_throughout(compiled, content).any(|need| makes(after, opposite(need)));
+    let most = envelope.duration.most.as_ref().filter(|_| ends_within);
     most.is_none_or(|most| content.duration.least <= *most)
         && !needs(compiled, content).any(|need| makes(before, opposite(need)))
         && !held.any(|&literal| snaps.any(|snap| makes(snap, opposite(literal))))

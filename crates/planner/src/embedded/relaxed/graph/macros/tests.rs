@@ -96,7 +96,7 @@ fn find_contents(compiled: &Compiled, state: &State) -> usize {
                 end.iter().all(|l| action.over_all.literals.contains(l))
             });
             if is_offered && is_possible && ends_alone {
-                assert!(compiled.macros.contains(&data), "{data:?} in {compiled:?}");
+                assert!(compiled.macros.contains(&data), "{data:?}");
                 found += 1;
             }
         }
