@@ -143,5 +143,5 @@ fn macro_operators_are_the_steps_that_they_are_made_of() {
         })
         .expect("both are the same");
     let (compared, found) = total.get();
-    assert!(compared > 100 && found > 50, "{compared}, {found}");
+    assert!(compared > 50 && found > 50, "{compared}, {found}");
 }
