@@ -16,7 +16,6 @@ use super::super::compressibility::{compressibility, readers};
 use super::super::directions::Shifts;
 use super::super::exclusive::{self, implied_tests};
 use super::super::interference::{Access, Annotations, Separations, TimedSeparations};
-use super::super::macros::Macro;
 use super::super::metric::{Metric, only_grows};
 use super::super::rules::stratified;
 use super::super::times::is_symbolic;
@@ -79,10 +78,7 @@ impl Builder<'_> {
             return None;
         }
         let facts = self.symbols.facts;
-        let fact_annotations = facts
-            .iter()
-            .map(|&fact| annotations.of_fact(fact))
-            .collect();
+        let fact_annotations = facts.iter().map(|&fact| annotations.of_fact(fact));
         let state = &situation.state;
         let values = |fluent| state.values.get(fluent).cloned();
         let (running, running_is_exact) = running(situation, scale);
@@ -116,13 +112,13 @@ impl Builder<'_> {
         };
         let changes_have_values =
             has_values_to_change(&self.actions, beginning.running.len(), &beginning.values);
-        let mut compiled = Compiled {
+        Some(Compiled {
             scale,
             tuning: wanted.tuning.clone(),
             epsilon: scale.ceil(&Rational::ZERO).0.max(self.epsilon),
             longest_distance: longest_distance(&self.snaps),
             now,
-            fact_annotations,
+            fact_annotations: fact_annotations.collect(),
             facts,
             fluents: self.symbols.fluents,
             exclusive_fluents: exclusive,
@@ -151,9 +147,7 @@ impl Builder<'_> {
             needs_joining: numbers.or(relaxation_incomplete_because).is_some(),
             starts_depend_on_each_other,
             is_symbolic,
-        };
-        compiled.macros = Macro::all(&compiled);
-        Some(compiled)
+        })
     }
 
     /// The rules of derived facts by stratum, and their heads.
