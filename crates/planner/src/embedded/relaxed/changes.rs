@@ -94,6 +94,25 @@ pub(super) fn changes_by(compiled: &Compiled, kind: Kind) -> Vec<(u32, f64)> {
         .collect()
 }
 
+/// The constants that an operator assigns to fluents.
+pub(super) fn assignments(compiled: &Compiled, kind: Kind) -> Vec<(u32, f64)> {
+    let snaps = match kind {
+        Kind::Compressed(action) => {
+            let action = compiled.action(action);
+            [action.start, action.end]
+        }
+        Kind::Start(action) => [compiled.action(action).start, NONE],
+        Kind::End(action) => [NONE, compiled.action(action).end],
+        Kind::Macro(_) | Kind::Timed(_) | Kind::Axiom => [NONE, NONE],
+    };
+    let snaps = snaps.into_iter().filter(|&snap| snap != NONE);
+    let updates = snaps.flat_map(|snap| &compiled.snap(snap).updates);
+    let assigned = updates.filter(|update| update.operator == UpdateOperator::Assign);
+    assigned
+        .filter_map(|update| Some((update.fluent, update.value.as_constant()?.to_f64())))
+        .collect()
+}
+
 /// The amounts that a happening of an action adds to fluents.
 fn amounts<'c>(
     compiled: &'c Compiled,
