@@ -9,7 +9,7 @@ use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
 use super::bound::MetricBound;
-use super::compile::{Compiled, NONE};
+use super::compile::{Compiled, Macro, NONE};
 use super::expressions::{Form, Moment};
 use super::formula::set;
 use super::network::{NodeId, SETTLED};
@@ -27,10 +27,31 @@ pub(crate) enum Step {
     Start(u32),
     /// The action starts, and ends before anything else in the order of happenings.
     Compressed(u32),
+    /// The envelope starts, and ends after the content, before anything else in the order of happenings.
+    Macro(u32),
     /// The action at that place among those under way ends.
     End(u32),
     /// The next timed initials happen.
     Timed,
+}
+
+impl Step {
+    /// Returns the steps that make up a step from a state.
+    pub(crate) fn parts(self, compiled: &Compiled, state: &State) -> Vec<Self> {
+        let Self::Macro(number) = self else {
+            return vec![self];
+        };
+        let Macro { envelope, content } = compiled.macros[number as usize];
+        let content = if compiled.action(content).end == NONE {
+            Self::Start(content)
+        } else {
+            Self::Compressed(content)
+        };
+        // Where the start inserts the envelope.
+        let place = state.open.partition_point(|open| open.action <= envelope);
+        let place = u32::try_from(place).expect("few actions run at the same time");
+        vec![Self::Start(envelope), content, Self::End(place)]
+    }
 }
 
 /// Applies steps to states.
@@ -123,6 +144,11 @@ impl<'a> Stepper<'a> {
                 let place = self.start(state, action)?;
                 self.keeps_conditions(state)?;
                 self.end(state, place)?;
+            }
+            Step::Macro(_) => {
+                for part in step.parts(self.compiled, state) {
+                    self.advance(state, part)?;
+                }
             }
             Step::End(place) => self.end(state, place as usize)?,
             Step::Timed => self.timed(state)?,

@@ -19,6 +19,7 @@ mod exclusive;
 mod fixed_durations;
 mod guarded;
 mod interference;
+mod macros;
 mod metric;
 mod own_start;
 mod reads;
@@ -40,6 +41,7 @@ use elbowroom_num::Rational;
 pub(crate) use beginning::Beginning;
 pub(crate) use builder::{Failure, Wanted, compile};
 pub(crate) use calendars::{Calendar, Dates, spans};
+pub(crate) use macros::Macro;
 pub(crate) use metric::Metric;
 pub use unsupported::Unsupported;
 
@@ -75,6 +77,8 @@ pub(crate) struct Compiled {
     pub(crate) tests: Vec<Test>,
     pub(crate) snaps: Vec<Snap>,
     pub(crate) actions: Vec<Action>,
+    /// By envelope and content.
+    pub(crate) macros: Vec<Macro>,
     /// For each fact the annotations of its latest addition and deletion; [`NONE`] if nothing waits
     /// for them.
     pub(crate) fact_annotations: Vec<[u32; 2]>,

@@ -130,7 +130,7 @@ impl<'a> Replay<'a> {
                 let is_new = foreseen_end == SETTLED;
                 self.timings[ended?].end = Some(if is_new { node } else { foreseen_end });
             }
-            Step::Timed => {}
+            Step::Macro(_) | Step::Timed => {}
         }
         Some(())
     }

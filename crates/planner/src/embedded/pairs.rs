@@ -65,7 +65,7 @@ pub(crate) struct Pairs<'a> {
 impl<'a> Pairs<'a> {
     /// `None` if the problem is too large.
     pub(crate) fn of(compiled: &'a Compiled) -> Option<Self> {
-        let graph = Graph::of(compiled, None);
+        let graph = Graph::of(compiled, None, &[]);
         let model = Model::of(compiled, &graph)?;
         let most = model.atom_count + MOST_ENDED;
         let (actions, operators) = (compiled.actions.len(), model.operators.len());

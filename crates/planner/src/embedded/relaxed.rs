@@ -26,6 +26,7 @@ use super::apply::Step;
 use super::compile::{Compiled, Compressibility};
 use super::formula::Literal;
 use super::network::SETTLED;
+use super::root::root;
 use super::spans::Spans;
 use super::state::{Open, State};
 use super::step_costs::StepCosts;
@@ -109,7 +110,22 @@ pub(crate) struct Relaxed<'a> {
 impl<'a> Relaxed<'a> {
     /// Actions that can be compressed at least as safely as `compresses` count as one step.
     pub(crate) fn new(compiled: &'a Compiled, compresses: Option<Compressibility>) -> Self {
-        let graph = Graph::of(compiled, compresses);
+        Self::over(compiled, Graph::of(compiled, compresses, &[]))
+    }
+
+    /// The same with macro-operators in place of the starts of their envelopes. `None` if the goal is out of
+    /// reach then.
+    pub(crate) fn with_macros(
+        compiled: &'a Compiled,
+        compresses: Option<Compressibility>,
+    ) -> Option<Self> {
+        let graph = Graph::of(compiled, compresses, &compiled.macros);
+        let mut relaxed = Self::over(compiled, graph);
+        relaxed.evaluate(&root(compiled))?;
+        Some(relaxed)
+    }
+
+    fn over(compiled: &'a Compiled, graph: Graph) -> Self {
         let (propositions, operators) = (graph.proposition_count, graph.operators.len());
         Self {
             compiled,

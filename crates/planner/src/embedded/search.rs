@@ -147,18 +147,10 @@ impl<'a> Search<'a> {
         let is_weighing = strategy.aim != Aim::Goal;
         let metric = compiled.metric.as_ref().filter(|_| is_weighing);
         let step_costs = metric.map(|metric| StepCosts::of(compiled, metric));
-        let mut relaxed = Relaxed::new(compiled, strategy.compresses);
-        relaxed.is_chronological = strategy.is_chronological;
-        if strategy.draws_on_consumables && compiled.tuning.uses(Technique::Consumables) {
-            relaxed.count_consumables();
-        }
+        let mut relaxed = strategy.relaxed(compiled);
         let mut stepper = Stepper::new(compiled);
         stepper.is_chronological = strategy.is_chronological;
         stepper.joins = strategy.joins;
-        if strategy.replenishes {
-            relaxed.count_resources();
-        }
-        relaxed.lists_subgoals = strategy.novelty == Some(NoveltyOf::Successors);
         if let Some(step_costs) = &step_costs {
             relaxed.weigh(step_costs);
         }
@@ -197,7 +189,7 @@ impl<'a> Search<'a> {
             step_costs,
             limit: None,
             horizon: NEVER,
-            has_lost: strategy.is_chronological,
+            has_lost: strategy.is_chronological || strategy.replaces_starts(compiled),
             price: 1,
             labour: 0,
             weighed: 0,

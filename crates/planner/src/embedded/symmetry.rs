@@ -9,7 +9,7 @@ use elbowroom_model::Task;
 use elbowroom_model::problem::ObjectId;
 
 use super::apply::Step;
-use super::compile::{Action, Compiled, NONE, Snap};
+use super::compile::{Action, Compiled, Macro, NONE, Snap};
 use super::formula::{Formula, Linear, Literal, Numeric, is_set};
 use super::hash::Map;
 use super::state::State;
@@ -30,6 +30,7 @@ struct Exchange {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Symmetry {
     exchanges: Vec<Exchange>,
+    macros: Vec<Macro>,
 }
 
 impl Symmetry {
@@ -51,7 +52,10 @@ impl Symmetry {
                 }
             }
         }
-        Self { exchanges }
+        Self {
+            exchanges,
+            macros: compiled.macros.clone(),
+        }
     }
 
     /// Leaves out steps to which others in the list are equivalent.
@@ -65,8 +69,11 @@ impl Symmetry {
             }
             steps.retain(|step| match step {
                 Step::Start(action) | Step::Compressed(action) => {
-                    let found = exchange.actions.binary_search_by_key(action, |pair| pair.0);
-                    found.map_or(true, |place| exchange.actions[place].1 >= *action)
+                    exchange.image(*action) >= *action
+                }
+                Step::Macro(number) => {
+                    let Macro { envelope, content } = self.macros[*number as usize];
+                    [envelope, content].map(|part| exchange.image(part)) >= [envelope, content]
                 }
                 _ => true,
             });
@@ -75,6 +82,12 @@ impl Symmetry {
 }
 
 impl Exchange {
+    /// Returns the action that an action becomes.
+    fn image(&self, action: u32) -> u32 {
+        let found = self.actions.binary_search_by_key(&action, |pair| pair.0);
+        found.map_or(action, |place| self.actions[place].1)
+    }
+
     fn preserves(&self, state: &State, is_timeless: bool) -> bool {
         let touches = |action: u32| {
             let found = self.actions.binary_search_by_key(&action, |pair| pair.0);

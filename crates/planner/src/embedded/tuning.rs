@@ -35,6 +35,8 @@ pub enum Technique {
     /// In the relaxed problem a fact that holds only while an envelope runs does not serve who
     /// needs it for longer.
     Envelopes,
+    /// Some searches start an envelope only together with one action that needs it, as a macro-operator.
+    Macros,
     /// Mutual exclusions with an action under way that last for ever.
     Exclusions,
     /// An end that would break the over-all condition of an action under way waits for it in the
@@ -75,6 +77,7 @@ impl Technique {
         (Self::Landmarks, "landmarks"),
         (Self::Chronological, "chronological"),
         (Self::Envelopes, "envelopes"),
+        (Self::Macros, "macros"),
         (Self::Exclusions, "exclusions"),
         (Self::Nesting, "nesting"),
         (Self::Consumables, "consumables"),

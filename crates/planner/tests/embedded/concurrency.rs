@@ -219,3 +219,82 @@ fn cans_that_hold_too_little_fill_no_jar() {
     let answer = answer(&domain, &problem);
     assert!(answer.found().is_none(), "{}", describe(&answer));
 }
+
+/// Porters carry parcels from rooms to a hall. Each door can be held open at any time, for as long as two porters
+/// need to pass one after the other.
+fn doors(rooms: usize) -> (String, String) {
+    let domain = "
+        (:requirements :typing :durative-actions) (:types porter room door parcel)
+        (:predicates (in ?p - porter ?r - room) (free ?p - porter) (joins ?d - door ?a ?b - room) (shut ?d - door)
+          (open ?d - door) (lies ?x - parcel ?r - room) (carries ?p - porter ?x - parcel))
+        (:durative-action hold :parameters (?d - door) :duration (= ?duration 5)
+          :condition (at start (shut ?d))
+          :effect (and (at start (not (shut ?d))) (at start (open ?d))
+                       (at end (not (open ?d))) (at end (shut ?d))))
+        (:durative-action pass :parameters (?p - porter ?d - door ?a ?b - room) :duration (= ?duration 2)
+          :condition (and (at start (in ?p ?a)) (at start (free ?p)) (over all (open ?d)) (over all (joins ?d ?a ?b)))
+          :effect (and (at start (not (in ?p ?a))) (at start (not (free ?p)))
+                       (at end (in ?p ?b)) (at end (free ?p))))
+        (:action take :parameters (?p - porter ?x - parcel ?r - room)
+          :precondition (and (in ?p ?r) (free ?p) (lies ?x ?r) (not (exists (?y - parcel) (carries ?p ?y))))
+          :effect (and (not (lies ?x ?r)) (carries ?p ?x)))
+        (:action drop :parameters (?p - porter ?x - parcel ?r - room)
+          :precondition (and (in ?p ?r) (free ?p) (carries ?p ?x))
+          :effect (and (lies ?x ?r) (not (carries ?p ?x))))";
+    let rooms: Vec<usize> = (0..rooms).collect();
+    let each =
+        |text: &dyn Fn(usize) -> String| -> String { rooms.iter().map(|&n| text(n)).collect() };
+    let problem = format!(
+        "(:objects p q - porter hall {} - room {} - door {} - parcel)
+         (:init (in p hall) (in q hall) (free p) (free q) {})
+         (:goal (and {}))",
+        each(&|n| format!("r{n} ")),
+        each(&|n| format!("d{n} ")),
+        each(&|n| format!("x{n} ")),
+        each(&|n| format!(
+            "(shut d{n}) (joins d{n} hall r{n}) (joins d{n} r{n} hall) (lies x{n} r{n}) "
+        )),
+        each(&|n| format!("(lies x{n} hall) ")),
+    );
+    (domain.to_owned(), problem)
+}
+
+#[test]
+fn envelope_starts_together_with_its_content() {
+    let (domain, problem) = doors(6);
+    let mut tuning = Tuning::default();
+    tuning.only = Some(Member::Width);
+    let with = tuned(&domain, &problem, tuning.clone(), 10_000);
+    let with = counts(&with).evaluated;
+    assert!(with < 500, "{with} states");
+    tuning.without.push(Technique::Macros);
+    let without = tuned(&domain, &problem, tuning, 20 * with);
+    assert!(without.found().is_none(), "{}", describe(&without));
+}
+
+/// Two mends must share the light of one match, so that no envelope has a single content.
+#[test]
+fn contents_that_share_an_envelope_are_found() {
+    let domain = "
+        (:requirements :typing :durative-actions) (:types fuse)
+        (:predicates (match) (light) (mended ?f - fuse))
+        (:durative-action strike :parameters () :duration (= ?duration 8)
+          :condition (at start (match))
+          :effect (and (at start (not (match))) (at start (light)) (at end (not (light)))))
+        (:durative-action mend :parameters (?f - fuse) :duration (= ?duration 5)
+          :condition (over all (light))
+          :effect (at end (mended ?f)))";
+    let problem = "(:objects f g - fuse) (:init (match)) (:goal (and (mended f) (mended g)))";
+    let answer = tuned(domain, problem, Tuning::default(), 10_000);
+    assert!(answer.found().is_some(), "{}", describe(&answer));
+    for member in [Member::Landmarks, Member::Width, Member::Novelty] {
+        let mut tuning = Tuning::default();
+        tuning.only = Some(member);
+        let answer = tuned(domain, problem, tuning, 10_000);
+        assert!(
+            !matches!(answer, Answer::Unsolvable { .. }),
+            "{}",
+            describe(&answer)
+        );
+    }
+}

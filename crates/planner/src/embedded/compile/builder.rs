@@ -20,6 +20,7 @@ use super::directions::Shifts;
 use super::fixed_durations::{needs_fixed_duration, variants_with_fixed_duration};
 use super::guarded::{has_products, moving_fluents, variants_by_guards};
 use super::interference::{Links, Separations};
+use super::macros::Macro;
 use super::metric::Draft;
 use super::reads::{read_action, visit_changes, visit_disputed};
 use super::shortened::full_actions;
@@ -117,9 +118,11 @@ pub(crate) fn compile(
             return Err(Failure::Stopped);
         }
     }
-    builder
+    let mut compiled = builder
         .finish(grounding, wanted, scale, goes_on)
-        .ok_or(Failure::Stopped)
+        .ok_or(Failure::Stopped)?;
+    compiled.macros = Macro::all(&compiled);
+    Ok(compiled)
 }
 
 struct Builder<'a> {

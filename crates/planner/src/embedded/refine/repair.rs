@@ -269,7 +269,7 @@ impl Repair<'_, '_> {
                     }
                     intent.clone()
                 }
-                Step::Timed => continue,
+                Step::Macro(_) | Step::Timed => continue,
             };
             if let Some((item, scene)) = self.make(&node.scene, step) {
                 let order = u64::from(self.random.once_in(4));

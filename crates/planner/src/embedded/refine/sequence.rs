@@ -83,6 +83,7 @@ impl Scene {
                 action: self.state.open.get(place as usize)?.action,
                 block: self.open[place as usize],
             },
+            Step::Macro(_) => return None,
             Step::Timed => Item::TIMED,
         })
     }

@@ -7,7 +7,7 @@
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
-use super::super::compile::{Action, Compiled, NONE, Snap};
+use super::super::compile::{Action, Compiled, Macro, NONE, Snap};
 use super::super::formula::{Formula, Numeric};
 use super::super::tuning::Technique;
 use super::graph::Kind;
@@ -77,15 +77,39 @@ pub(super) fn changes<'c>(
 
 /// The changes of fluents by an operator. Continuous changes belong to the start.
 pub(super) fn changes_by(compiled: &Compiled, kind: Kind) -> Vec<(u32, f64)> {
+    if let Kind::Macro(number) = kind {
+        let Macro { envelope, content } = compiled.macros[number as usize];
+        let whole = |action| changes_by(compiled, Kind::Compressed(action));
+        return [whole(envelope), whole(content)].concat();
+    }
     let (action, is_part): (u32, fn(Moment) -> bool) = match kind {
         Kind::Compressed(action) => (action, |_| true),
         Kind::Start(action) => (action, |moment| moment != Moment::End),
         Kind::End(action) => (action, |moment| moment == Moment::End),
-        Kind::Timed(_) | Kind::Axiom => return Vec::new(),
+        Kind::Macro(_) | Kind::Timed(_) | Kind::Axiom => return Vec::new(),
     };
     changes(compiled, compiled.action(action))
         .filter(|change| is_part(change.moment))
         .map(|change| (change.fluent, change.amount))
+        .collect()
+}
+
+/// The constants that an operator assigns to fluents.
+pub(super) fn assignments(compiled: &Compiled, kind: Kind) -> Vec<(u32, f64)> {
+    let snaps = match kind {
+        Kind::Compressed(action) => {
+            let action = compiled.action(action);
+            [action.start, action.end]
+        }
+        Kind::Start(action) => [compiled.action(action).start, NONE],
+        Kind::End(action) => [NONE, compiled.action(action).end],
+        Kind::Macro(_) | Kind::Timed(_) | Kind::Axiom => [NONE, NONE],
+    };
+    let snaps = snaps.into_iter().filter(|&snap| snap != NONE);
+    let updates = snaps.flat_map(|snap| &compiled.snap(snap).updates);
+    let assigned = updates.filter(|update| update.operator == UpdateOperator::Assign);
+    assigned
+        .filter_map(|update| Some((update.fluent, update.value.as_constant()?.to_f64())))
         .collect()
 }
 

@@ -3,11 +3,12 @@
 mod actions;
 mod envelopes;
 mod exclusions;
+mod macros;
 mod timetables;
 
 use std::ops::Range;
 
-use super::super::compile::{Compiled, Compressibility, NONE};
+use super::super::compile::{Compiled, Compressibility, Macro, NONE};
 use super::super::formula::Formula;
 use super::super::step_costs::StepCosts;
 use super::super::time::Ticks;
@@ -21,6 +22,8 @@ pub(crate) use timetables::Window;
 pub(crate) enum Kind {
     Start(u32),
     Compressed(u32),
+    /// An envelope and its content.
+    Macro(u32),
     /// The end of some instance of the action.
     End(u32),
     Timed(u32),
@@ -83,7 +86,12 @@ pub(crate) struct Graph {
 }
 
 impl Graph {
-    pub(crate) fn of(compiled: &Compiled, compresses: Option<Compressibility>) -> Self {
+    /// `macros`: the macro-operators that take the place of the starts of their envelopes.
+    pub(crate) fn of(
+        compiled: &Compiled,
+        compresses: Option<Compressibility>,
+        macros: &[Macro],
+    ) -> Self {
         let first_test = narrow(2 * compiled.facts.len());
         let first_running = first_test + narrow(compiled.tests.len());
         let mut tests_of_fluent = vec![Vec::new(); compiled.fluents.len()];
@@ -115,8 +123,12 @@ impl Graph {
         };
         graph.proposition_count += stays.list.len();
         for number in 0..compiled.actions.len() {
-            graph.add_action(compiled, &stays, narrow(number), compresses);
+            let number = narrow(number);
+            let place = macros.partition_point(|data| data.envelope < number);
+            let starts_alone = macros.get(place).is_none_or(|next| next.envelope != number);
+            graph.add_action(compiled, &stays, number, compresses, starts_alone);
         }
+        graph.add_macros(compiled, &stays, macros);
         graph.add_rules(compiled);
         graph.add_timed(compiled);
         graph.goal = graph.propositions(&compiled.goal);
@@ -138,7 +150,7 @@ impl Graph {
                 Kind::Start(action) => step_costs.start(action),
                 Kind::End(action) => step_costs.end(action),
                 Kind::Compressed(action) => step_costs.start(action) + step_costs.end(action),
-                Kind::Timed(_) | Kind::Axiom => operator.cost,
+                Kind::Macro(_) | Kind::Timed(_) | Kind::Axiom => operator.cost,
             };
         }
     }

@@ -3,7 +3,7 @@
 use elbowroom_num::Rational;
 
 use super::super::apply::Step;
-use super::super::compile::{NONE, Timed};
+use super::super::compile::{Macro, NONE, Timed};
 use super::super::formula::Literal;
 use super::super::state::State;
 use super::graph::Kind;
@@ -264,6 +264,12 @@ impl Relaxed<'_> {
                 Kind::Start(action) | Kind::Compressed(action) => {
                     !state.excludes(self.compiled, self.compiled.action(action))
                 }
+                Kind::Macro(number) => {
+                    let Macro { envelope, content } = self.compiled.macros[number as usize];
+                    [envelope, content]
+                        .iter()
+                        .all(|&a| !state.excludes(self.compiled, self.compiled.action(a)))
+                }
                 _ => true,
             };
             if is_possible {
@@ -283,6 +289,7 @@ fn push_steps(kind: Kind, state: &State, steps: &mut Vec<Step>) {
     match kind {
         Kind::Start(action) => steps.push(Step::Start(action)),
         Kind::Compressed(action) => steps.push(Step::Compressed(action)),
+        Kind::Macro(number) => steps.push(Step::Macro(number)),
         Kind::End(action) => {
             for (place, open) in (0..).zip(&state.open) {
                 if open.action == action {

@@ -14,8 +14,8 @@ use super::super::formula::{Formula, Numeric};
 use super::super::state::State;
 use super::super::symbolic;
 use super::super::tuning::Technique;
-use super::changes::{changes, changes_by};
-use super::graph::Graph;
+use super::changes::{assignments, changes, changes_by};
+use super::graph::{Graph, Kind};
 
 /// The most that fits into a reservoir without a capacity.
 const UNBOUNDED: f64 = 1e12;
@@ -86,6 +86,18 @@ impl Resources {
                 match changes.iter_mut().find(|change| change.0 == place) {
                     Some(change) => change.1 += amount,
                     None => changes.push((place, amount)),
+                }
+            }
+            let assignments = operator
+                .is_step
+                .then(|| assignments(compiled, operator.kind));
+            for (fluent, value) in assignments.into_iter().flatten() {
+                let Some(place) = place[fluent as usize] else {
+                    continue;
+                };
+                let amount = value - resources.list[place].reservoir.floor;
+                if amount > 0.0 && changes.iter().all(|change| change.0 != place) {
+                    changes.push((place, amount));
                 }
             }
             for (place, amount) in &mut changes {
@@ -180,6 +192,15 @@ pub(crate) fn reservoirs(compiled: &Compiled) -> Vec<Reservoir> {
     for action in &compiled.actions {
         note_floors(compiled, action, &mut floors);
         note_ceilings(compiled, action, &mut ceilings);
+    }
+    for number in 0..compiled.actions.len() {
+        let number = u32::try_from(number).expect("fewer than 2^32 actions");
+        for (fluent, value) in assignments(compiled, Kind::Compressed(number)) {
+            if floors[fluent as usize].is_some_and(|floor| value > floor) {
+                let known = &mut ceilings[fluent as usize];
+                *known = Some(known.map_or(value, |known| known.max(value)));
+            }
+        }
     }
     let bounds = (0..).zip(floors.into_iter().zip(ceilings));
     let reservoirs = bounds.filter_map(|(fluent, (floor, ceiling))| {

@@ -31,6 +31,11 @@ impl Planner<'_> {
             }
             strategies.push(strategy);
         }
+        let searches_novelty = tuning.uses(Technique::Novelty) && !self.frame.compiled.is_symbolic;
+        if self.has_reservoirs && searches_novelty {
+            // A state can be new because a reservoir is empty, so this search looks ahead as the first one does.
+            strategies.insert(1, Strategy::of(Member::Novelty, tuning).replenishing());
+        }
         let counts_landmarks =
             tuning.uses(Technique::Landmarks) && !self.frame.compiled.is_symbolic;
         let needs_concurrency = self.needs_concurrency();
@@ -54,9 +59,9 @@ impl Planner<'_> {
             if counts_landmarks && !needs_concurrency {
                 add(Member::Landmarks);
             }
-            if tuning.uses(Technique::Novelty) {
-                add(Member::Novelty);
-            }
+        }
+        if searches_novelty && !self.has_reservoirs {
+            add(Member::Novelty);
         }
         add(Member::Complete);
         if self.frame.compiled.needs_joining {

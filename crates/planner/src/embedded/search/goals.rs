@@ -54,7 +54,9 @@ impl Search<'_> {
         let mut steps = Vec::new();
         while self.nodes[number as usize].parent != ROOT {
             let node = &self.nodes[number as usize];
-            steps.push(node.step);
+            let before = &self.nodes[node.parent as usize].state;
+            let single = node.step.parts(self.compiled, before);
+            steps.extend(single.into_iter().rev());
             number = node.parent;
         }
         steps.reverse();

@@ -1,7 +1,8 @@
 //! How a search goes about it.
 
-use super::super::compile::Compressibility;
-use super::super::tuning::{Member, Tuning};
+use super::super::compile::{Compiled, Compressibility};
+use super::super::relaxed::Relaxed;
+use super::super::tuning::{Member, Technique, Tuning};
 
 /// How a search goes about it.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +14,8 @@ pub(crate) struct Strategy {
     /// If present, actions that can be compressed at least so safely are, and states are compared
     /// roughly. Some plans are lost.
     pub(crate) compresses: Option<Compressibility>,
+    /// `true` if envelopes that have macro-operators start as parts of these only. Some plans are lost.
+    pub(crate) uses_macros: bool,
     /// How many states that differ in times only are kept; more are dropped, and some plans lost.
     pub(crate) variants: usize,
     /// Whether what is chosen later also happens later, or at the same time. Then it is known, of
@@ -67,6 +70,7 @@ impl Strategy {
     /// Loses nothing but what [`Search::is_incomplete`](super::Search::is_incomplete) tells.
     pub(crate) const COMPLETE: Self = Self {
         compresses: None,
+        uses_macros: false,
         variants: usize::MAX,
         is_chronological: false,
         draws_on_consumables: false,
@@ -87,6 +91,7 @@ impl Strategy {
 
     /// The strategy of that member of the portfolio.
     pub(crate) fn of(member: Member, tuning: &Tuning) -> Self {
+        let uses_macros = tuning.uses(Technique::Macros);
         match member {
             Member::Compressing => Self::compressing(Compressibility::HoldsResource, tuning),
             Member::CompressingSafe => Self::compressing(Compressibility::Safe, tuning),
@@ -106,15 +111,18 @@ impl Strategy {
             Member::Novelty => Self {
                 novelty: Some(NoveltyOf::Expanded),
                 draws_on_consumables: false,
+                uses_macros,
                 ..Self::of(Member::Compressing, tuning)
             },
             Member::Width => Self {
                 novelty: Some(NoveltyOf::Successors),
                 draws_on_consumables: false,
+                uses_macros,
                 ..Self::of(Member::Compressing, tuning)
             },
             Member::Landmarks => Self {
                 counts_landmarks: true,
+                uses_macros,
                 ..Self::of(Member::Compressing, tuning)
             },
             Member::LandmarkWidth => Self {
@@ -123,6 +131,30 @@ impl Strategy {
             },
             Member::Complete => Self::COMPLETE,
         }
+    }
+
+    /// Returns `true` if macro-operators take the place of the starts of some envelopes.
+    pub(super) fn replaces_starts(self, compiled: &Compiled) -> bool {
+        self.uses_macros && !compiled.macros.is_empty()
+    }
+
+    /// Returns the heuristic for its states.
+    pub(super) fn relaxed(self, compiled: &Compiled) -> Relaxed<'_> {
+        let with_macros = self
+            .replaces_starts(compiled)
+            .then(|| Relaxed::with_macros(compiled, self.compresses));
+        let mut relaxed = with_macros
+            .flatten()
+            .unwrap_or_else(|| Relaxed::new(compiled, self.compresses));
+        relaxed.is_chronological = self.is_chronological;
+        if self.draws_on_consumables && compiled.tuning.uses(Technique::Consumables) {
+            relaxed.count_consumables();
+        }
+        if self.replenishes {
+            relaxed.count_resources();
+        }
+        relaxed.lists_subgoals = self.novelty == Some(NoveltyOf::Successors);
+        relaxed
     }
 
     /// Compresses actions that are at least so safe.

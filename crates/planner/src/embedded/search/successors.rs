@@ -164,6 +164,10 @@ impl Search<'_> {
                 }
             }
         }
+        if let Step::Macro(_) = step {
+            self.has_lost = true;
+            return Some((step, self.stepper.apply(state, step)?));
+        }
         let step = match step {
             Step::Compressed(action) => Step::Start(action),
             other => other,

@@ -78,10 +78,7 @@ impl Builder<'_> {
             return None;
         }
         let facts = self.symbols.facts;
-        let fact_annotations = facts
-            .iter()
-            .map(|&fact| annotations.of_fact(fact))
-            .collect();
+        let fact_annotations = facts.iter().map(|&fact| annotations.of_fact(fact));
         let state = &situation.state;
         let values = |fluent| state.values.get(fluent).cloned();
         let (running, running_is_exact) = running(situation, scale);
@@ -121,13 +118,14 @@ impl Builder<'_> {
             epsilon: scale.ceil(&Rational::ZERO).0.max(self.epsilon),
             longest_distance: longest_distance(&self.snaps),
             now,
-            fact_annotations,
+            fact_annotations: fact_annotations.collect(),
             facts,
             fluents: self.symbols.fluents,
             exclusive_fluents: exclusive,
             tests: self.symbols.tests,
             snaps: self.snaps,
             actions: self.actions,
+            macros: Vec::new(),
             annotation_count: annotations.count(),
             timed,
             calendars,

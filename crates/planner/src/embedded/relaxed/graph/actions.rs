@@ -24,13 +24,14 @@ pub(super) struct Draft<'a> {
 }
 
 impl Graph {
-    /// Adds the operators of an action.
+    /// Adds the operators of an action, that of its start only if it `starts_alone`.
     pub(super) fn add_action(
         &mut self,
         compiled: &Compiled,
         stays: &Stays,
         number: u32,
         compresses: Option<Compressibility>,
+        starts_alone: bool,
     ) {
         let action = compiled.action(number);
         if action.end == NONE {
@@ -52,7 +53,7 @@ impl Graph {
         let end = compiled.snap(action.end);
         let running = self.running(number);
         let mut end_needs = self.propositions(&end.condition);
-        if action.start != NONE {
+        if action.start != NONE && starts_alone {
             let start = compiled.snap(action.start);
             let mut needs = self.propositions(&start.condition);
             needs.extend(self.propositions(&compiled.needed_before_start(action)));
@@ -137,7 +138,7 @@ impl Graph {
         operator
     }
 
-    fn gains_of(&self, compiled: &Compiled, updates: &[&Update]) -> Vec<(u32, Gain)> {
+    pub(super) fn gains_of(&self, compiled: &Compiled, updates: &[&Update]) -> Vec<(u32, Gain)> {
         let mut gains: Vec<(u32, Gain)> = Vec::new();
         // A fluent can occur in as many tests as there are actions.
         let mut known: Map<u32, ()> = Map::default();
@@ -155,7 +156,12 @@ impl Graph {
     }
 
     /// Adds the gains of a continuous change, which may reach any value in its direction.
-    fn add_flow_gain(&self, compiled: &Compiled, flow: &Flow, gains: &mut Vec<(u32, Gain)>) {
+    pub(super) fn add_flow_gain(
+        &self,
+        compiled: &Compiled,
+        flow: &Flow,
+        gains: &mut Vec<(u32, Gain)>,
+    ) {
         let Some(rate) = flow.rate.as_constant() else {
             self.add_any_gain(flow.fluent, gains);
             return;
@@ -203,7 +209,7 @@ pub(super) fn most_ticks(compiled: &Compiled, action: &Action) -> Ticks {
     most.map_or(NEVER, |most| compiled.scale.ceil(most).0)
 }
 
-fn effects_of(snap: &Snap) -> impl Iterator<Item = u32> + '_ {
+pub(super) fn effects_of(snap: &Snap) -> impl Iterator<Item = u32> + '_ {
     let adds = snap.adds.iter().map(|fact| 2 * fact);
     adds.chain(snap.deletes.iter().map(|fact| 2 * fact + 1))
 }
