@@ -3,6 +3,8 @@
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
+#[path = "derived_certificates/chosen.rs"]
+mod chosen;
 #[path = "derived_certificates/course.rs"]
 mod course;
 #[path = "derived_certificates/forgery.rs"]
