@@ -17,7 +17,7 @@ import elbowroom.up  # noqa: E402
 from unified_planning.engines import PlanGenerationResultStatus as Status  # noqa: E402
 from unified_planning.engines import SequentialPlanValidator  # noqa: E402
 from unified_planning.exceptions import UPUsageError  # noqa: E402
-from unified_planning.plans import ActionInstance, SequentialPlan, TimeTriggeredPlan  # noqa: E402
+from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, TimeTriggeredPlan  # noqa: E402
 from unified_planning.shortcuts import (  # noqa: E402
     GE,
     And,
@@ -381,3 +381,27 @@ def test_number_assigned_for_each_object_is_no_conflict() -> None:
     problem.add_goal(Equals(number, 2))
     assert judged_in_order(problem, [go]) == (True, True)
     assert solved(problem).status == Status.SOLVED_SATISFICING
+
+
+@pytest.mark.parametrize("goals", [1, 2])
+def test_stn_plan_has_actions_without_constraints(goals: int) -> None:
+    problem = Problem("free")
+    for number in range(2):
+        done = problem.add_fluent(f"done{number}", default_initial_value=False)
+        go = InstantaneousAction(f"go{number}")
+        go.add_effect(done, True)
+        problem.add_action(go)
+        if number < goals:
+            problem.add_goal(done)
+    # Plans of the problem have times.
+    rest = DurativeAction("rest")
+    rest.set_fixed_duration(1)
+    problem.add_action(rest)
+    result = solved(problem, plan="stn")
+    instances = {node.action_instance for node in result.plan.get_constraints()} | {
+        node.action_instance for found in result.plan.get_constraints().values() for _, _, node in found
+    }
+    assert len(instances - {None}) == goals, result.plan
+    with PlanValidator(name="elbowroom-val") as own:
+        assert own.validate(problem, result.plan)
+    assert all(verdicts(problem, result.plan.convert_to(PlanKind.TIME_TRIGGERED_PLAN, problem)))
