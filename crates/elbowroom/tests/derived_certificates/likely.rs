@@ -35,7 +35,7 @@ fn world(distribution: &str, task: &Task) -> WorldModel {
         "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"*\"\nrelative = true\n\
          {distribution}\n"
     );
-    WorldModel::read(&Source::new("world", text), task.problem()).expect("a world without mistakes")
+    WorldModel::read(Source::new("world", text), task.problem()).expect("a world without mistakes")
 }
 
 fn verified_in(
