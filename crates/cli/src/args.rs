@@ -240,6 +240,10 @@ pub(crate) struct VerifyArgs {
     /// The plan file, for a box
     #[arg(value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
+    /// For a box of --objective probability: the world file that it was made with, to check its
+    /// probability (docs/formats/world.md)
+    #[arg(long, value_name = "WORLD.toml", requires = "plan")]
+    pub(crate) world: Option<PathBuf>,
     /// Print the verdict as one JSON document
     #[arg(long)]
     pub(crate) json: bool,

@@ -8,6 +8,7 @@ use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
 use elbowroom::plan::format;
+use elbowroom::sim::WorldModel;
 use elbowroom::{PlanKind, RoundingRule};
 use elbowroom_calendar::Calendar;
 
@@ -137,6 +138,14 @@ pub(crate) fn record(path: &Path, what: &str) -> Result<Source, Failure> {
         Failure::new(message, crate::journal::DAMAGED)
     })?;
     Ok(Source::new(text.name(), journal.text))
+}
+
+/// Reads a world on a clock.
+pub(crate) fn world(path: &Path, task: &Task) -> Result<WorldModel, Failure> {
+    let text = source(path, "world")?;
+    WorldModel::read(&text, task.problem()).map_err(|wrong| {
+        Failure::from(wrong).advised("docs/formats/world.md describes world files")
+    })
 }
 
 /// Reads a text file, or standard input for `-`.

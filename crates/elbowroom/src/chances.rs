@@ -49,18 +49,30 @@ pub fn chances(
             return Err(ChanceError::NoDuration(parameter.name.clone()));
         };
         let action = &plan.plan.instance(instance).action.name;
-        let Some(rule) = world.duration_rule(action) else {
-            return Ok(None);
-        };
-        if matches!(rule.distribution, Distribution::Gamma { .. }) {
-            return Err(ChanceError::Gamma(action.clone()));
-        }
-        let chance = distributed(rule, &parameter.nominal, &world.resolution);
-        chance
-            .ok_or_else(|| ChanceError::NoNumber(action.clone()))
-            .map(Some)
+        chance(action, &parameter.nominal, world)
     });
     chances.collect()
+}
+
+/// Returns the distribution of the duration of an action in a world; `None` if it is always the planned one.
+///
+/// # Errors
+/// When it is none that boxes can be proved to be the best for.
+pub fn chance(
+    action: &str,
+    planned: &Rational,
+    world: &WorldModel,
+) -> Result<Option<Chance>, ChanceError> {
+    let Some(rule) = world.duration_rule(action) else {
+        return Ok(None);
+    };
+    if matches!(rule.distribution, Distribution::Gamma { .. }) {
+        return Err(ChanceError::Gamma(action.to_owned()));
+    }
+    let chance = distributed(rule, planned, &world.resolution);
+    chance
+        .ok_or_else(|| ChanceError::NoNumber(action.to_owned()))
+        .map(Some)
 }
 
 /// How a duration is distributed by a rule; `None` if a number of it is not finite.

@@ -180,7 +180,7 @@ mod rounding;
 pub mod timed;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
-pub use chances::{ChanceError, chances};
+pub use chances::{ChanceError, chance, chances};
 pub use elbowroom_envelope as envelope;
 pub use elbowroom_execution as execution;
 pub use elbowroom_external as external;

@@ -3,12 +3,16 @@
 
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
+#[path = "derived_certificates/chosen.rs"]
+mod chosen;
 #[path = "derived_certificates/course.rs"]
 mod course;
 #[path = "derived_certificates/forgery.rs"]
 mod forgery;
 #[path = "derived_certificates/guards.rs"]
 mod guards;
+#[path = "derived_certificates/likely.rs"]
+mod likely;
 #[path = "derived_certificates/moments.rs"]
 mod moments;
 #[path = "derived_certificates/networks.rs"]
@@ -54,16 +58,30 @@ fn answer_for(
     (guarantee, objective): (Guarantee, Objective),
     vary: &[&str],
 ) -> Option<Value> {
-    let mut request = EnvelopeRequest::new(task, plan.clone());
+    let mut request = request(task, plan, (guarantee, objective));
     let specifications = vary.iter().map(|own| own.parse().expect("a specification"));
     request.vary = specifications.collect();
+    answered(&request)
+}
+
+fn request(
+    task: &Arc<Task>,
+    plan: &(impl Clone + Into<AnyPlan>),
+    (guarantee, objective): (Guarantee, Objective),
+) -> EnvelopeRequest {
+    let mut request = EnvelopeRequest::new(task, plan.clone());
     request.guarantee = guarantee;
     request.search.method = Some(Method::Best);
     request.search.best = BestSettings {
         objective,
         ..BestSettings::default()
     };
-    let outcome = envelope(&request, &mut Unwatched).ok()?;
+    request
+}
+
+/// The answer, if it has a certificate.
+fn answered(request: &EnvelopeRequest) -> Option<Value> {
+    let outcome = envelope(request, &mut Unwatched).ok()?;
     let answer = serde_json::to_value(&outcome.answer).expect("a document");
     let certificate = answer.pointer("/best/certificate");
     certificate.is_some_and(Value::is_object).then_some(answer)

@@ -201,8 +201,8 @@ fn a_duration_that_never_is_as_the_plan_can_bear_leaves_no_probability() {
     );
     let verdict = verify_answer(&written(&outcome));
     assert!(
-        verdict.is_err(),
-        "nothing is proved of a box without probability"
+        matches!(verdict, Err(AnswerError::NoCertificate)),
+        "nothing is proved of a box without probability: {verdict:?}"
     );
     // As planned, and only as planned: certain.
     let always = "[[duration]]\naction = \"pick\"\nconstant = 2";

@@ -10,6 +10,7 @@ use elbowroom::answers::odds::{
     ValueAnswer, odds,
 };
 use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::sim::WorldModel;
@@ -288,6 +289,34 @@ fn what_is_no_plan_has_no_odds() {
     let never = LIKELY.replace("start = 0.5", "start = 0.0");
     let never = Scene::new(LAMP, EVENING, &never).ask(OddsSettings::default());
     assert!(matches!(never.finding, OddsFinding::NoOrder), "{never:?}");
+}
+
+#[test]
+fn bound_of_a_condition_on_a_duration_delays_the_end() {
+    for (condition, earliest) in [
+        ("(and)", 1),
+        ("(at start (>= ?duration 5))", 5),
+        ("(at start (not (< ?duration 5)))", 5),
+        ("(at end (<= (least) ?duration))", 5),
+        ("(over all (>= ?duration 5))", 5),
+        // An open end: as planned.
+        ("(at start (> ?duration 5))", 6),
+    ] {
+        let domain = format!(
+            "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (g))
+              (:functions (least))
+              (:durative-action a :parameters ()
+                :duration (and (>= ?duration 1) (<= ?duration 10))
+                :condition {condition} :effect (at end (g))))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (= (least) 5)) (:goal (g)))";
+        let likely = "format = \"elbowroom-likelihoods\"\nversion = 1\n[defaults]\nbecomes_true = 0.0\n\
+                      becomes_false = 0.0\nstart = 0.9\neffect = 1.0\n";
+        let scene = Scene::new(&domain, problem, likely).with_plan("0: (a) [6]");
+        let odds = scene.odds(OddsSettings::default());
+        let end = odds.order.happenings[1].earliest.as_ref();
+        assert_eq!(end, Some(&Rational::from(earliest)), "{condition}");
+    }
 }
 
 #[test]

@@ -306,6 +306,24 @@ fn last_plan_of_a_log_is_read_with_a_note() {
 }
 
 #[test]
+fn comment_between_two_steps_begins_no_other_plan() {
+    for comment in [
+        "; new plan",
+        ";; plan",
+        "; found plan b",
+        "; solution found",
+    ] {
+        let log = format!("0: (wait) [2]\n{comment}\n7: (snap b1)\n");
+        assert_eq!(
+            plan(&log),
+            "0.000: (wait) [2.000]; 7.000: (snap b1)",
+            "{comment}"
+        );
+        assert_eq!(notes(&log), "", "{comment}");
+    }
+}
+
+#[test]
 fn text_without_an_action_is_no_plan_unless_nothing_has_to_be_done() {
     let no_plan = "1: this is not a plan: it has no action";
     for text in [

@@ -1,6 +1,10 @@
 //! Which durations a domain allows.
 
-use elbowroom_model::ground::{DurationConstraint, Expression};
+use std::sync::Arc;
+
+use elbowroom_model::ground::{
+    Action, Body, Condition, DurationConstraint, DurativeBody, Expression,
+};
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::{End, Interval, Rational};
 
@@ -30,4 +34,81 @@ pub(crate) fn allowed<'a>(
         });
     }
     Some(allowed)
+}
+
+/// The action with the bounds on its duration that its conditions set, such as `(at start (>= ?duration 5))`, among
+/// those of the domain. Of conditions over all, only comparisons with numbers count. They are too strict for the
+/// duration 0, for which such conditions are vacuous.
+#[must_use]
+pub fn with_bounds_of_conditions(action: &Arc<Action>) -> Arc<Action> {
+    let mut action = Arc::clone(action);
+    let bounds = action.durative().map(of_conditions);
+    if let Some(bounds) = bounds.filter(|bounds| !bounds.is_empty())
+        && let Body::Durative(body) = &mut Arc::make_mut(&mut action).body
+    {
+        body.duration.extend(bounds);
+    }
+    action
+}
+
+/// The bounds on the duration that conditions set.
+fn of_conditions(body: &DurativeBody) -> Vec<DurationConstraint> {
+    let of = |condition: &Condition, at_end: bool| {
+        let conjuncts = condition.conjuncts().into_iter();
+        let bounds = conjuncts.filter_map(move |own| bound(own, at_end));
+        bounds.collect::<Vec<_>>()
+    };
+    let mut bounds = of(&body.start.condition, false);
+    bounds.extend(of(&body.end.condition, true));
+    let over_all = of(&body.over_all, false).into_iter();
+    bounds.extend(over_all.filter(|own| matches!(own.bound, Expression::Constant(_))));
+    bounds
+}
+
+/// The condition as a bound on the duration, if it compares the duration with something else.
+fn bound(condition: &Condition, at_end: bool) -> Option<DurationConstraint> {
+    let (comparison, left, right) = match condition {
+        Condition::Compare(comparison, left, right) => (*comparison, left, right),
+        Condition::Not(part) => match &**part {
+            Condition::Compare(comparison, left, right) => (negated(*comparison)?, left, right),
+            _ => return None,
+        },
+        _ => return None,
+    };
+    let (comparison, bound) = match (left, right) {
+        (Expression::Duration, bound) => (comparison, bound),
+        (bound, Expression::Duration) => (mirrored(comparison), bound),
+        _ => return None,
+    };
+    let mut is_of_state = true;
+    bound.visit_leaves(&mut |leaf| {
+        is_of_state &= matches!(leaf, Expression::Constant(_) | Expression::Fluent(_));
+    });
+    is_of_state.then(|| DurationConstraint {
+        comparison,
+        bound: bound.clone(),
+        at_end,
+    })
+}
+
+/// The comparison that holds where this one does not.
+fn negated(comparison: Comparison) -> Option<Comparison> {
+    match comparison {
+        Comparison::Equal => None,
+        Comparison::AtMost => Some(Comparison::Greater),
+        Comparison::AtLeast => Some(Comparison::Less),
+        Comparison::Less => Some(Comparison::AtLeast),
+        Comparison::Greater => Some(Comparison::AtMost),
+    }
+}
+
+/// The same comparison with its sides exchanged.
+fn mirrored(comparison: Comparison) -> Comparison {
+    match comparison {
+        Comparison::Equal => Comparison::Equal,
+        Comparison::AtMost => Comparison::AtLeast,
+        Comparison::AtLeast => Comparison::AtMost,
+        Comparison::Less => Comparison::Greater,
+        Comparison::Greater => Comparison::Less,
+    }
 }

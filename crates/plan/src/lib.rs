@@ -59,6 +59,7 @@ mod unknowns;
 mod valuation;
 
 pub use decoupled::{BoxEnd, DecoupledEnvelope};
+pub use durations::with_bounds_of_conditions;
 pub use elbowroom_num::Side;
 pub use network::{Origin, Schedule, network_node};
 pub use parameter::{Parameter, ParameterKind, ParametrizedPlan};

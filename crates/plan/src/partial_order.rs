@@ -21,6 +21,7 @@ use elbowroom_model::{Footprint, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use crate::deorder::{Labelled, durations, labelled};
+use crate::durations::with_bounds_of_conditions;
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, StnPlan};
 
 /// Actions, and the few orderings among their happenings that are kept whatever is skipped.
@@ -84,7 +85,8 @@ impl PartialOrderPlan {
         let footprints: Vec<Footprint> = nodes
             .map(|(node, _)| stn_plan.footprint(task, node))
             .collect();
-        let constraints = durations::steady(task, &stn_plan, &footprints);
+        let bounded = with_all_bounds(&stn_plan);
+        let constraints = durations::steady(task, &bounded, &footprints);
         let links = constraints.into_iter().map(duration_link);
         Self {
             links: links.collect(),
@@ -126,15 +128,16 @@ impl PartialOrderPlan {
 
 /// The partial order of a valid plan with fixed times.
 ///
-/// Durations get the domain's interval; the plan's own number where the domain's bounds depend on
-/// the schedule.
+/// Durations get the domain's interval, as far as the action's conditions on its duration hold; the plan's own number
+/// where these bounds depend on the schedule.
 pub fn partial_order(task: &Task, plan: &TimeTriggeredPlan) -> PartialOrderPlan {
     let Labelled {
         plan: stn_plan,
         instances,
         times,
     } = labelled(task, plan);
-    let mut links: Vec<Link> = durations::constraints(task, &stn_plan, &times)
+    let bounded = with_all_bounds(&stn_plan);
+    let mut links: Vec<Link> = durations::constraints(task, &bounded, &times)
         .into_iter()
         .map(duration_link)
         .collect();
@@ -171,6 +174,15 @@ pub fn partial_order(task: &Task, plan: &TimeTriggeredPlan) -> PartialOrderPlan 
         nodes: stn_plan.nodes,
         links,
     }
+}
+
+/// The plan with the bounds on durations that conditions set among those of the domain.
+fn with_all_bounds(plan: &StnPlan) -> StnPlan {
+    let mut plan = plan.clone();
+    for instance in &mut plan.instances {
+        instance.action = with_bounds_of_conditions(&instance.action);
+    }
+    plan
 }
 
 fn duration_link(constraint: Constraint) -> Link {

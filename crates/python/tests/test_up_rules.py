@@ -15,8 +15,9 @@ warnings.filterwarnings("ignore")
 
 import elbowroom.up  # noqa: E402
 from unified_planning.engines import PlanGenerationResultStatus as Status  # noqa: E402
+from unified_planning.engines import SequentialPlanValidator  # noqa: E402
 from unified_planning.exceptions import UPUsageError  # noqa: E402
-from unified_planning.plans import ActionInstance, TimeTriggeredPlan  # noqa: E402
+from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, TimeTriggeredPlan  # noqa: E402
 from unified_planning.shortcuts import (  # noqa: E402
     GE,
     And,
@@ -335,3 +336,72 @@ def test_random_problems_are_answered_by_unified_plannings_rules() -> None:
             own, _ = verdicts(problem, TimeTriggeredPlan(steps))
             assert not own, (problem, steps)
     assert found[Status.SOLVED_SATISFICING] > 40 and found[Status.UNSOLVABLE_PROVEN] > 10, found
+
+
+def judged_in_order(problem: Any, actions: list[Any]) -> tuple[bool, bool]:
+    """What both validators say of a plan without times."""
+    plan = SequentialPlan([ActionInstance(action) for action in actions])
+    with PlanValidator(name="elbowroom-val") as own, SequentialPlanValidator() as their:
+        return bool(own.validate(problem, plan)), bool(their.validate(problem, plan))
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_type_without_objects_has_nothing_to_quantify_over(is_known: bool) -> None:
+    problem = Problem("nobody")
+    kind = UserType("nobody")
+    done = problem.add_fluent("done", default_initial_value=False)
+    if is_known:
+        problem.add_fluent("seen", default_initial_value=False, who=kind)
+    who = Variable("who", kind)
+    go = InstantaneousAction("go")
+    # The variable does not occur in them.
+    go.add_precondition(Forall(Equals(1, 2), who))
+    go.add_precondition(Not(Exists(Equals(1, 1), who)))
+    go.add_effect(done, True)
+    spoil = InstantaneousAction("spoil")
+    spoil.add_effect(done, True)
+    spoil.add_effect(done, False, forall=(who,))
+    problem.add_actions([go, spoil])
+    problem.add_goal(And(done, Forall(Not(done), who)))
+    for action in (go, spoil):
+        assert judged_in_order(problem, [action]) == (True, True)
+    assert solved(problem).status == Status.SOLVED_SATISFICING
+
+
+def test_number_assigned_for_each_object_is_no_conflict() -> None:
+    problem = Problem("count")
+    kind = UserType("item")
+    problem.add_objects([Object(name, kind) for name in ("a", "b")])
+    ready = problem.add_fluent("ready", default_initial_value=True, it=kind)
+    number = problem.add_fluent("number", RealType(), default_initial_value=0)
+    item = Variable("item", kind)
+    go = InstantaneousAction("go")
+    go.add_effect(number, 2, ready(item), (item,))
+    problem.add_action(go)
+    problem.add_goal(Equals(number, 2))
+    assert judged_in_order(problem, [go]) == (True, True)
+    assert solved(problem).status == Status.SOLVED_SATISFICING
+
+
+@pytest.mark.parametrize("goals", [1, 2])
+def test_stn_plan_has_actions_without_constraints(goals: int) -> None:
+    problem = Problem("free")
+    for number in range(2):
+        done = problem.add_fluent(f"done{number}", default_initial_value=False)
+        go = InstantaneousAction(f"go{number}")
+        go.add_effect(done, True)
+        problem.add_action(go)
+        if number < goals:
+            problem.add_goal(done)
+    # Plans of the problem have times.
+    rest = DurativeAction("rest")
+    rest.set_fixed_duration(1)
+    problem.add_action(rest)
+    result = solved(problem, plan="stn")
+    instances = {node.action_instance for node in result.plan.get_constraints()} | {
+        node.action_instance for found in result.plan.get_constraints().values() for _, _, node in found
+    }
+    assert len(instances - {None}) == goals, result.plan
+    with PlanValidator(name="elbowroom-val") as own:
+        assert own.validate(problem, result.plan)
+    assert all(verdicts(problem, result.plan.convert_to(PlanKind.TIME_TRIGGERED_PLAN, problem)))

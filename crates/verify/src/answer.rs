@@ -5,19 +5,18 @@ use std::collections::BTreeMap;
 
 use elbowroom_model::ground::FluentId;
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, chance};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 
 use crate::certificate::{Certificate, Chance, End as Side, Guarantee, Parameter, Reasons};
 use crate::check::{Inside, Verified, verify};
-use crate::claim;
-use crate::derive::{self, NotDerived, Plan};
+use crate::derive::{self, NotDerived, Plan, Quantity};
 use crate::flaw::Flaw;
 use crate::given::GivenPlan;
-use crate::number;
 use crate::sound::Endless;
+use crate::{claim, number, probability};
 
 /// Why nothing can be said of an answer, or what is wrong with it.
 #[derive(Debug, thiserror::Error)]
@@ -26,10 +25,17 @@ pub enum AnswerError {
     /// It is no answer with a largest box.
     #[error("this is no answer of `elbowroom envelope --method best --json`: {0}")]
     Unreadable(#[from] serde_json::Error),
+    /// It is an answer of another format, which has no certificate.
+    #[error(
+        "an answer of the format `{0}` has no certificate; only answers of `elbowroom envelope --method \
+         best --json`, and of `elbowroom plan --json` that no plan exists, can be verified"
+    )]
+    OtherAnswer(String),
     /// It is about no largest box.
     #[error(
-        "the answer has no largest box: it was made by another method, nothing may deviate, or the \
-         plan does not work as planned"
+        "the answer has no largest box, because it was made by another method, nothing may deviate, or \
+         the plan does not work as planned; only answers of `elbowroom envelope --method best --json`, and \
+         of `elbowroom plan --json` that no plan exists, can be verified"
     )]
     NoBox,
     /// It has no certificate.
@@ -44,6 +50,13 @@ pub enum AnswerError {
     /// The checker has no rule that derives the certificate from the files.
     #[error("not derivable here: {0}")]
     NotDerivable(String),
+}
+
+impl AnswerError {
+    /// Returns `true` if nothing was found to be wrong, because there is nothing that can be checked, or no rule for it.
+    pub fn is_limit(&self) -> bool {
+        !matches!(self, Self::Unreadable(_) | Self::Flaw(_))
+    }
 }
 
 /// The part that all answers of `elbowroom envelope` have.
@@ -105,6 +118,14 @@ struct Best {
     certificate: Option<Certificate>,
     #[serde(default)]
     chances: Vec<Option<Chance>>,
+    probability: Option<Probability>,
+}
+
+/// Enclosure of the probability that all parameters are inside the box.
+#[derive(Deserialize)]
+struct Probability {
+    least: Number,
+    most: Number,
 }
 
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
@@ -176,7 +197,7 @@ pub fn verify_answer_of(
     task: &Task,
     plan: &TimeTriggeredPlan,
 ) -> Result<Verified, AnswerError> {
-    verify_with(text, task, Plan::Times(plan))
+    verify_answer_in_world(text, task, Plan::Times(plan), None)
 }
 
 /// Checks as [`verify_answer_of`] does, against a plan that is given with constraints.
@@ -188,10 +209,24 @@ pub fn verify_answer_of_network(
     task: &Task,
     plan: &GivenPlan,
 ) -> Result<Verified, AnswerError> {
-    verify_with(text, task, Plan::Network(plan))
+    verify_answer_in_world(text, task, Plan::Network(plan), None)
 }
 
-fn verify_with(text: &str, task: &Task, plan: Plan<'_>) -> Result<Verified, AnswerError> {
+/// Distribution of the duration of an action in a world, from the action's name and its planned duration;
+/// `None` if it is always the planned one. The error says why a world's distribution cannot be compared.
+pub type Distributions<'a> = &'a dyn Fn(&str, &Rational) -> Result<Option<chance::Chance>, String>;
+
+/// Checks as [`verify_answer_of`] does. For a box of the objective `probability` it also checks that the
+/// parameters are distributed as in a world; without one, this is the only assumption of the verdict.
+///
+/// # Errors
+/// Those of [`verify_answer_of`].
+pub fn verify_answer_in_world(
+    text: &str,
+    task: &Task,
+    plan: Plan<'_>,
+    world: Option<Distributions<'_>>,
+) -> Result<Verified, AnswerError> {
     let mut verified = verify_answer(text)?;
     let any: AnyAnswer = serde_json::from_str(text)?;
     let answer: Answer = serde_json::from_str(text)?;
@@ -226,7 +261,7 @@ fn verify_with(text: &str, task: &Task, plan: Plan<'_>) -> Result<Verified, Answ
             NotDerived::Flaw(flaw) => AnswerError::Flaw(flaw),
             NotDerived::Unknown(what) => AnswerError::NotDerivable(what),
         })?;
-    for quantity in derived.quantities {
+    for quantity in &derived.quantities {
         let room = answer.parameters.get(quantity.parameter);
         let room = room.ok_or(Flaw::NoSuch("parameter", quantity.parameter))?;
         let is_kind = room.kind.as_deref().is_none_or(|own| own == quantity.kind);
@@ -238,6 +273,12 @@ fn verify_with(text: &str, task: &Task, plan: Plan<'_>) -> Result<Verified, Answ
         same(is_kind && is_told, &what)?;
     }
     verified.assumes.clear();
+    if matches!(certificate.reasons, Reasons::Probability(_)) {
+        match world {
+            None => verified.assumes.push(claim::DISTRIBUTED.to_owned()),
+            Some(world) => distributed(certificate, &derived.quantities, world)?,
+        }
+    }
     verified.proves = claim::proves_all(certificate);
     verified.from_conditions = std::mem::take(&mut verified.assumed);
     verified.inside = Some(Inside {
@@ -246,6 +287,34 @@ fn verify_with(text: &str, task: &Task, plan: Plan<'_>) -> Result<Verified, Answ
         assumed: 0,
     });
     Ok(verified)
+}
+
+/// Checks that each parameter is the duration of an action, distributed as in the world.
+fn distributed(
+    certificate: &Certificate,
+    quantities: &[Quantity],
+    world: Distributions<'_>,
+) -> Result<(), AnswerError> {
+    for (index, parameter) in certificate.parameters.iter().enumerate() {
+        let mut own = quantities.iter().filter(|own| own.parameter == index);
+        let action = match (own.next(), own.next()) {
+            (Some(own), None) if own.kind == "duration" => own.action.as_ref(),
+            _ => None,
+        };
+        let what = || {
+            format!(
+                "the distribution of {}, which is no duration",
+                parameter.name
+            )
+        };
+        let action = action.ok_or_else(|| AnswerError::NotDerivable(what()))?;
+        let chance = world(action, &parameter.nominal).map_err(AnswerError::NotDerivable)?;
+        if parameter.chance != chance.as_ref().map(Chance::from) {
+            let what = format!("the world has another distribution for the duration of {action}");
+            return Err(Flaw::Files(what).into());
+        }
+    }
+    Ok(())
 }
 
 /// Returns the parameters that are initial values, by fluent.
@@ -277,10 +346,15 @@ fn initials(answer: &Answer, task: &Task) -> Result<BTreeMap<FluentId, usize>, A
 /// # Errors
 /// When the text is no such answer, or the first thing in it that is not so.
 pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
+    let whole: Value = serde_json::from_str(text)?;
+    let format = whole.get("format").and_then(Value::as_str);
+    let other = format.filter(|own| own.starts_with("elbowroom-") && *own != "elbowroom-envelope");
+    if let Some(other) = other {
+        return Err(AnswerError::OtherAnswer(other.to_owned()));
+    }
     let any: AnyAnswer = serde_json::from_str(text)?;
     any.best.ok_or(AnswerError::NoBox)?;
     let answer: Answer = serde_json::from_str(text)?;
-    let whole: Value = serde_json::from_str(text)?;
     same(
         whole.get("version") == Some(&Value::from(1)),
         "the version, which is 1,",
@@ -327,7 +401,24 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
     {
         check_interval(&answer, certificate, (index, room, own))?;
     }
+    same(
+        is_likely_so(&answer, certificate, &verified.bound),
+        "the probability",
+    )?;
     Ok(verified)
+}
+
+/// Returns `true` if the answer encloses the probability of its box as the distributions of the certificate do, and
+/// no other answer has a probability. Its intervals are those of the certificate.
+fn is_likely_so(answer: &Answer, certificate: &Certificate, bound: &Rational) -> bool {
+    let Some(told) = &answer.best.probability else {
+        return answer.best.objective != Objective::Probability;
+    };
+    let ends = answer.parameters.iter();
+    let ends = ends.map(|room| [&room.lower, &room.upper].map(|end| end.exact.parse().ok()));
+    let own = probability::enclosure(certificate, ends, bound);
+    answer.best.objective == Objective::Probability
+        && own.is_some_and(|own| own == [told.least.exact.clone(), told.most.exact.clone()])
 }
 
 /// Checks that the interval of a parameter in the answer is the certificate's.

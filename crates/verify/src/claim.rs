@@ -44,16 +44,16 @@ fn is_best(certificate: &Certificate) -> &'static str {
     }
 }
 
+/// Assumption about the distributions of parameters, which are those of a world file.
+pub(crate) const DISTRIBUTED: &str = "the parameters are independent of each other, each distributed as its `chance` \
+                                      says, and one without it always at its nominal value";
+
 /// What has to be known from elsewhere, the same in all certificates first.
 pub(crate) fn assumes(certificate: &Certificate) -> Vec<String> {
     let mut assumes = is_inside(certificate);
     assumes.push("the time points and constraints are those of the plan".to_owned());
     if matches!(certificate.reasons, Reasons::Probability(_)) {
-        assumes.push(
-            "the parameters are independent of each other, each distributed as its `chance` says, and \
-             one without it always at its nominal value"
-                .to_owned(),
-        );
+        assumes.push(DISTRIBUTED.to_owned());
     }
     for (index, proof) in certificate.proofs.iter().enumerate() {
         if let Proof::Assumed { why, .. } = proof {

@@ -60,7 +60,7 @@ use elbowroom_model::ground::FluentId;
 use elbowroom_model::{Task, TimeTriggeredPlan, validate};
 use elbowroom_num::Rational;
 
-use crate::certificate::{Certificate, Parameter, Proof, Reasons};
+use crate::certificate::{Certificate, Parameter, Proof};
 use crate::flaw::Flaw;
 use crate::given::GivenPlan;
 use crate::intervals::Intervals;
@@ -98,8 +98,8 @@ impl NotDerived {
 }
 
 /// The plan that a certificate has to be about.
-#[derive(Clone, Copy)]
-pub(crate) enum Plan<'a> {
+#[derive(Clone, Copy, Debug)]
+pub enum Plan<'a> {
     /// Actions with fixed times.
     Times(&'a TimeTriggeredPlan),
     /// Actions with constraints on their times.
@@ -118,10 +118,6 @@ pub(crate) fn check(
     plan: Plan<'_>,
     initials: BTreeMap<FluentId, usize>,
 ) -> Result<Derived, NotDerived> {
-    if matches!(certificate.reasons, Reasons::Probability(_)) {
-        let what = "the distributions of durations, which come from a world file";
-        return Err(NotDerived::unknown(what));
-    }
     let Some(sound) = &certificate.sound else {
         let what = "the certificate does not tell why the box is inside the envelope";
         return Err(NotDerived::unknown(what));

@@ -62,7 +62,8 @@ pub mod row;
 mod volume;
 
 pub use answer::{
-    AnswerError, epsilon_of, verify_answer, verify_answer_of, verify_answer_of_network,
+    AnswerError, Distributions, epsilon_of, verify_answer, verify_answer_in_world,
+    verify_answer_of, verify_answer_of_network,
 };
 pub use bounds::Ends;
 pub use certificate::{
@@ -70,6 +71,6 @@ pub use certificate::{
     Part, Proof, Reasons, Shape, Source, Stopped, Sum, Term, Total, Touch, Way, sound,
 };
 pub use check::{Inside, Verified, added_up, verify};
-pub use derive::NotDerived;
+pub use derive::{NotDerived, Plan};
 pub use flaw::Flaw;
 pub use given::{GivenConstraint, GivenInstance, GivenParameter, GivenPlan};

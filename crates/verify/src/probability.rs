@@ -155,6 +155,34 @@ impl Chances {
     }
 }
 
+/// Returns an enclosure of the probability that all parameters are inside their intervals: at least this in the box,
+/// rounded down to a billionth, and at most this in any box, rounded up. An end that is `None` is infinite; `bound` is
+/// the greatest logarithm of the probability of a box. Returns `None` if a distribution makes no sense.
+pub(crate) fn enclosure(
+    certificate: &Certificate,
+    ends: impl Iterator<Item = [Option<Rational>; 2]>,
+    bound: &Rational,
+) -> Option<[Rational; 2]> {
+    /// Longer than any duration, for ends that are infinite.
+    const EVER: i64 = 1_000_000_000_000;
+    let mut least = Rational::ONE;
+    for (parameter, [lower, upper]) in certificate.parameters.iter().zip(ends) {
+        let Some(own) = &parameter.chance else {
+            continue;
+        };
+        let resolution = own.resolution.as_ref();
+        let resolution = resolution.map_or(Rational::ONE, |own| own.0.clone());
+        let ever = Rational::from(EVER);
+        let lower = lower.unwrap_or_else(|| -&ever);
+        let inside = own
+            .reckoned()?
+            .inside([&lower, &upper.unwrap_or(ever)], &resolution);
+        least = enclosed::billionths_below(&(least * inside));
+    }
+    let [_, most] = enclosed::exp_of_minus(&(-bound).max(Rational::ZERO));
+    Some([least, enclosed::billionths_above(&most).min(Rational::ONE)])
+}
+
 /// The touch with its numbers; `None` if it is not in the cell.
 fn touching(touch: &Touch, cell: &Cell) -> Option<Touching> {
     Some(match touch {

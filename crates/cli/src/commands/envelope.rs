@@ -11,7 +11,6 @@ use elbowroom::answers::RequestError;
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Search};
 use elbowroom::envelope as library;
 use elbowroom::plan::parametrize::VarySpec;
-use elbowroom::sim::WorldModel;
 
 use crate::args::{self, EnvelopeArgs};
 use crate::exit::{Answer, Exit, Failure};
@@ -36,16 +35,8 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         &arguments.controllable,
     ))?);
     let plan = input::any_plan(&task, &arguments.plan, &arguments.rounding(), output)?;
-    let world = match &arguments.world {
-        Some(path) => {
-            let text = input::source(path, "world")?;
-            let world = WorldModel::read(&text, task.problem()).map_err(|wrong| {
-                Failure::from(wrong).advised("docs/formats/world.md describes world files")
-            })?;
-            Some(Arc::new(world))
-        }
-        None => None,
-    };
+    let world = arguments.world.as_deref();
+    let world = world.map(|path| input::world(path, &task)).transpose()?;
     let search = Search::default();
     let request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
@@ -71,7 +62,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
             most_checks: search.most_checks,
             best,
         },
-        world,
+        world: world.map(Arc::new),
         ..EnvelopeRequest::new(&Arc::new(task), plan)
     };
     let request = Arc::new(request);

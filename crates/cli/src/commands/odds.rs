@@ -7,7 +7,6 @@ use std::sync::Arc;
 use elbowroom::RoundingRule;
 use elbowroom::answers::odds::{LatticeFinding, OddsFinding, OddsRequest, OddsSettings, odds};
 use elbowroom::probability::likelihoods;
-use elbowroom::sim::WorldModel;
 
 use crate::args::OddsArgs;
 use crate::exit::{Answer, Exit, Failure};
@@ -33,16 +32,8 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
     };
     let text = input::source(&arguments.likelihoods, "likelihoods")?;
     let likelihoods = read_likelihoods(&text, &task)?;
-    let world = match &arguments.world {
-        Some(path) => {
-            let text = input::source(path, "world")?;
-            let world = WorldModel::read(&text, task.problem()).map_err(|wrong| {
-                Failure::from(wrong).advised("docs/formats/world.md describes world files")
-            })?;
-            Some(world)
-        }
-        None => None,
-    };
+    let world = arguments.world.as_deref();
+    let world = world.map(|path| input::world(path, &task)).transpose()?;
     let request = OddsRequest {
         task: &task,
         plan,

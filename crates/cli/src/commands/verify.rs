@@ -8,11 +8,12 @@ use std::path::Path;
 
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
+use elbowroom::sim::WorldModel;
 use elbowroom::verify::{
-    AnswerError, Inside, Verified, epsilon_of, verify_answer, verify_answer_of,
-    verify_answer_of_network,
+    AnswerError, Distributions, Inside, Plan, Verified, epsilon_of, verify_answer,
+    verify_answer_in_world,
 };
-use elbowroom::{AnyPlan, RoundingRule, given_plan};
+use elbowroom::{AnyPlan, RoundingRule, chance, given_plan};
 use serde_json::{Value, json};
 
 use crate::args::{ProblemArgs, VerifyArgs};
@@ -39,13 +40,10 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
                 &epsilon.unwrap_or_else(Task::default_epsilon),
                 output,
             )?;
-            let verdict = match input::any_plan(&task, plan, &RoundingRule::default(), output)? {
-                AnyPlan::TimeTriggered(plan) => verify_answer_of(source.text(), &task, &plan),
-                AnyPlan::Stn(plan) => {
-                    verify_answer_of_network(source.text(), &task, &given_plan(&plan))
-                }
-            };
-            (verdict, true)
+            let plan = input::any_plan(&task, plan, &RoundingRule::default(), output)?;
+            let world = arguments.world.as_deref();
+            let world = world.map(|path| input::world(path, &task)).transpose()?;
+            (derived(source.text(), &task, &plan, world.as_ref()), true)
         }
     };
     match verdict {
@@ -57,7 +55,7 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
             }
             Ok(Exit::Yes)
         }
-        Err(unsuitable @ (AnswerError::Unreadable(_) | AnswerError::NoBox)) => Err(Failure::new(
+        Err(unsuitable @ AnswerError::Unreadable(_)) => Err(Failure::new(
             unsuitable,
             "`elbowroom envelope DOMAIN PROBLEM PLAN --method best --json` makes one",
         )),
@@ -69,10 +67,35 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
                 push_wrapped(&mut text, &format!("{wrong}."), 2, Look::of_stdout().width);
                 output::print(&text)?;
             }
-            Ok(match wrong {
-                AnswerError::NotDerivable(_) | AnswerError::NoCertificate => Exit::Limit,
-                _ => Exit::No,
+            Ok(if wrong.is_limit() {
+                Exit::Limit
+            } else {
+                Exit::No
             })
+        }
+    }
+}
+
+/// Checks an answer against a problem, a plan, and a world if there is one.
+fn derived(
+    answer: &str,
+    task: &Task,
+    plan: &AnyPlan,
+    world: Option<&WorldModel>,
+) -> Result<Verified, AnswerError> {
+    let of_world = world.map(|world| {
+        |action: &str, planned: &Rational| {
+            chance(action, planned, world).map_err(|wrong| wrong.to_string())
+        }
+    });
+    let world = of_world.as_ref().map(|own| own as Distributions<'_>);
+    match plan {
+        AnyPlan::TimeTriggered(plan) => {
+            verify_answer_in_world(answer, task, Plan::Times(plan), world)
+        }
+        AnyPlan::Stn(plan) => {
+            let given = given_plan(plan);
+            verify_answer_in_world(answer, task, Plan::Network(&given), world)
         }
     }
 }
@@ -117,7 +140,7 @@ fn document(verdict: Result<&Verified, &AnswerError>, is_derived: bool) -> Value
         }),
         Err(wrong) => json!({
             "proved": false,
-            "derivable": !matches!(wrong, AnswerError::NotDerivable(_)),
+            "derivable": !wrong.is_limit(),
             "reason": wrong.to_string(),
         }),
     };
@@ -129,9 +152,13 @@ fn document(verdict: Result<&Verified, &AnswerError>, is_derived: bool) -> Value
 
 fn proven(name: &str, verified: &Verified, is_derived: bool, look: Look) -> String {
     let mut text = String::new();
-    if !is_derived {
-        let without = "Assumed, because the files are not given (`elbowroom verify ANSWER.json DOMAIN \
-                       PROBLEM PLAN` derives it from them):";
+    if !verified.assumes.is_empty() {
+        let without = if is_derived {
+            "Assumed, because no world file is given:"
+        } else {
+            "Assumed, because the files are not given (`elbowroom verify ANSWER.json DOMAIN PROBLEM \
+             PLAN` derives it from them):"
+        };
         push_wrapped(&mut text, without, 0, look.width);
         for assumed in &verified.assumes {
             push_wrapped(&mut text, &format!("- {assumed}"), 2, look.width);
@@ -170,10 +197,17 @@ fn proven(name: &str, verified: &Verified, is_derived: bool, look: Look) -> Stri
     };
     push_wrapped(&mut text, &how, 2, look.width);
     if is_derived {
-        let derived = "The box is inside the envelope: for all its values the plan can be scheduled, and \
-                       every schedule is a valid plan. Network and conditions were derived from domain, \
-                       problem and plan; nothing is assumed.";
-        push_wrapped(&mut text, derived, 2, look.width);
+        let rest = if verified.assumes.is_empty() {
+            "; nothing is assumed."
+        } else {
+            ". The probability was not checked against a world: `--world WORLD.toml` does that."
+        };
+        let derived = format!(
+            "The box is inside the envelope: for all its values the plan can be scheduled, and every \
+             schedule is a valid plan. Network and conditions were derived from domain, problem and \
+             plan{rest}"
+        );
+        push_wrapped(&mut text, &derived, 2, look.width);
     } else {
         push_wrapped(&mut text, &inside(verified.inside), 2, look.width);
     }

@@ -229,6 +229,7 @@ fn finding(
         match planned(request) {
             PlanAnswer::Plan(plan) => made = plan,
             PlanAnswer::Unsolvable => return Ok(OddsFinding::NoPlan),
+            PlanAnswer::Failed { why } => return Err(RequestError::Unsupported(why)),
             other => {
                 let reason = other.why_not().unwrap_or_default().to_owned();
                 return Ok(OddsFinding::None { reason });

@@ -7,6 +7,7 @@ use elbowroom_model::ground::{
     Action, Body, Change, Condition, Effect, Expression, FluentId, Guard, SnapAction,
 };
 use elbowroom_model::{Step, Task, TimeTriggeredPlan};
+use elbowroom_plan::with_bounds_of_conditions;
 
 /// The plan without conditions on numbers, and without effects on numbers that decide neither durations nor facts: what
 /// `ROSPlan` orders happenings by.
@@ -151,7 +152,8 @@ fn timed(step: &Step) -> Step {
         _ => None,
     };
     Step {
-        action: Arc::new(step.action.map_leaves(&mut planned)),
+        // What conditions say of other durations counts among the bounds.
+        action: Arc::new(with_bounds_of_conditions(&step.action).map_leaves(&mut planned)),
         ..step.clone()
     }
 }

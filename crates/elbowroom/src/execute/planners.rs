@@ -118,7 +118,11 @@ pub(crate) fn without_plan(
             let goes_on = &mut || goes_on();
             return refuted((task, situation), proof, certificate_work, goes_on);
         }
-        embedded::Answer::Unsupported(unsupported) => unsupported.to_string(),
+        // It says nothing about plans.
+        embedded::Answer::Unsupported(unsupported) => {
+            let why = unsupported.to_string();
+            return PlanAnswer::Failed { why };
+        }
         _ if !goes_on() => "planning was interrupted".to_owned(),
         embedded::Answer::NoneFound {
             stopped,

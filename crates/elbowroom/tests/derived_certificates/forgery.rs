@@ -120,10 +120,10 @@ fn places(value: &Value, path: &str, lists: &mut Vec<String>) {
 fn mutated(answer: &Value, draw: &mut Draw) -> Value {
     let mut broken = answer.clone();
     let mut found = Vec::new();
-    let root = if draw.below(4) == 0 {
-        "/parameters"
-    } else {
-        "/best/certificate"
+    let root = match draw.below(8) {
+        0 | 1 => "/parameters",
+        2 if answer.pointer("/best/probability").is_some() => "/best",
+        _ => "/best/certificate",
     };
     let part = answer.pointer(root).expect("a member").clone();
     match draw.below(6) {
@@ -203,6 +203,8 @@ pub(super) fn claim(answer: &Value) -> Vec<Value> {
         "/best/most",
         "/best/value",
         "/best/bound",
+        "/best/probability",
+        "/best/chances",
     ];
     let members = members.iter().map(|place| answer.pointer(place).cloned());
     let rooms = answer["parameters"].as_array().into_iter().flatten();

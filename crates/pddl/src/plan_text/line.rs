@@ -99,7 +99,7 @@ pub(super) fn line(text: &str, start: usize) -> Line<'_> {
     let mut cursor = Cursor::new(text, start);
     cursor.skip_space();
     if cursor.is_done_or_comment() {
-        return if is_heading(text) {
+        return if is_heading_comment(text) {
             Line::Heading
         } else {
             Line::Blank
@@ -146,7 +146,25 @@ fn is_rule(text: &str) -> bool {
         .any(|&sign| text.len() >= 3 && text.chars().all(|c| c == sign))
 }
 
-/// Returns `true` if planners print this before a plan, or between a plan and a better one.
+/// Returns `true` for the comments that POPF and OPTIC print before each plan: `;;;; Solution Found`,
+/// `; Plan found with metric 5.0`, `; States evaluated: 12`, `; States evaluated so far: 12`; and for `; Plan found`,
+/// which this project's program for the engines of unified-planning prints. Any other comment is about the steps
+/// around it, whatever its words.
+fn is_heading_comment(text: &str) -> bool {
+    const BEFORE_NUMBERS: &[&str] = &[
+        "; Plan found with metric ",
+        "; States evaluated: ",
+        "; States evaluated so far: ",
+    ];
+    let text = text.trim();
+    let mut numbers = BEFORE_NUMBERS
+        .iter()
+        .filter_map(|own| text.strip_prefix(own));
+    let is_number = |own: &str| own.trim().parse::<f64>().is_ok();
+    matches!(text, ";;;; Solution Found" | "; Plan found") || numbers.any(is_number)
+}
+
+/// Returns `true` if planners print this line, which is no comment, before a plan, or between a plan and a better one.
 fn is_heading(text: &str) -> bool {
     /// Beginnings, behind signs.
     const BEGINNINGS: &[&str] = &[
@@ -161,11 +179,10 @@ fn is_heading(text: &str) -> bool {
         "sequentialplan:",
         "solution found",
         "solution number",
-        "states evaluated",
         "timetriggeredplan:",
     ];
     /// Whole lines, without signs.
-    const LINES: &[&str] = &["plan", "new plan", "rescheduled plan", "the plan"];
+    const LINES: &[&str] = &["plan", "rescheduled plan"];
     let mut text = text.trim();
     // Fast Downward: `[t=0.003s, 10084 KB] Solution found!`.
     if let Some((_, behind)) = text.strip_prefix('[').and_then(|rest| rest.split_once(']')) {

@@ -46,6 +46,8 @@ class Bounds:
         """The conditions of effects that happen at once."""
         found: dict[str, None] = {}
         for effect in effects:
+            if self._say.ranges_over_nothing(effect.forall):
+                continue
             for condition in self._within(effect.fluent.fluent(), self._say.target(effect.fluent)):
                 bound = self._say.declared(effect.forall)
                 found[f"(forall ({bound}) {condition})" if effect.forall else condition] = None

@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from unified_planning.model import FNode, OperatorKind, Problem as UPProblem
+from unified_planning.model.walkers.identitydag import IdentityDagWalker
 
 from ._errors import UnsupportedError
 
@@ -29,7 +30,21 @@ class Expressions:
         self._names: dict[tuple[str, Any], str] = {}
         self._used = {*_TAKEN, *taken}
         self._variables: dict[tuple[type, str, Any], str] = {}
-        self.simplify = problem.environment.simplifier.simplify
+        self._problem = problem
+        self._without_empty = _WithoutEmptyTypes(self)
+        self._simplify = problem.environment.simplifier.simplify
+
+    def simplify(self, expression: FNode) -> FNode:
+        """The expression without what is always so."""
+        # The simplifier drops quantified variables that do not occur, as if each type had objects.
+        return self._simplify(self._without_empty.walk(expression))
+
+    def ranges_over_nothing(self, variables: Iterable[Any]) -> bool:
+        """Whether the problem has no object for one of the variables. It need not know the type of that one."""
+        return any(
+            it.type.is_user_type() and next(iter(self._problem.objects(it.type)), None) is None
+            for it in variables
+        )
 
     def name(self, kind: str, thing: Any) -> str:
         """The name of something, the same each time."""
@@ -111,7 +126,9 @@ class Expressions:
         return f"({operator} {' '.join(args)})"
 
     def effect(self, effect: Any) -> str:
-        """An effect, with its condition and its forall."""
+        """An effect, with its condition and its forall; empty if there is none."""
+        if self.ranges_over_nothing(effect.forall):
+            return ""
         target = self.target(effect.fluent)
         made: list[str]
         if effect.is_increase() or effect.is_decrease():
@@ -129,14 +146,44 @@ class Expressions:
         else:
             value = self.condition(effect.value)
             made = [f"(assign {target} {value})"]
-        condition = self.simplify(effect.condition)
+        condition, forall = effect.condition, effect.forall
+        if forall and self._assigns_one_number(effect):
+            # In PDDL the same number several times is a conflict.
+            condition, forall = effect.environment.expression_manager.Exists(condition, *forall), ()
+        condition = self.simplify(condition)
         if not condition.is_true():
             guard = self.walk(condition)
             made = [_when(guard, it) for it in made]
-        if effect.forall:
-            bound = self.declared(effect.forall)
+        if forall:
+            bound = self.declared(forall)
             made = [f"(forall ({bound}) {it})" for it in made]
         return " ".join(made)
+
+
+    def _assigns_one_number(self, effect: Any) -> bool:
+        """Whether an effect for all objects assigns the same number to the same fluent for each of them."""
+        if not effect.is_assignment() or effect.fluent.type.is_bool_type():
+            return False
+        free = effect.environment.free_vars_oracle.get_free_variables
+        return not (free(effect.fluent) | free(effect.value)) & set(effect.forall)
+
+
+class _WithoutEmptyTypes(IdentityDagWalker):  # type: ignore[misc, unused-ignore]
+    """Replaces quantifiers over types without objects by what they say then."""
+
+    def __init__(self, say: Expressions) -> None:
+        IdentityDagWalker.__init__(self, say._problem.environment)
+        self._say = say
+
+    def walk_exists(self, expression: FNode, args: list[FNode], **kwargs: Any) -> FNode:
+        if self._say.ranges_over_nothing(expression.variables()):
+            return self.manager.FALSE()
+        return IdentityDagWalker.walk_exists(self, expression, args, **kwargs)
+
+    def walk_forall(self, expression: FNode, args: list[FNode], **kwargs: Any) -> FNode:
+        if self._say.ranges_over_nothing(expression.variables()):
+            return self.manager.TRUE()
+        return IdentityDagWalker.walk_forall(self, expression, args, **kwargs)
 
 
 def _when(guard: str, change: str) -> str:

@@ -58,6 +58,11 @@ def stn_plan(translated: Translation, plan: Any) -> STNPlan:
             continue
         first = kept.get(source, start)
         constraints.append((first, _finite(lower), _finite(upper), kept[target]))
+    # An STN plan has the nodes of its constraints alone.
+    mentioned = {node for first, _, _, second in constraints for node in (first, second)}
+    for node in kept.values():
+        if node not in mentioned:
+            constraints.append((start, Fraction(0), None, node))
     return STNPlan(constraints, translated.original.environment)
 
 

@@ -10,7 +10,7 @@ use super::course::Course;
 use super::histories::Histories;
 use super::subject::{Point, Subject, What};
 use super::{NotDerived, Quantity};
-use crate::certificate::{Certificate, Constraint, Guarantee, Limit};
+use crate::certificate::{Certificate, Constraint, Guarantee, Limit, Part, Proof};
 
 /// Returns the quantities of the parameters, each once.
 ///
@@ -28,12 +28,13 @@ pub(super) fn check(
         subject,
         sides: sides(subject),
         set: BTreeSet::new(),
+        narrowed: Vec::new(),
         quantities: BTreeMap::new(),
     };
     for (index, constraint) in certificate.constraints.iter().enumerate() {
         let is_needed =
             reader.sets(constraint)? || reader.orders(constraint) || course.implies(constraint);
-        if !is_needed {
+        if !is_needed && !reader.narrows(index) {
             let [from, to] = [constraint.from, constraint.to].map(|point| reader.name(point));
             let what = format!("constraint {index}, from `{from}` to `{to}`, is none of the plan");
             return Err(if subject.is_plain {
@@ -43,6 +44,7 @@ pub(super) fn check(
             });
         }
     }
+    reader.proofs_leave_out_narrowed()?;
     let durations = subject.durative().map(|(step, _)| subject.ends[step][1]);
     let timed = |point: &usize| matches!(subject.points[*point].what, What::Timed(_));
     let timed = (0..subject.points.len()).filter(timed);
@@ -76,6 +78,8 @@ struct Reader<'a> {
     sides: BTreeSet<(usize, usize)>,
     /// Ends of actions and timed initials that a constraint has set.
     set: BTreeSet<usize>,
+    /// Constraints that keep a duration at the planned one where the domain leaves a choice.
+    narrowed: Vec<usize>,
     quantities: BTreeMap<usize, Quantity>,
 }
 
@@ -114,7 +118,12 @@ impl Reader<'_> {
                     None => (planned.clone(), Some(planned)),
                     Some((step, body)) => {
                         let (least, most) = subject.allowed(step, body, self.histories)?;
-                        if most.as_ref() != Some(&least) && Subject::reads_duration_early(body) {
+                        let is_chosen = most.as_ref() != Some(&least)
+                            && !self.certificate.constraints.iter().any(|own| {
+                                (own.from, own.to) == (constraint.from, constraint.to)
+                                    && self.is_as_planned(own)
+                            });
+                        if is_chosen && Subject::reads_duration_early(body) {
                             let name = &subject.steps[step].action.name;
                             let what = format!("an effect that depends on the duration of {name}");
                             return Err(NotDerived::Unknown(what));
@@ -131,6 +140,61 @@ impl Reader<'_> {
         }
         let is_first = self.set.insert(constraint.to);
         Ok(is_first || self.is_repeated(constraint))
+    }
+
+    /// Returns `true` if the constraint sets a duration to the planned one.
+    fn is_as_planned(&self, constraint: &Constraint) -> bool {
+        let what = |point: usize| self.subject.points.get(point).map(|own| own.what);
+        let (Some(What::Start(start)), Some(What::End(end))) =
+            (what(constraint.from), what(constraint.to))
+        else {
+            return false;
+        };
+        let planned = self.subject.steps[start].duration.clone();
+        let planned = Limit::Number(crate::Exact(planned.unwrap_or_default()));
+        start == end
+            && !constraint.observed
+            && constraint.lower == planned
+            && constraint.upper == planned
+    }
+
+    /// Returns `true` if the constraint keeps a duration that the executor could choose at the planned one. Schedules
+    /// of the network are some of all schedules then, so the box is inside the envelope if these are enough.
+    fn narrows(&mut self, index: usize) -> bool {
+        let constraint = &self.certificate.constraints[index];
+        let is_weak = self.certificate.guarantee == Guarantee::Weak;
+        if !is_weak || !self.is_as_planned(constraint) {
+            return false;
+        }
+        self.set.insert(constraint.to);
+        self.narrowed.push(index);
+        true
+    }
+
+    /// Checks that no proof about other boxes uses a constraint that all schedules need not satisfy.
+    fn proofs_leave_out_narrowed(&self) -> Result<(), NotDerived> {
+        let Some(&first) = self.narrowed.first() else {
+            return Ok(());
+        };
+        let is_other = |part: &Part| match part {
+            Part::Least(index) | Part::Most(index) => !self.narrowed.contains(index),
+            _ => matches!(part, Part::Beginning(_)),
+        };
+        let mut proofs = self.certificate.proofs.iter();
+        let are_others = proofs.all(|proof| match proof {
+            Proof::Cycle(parts) => parts.iter().all(is_other),
+            _ => false,
+        });
+        if are_others {
+            return Ok(());
+        }
+        let constraint = &self.certificate.constraints[first];
+        let what = format!(
+            "an inequality that may depend on the duration from `{}` to `{}` being the planned one",
+            self.name(constraint.from),
+            self.name(constraint.to)
+        );
+        Err(NotDerived::Unknown(what))
     }
 
     /// Returns `true` if all constraints that set the same difference set it to numbers. Those are equal then.

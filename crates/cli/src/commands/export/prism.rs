@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use elbowroom::export::prism::{self, PrismError};
 use elbowroom::probability::{likelihoods, optimum};
-use elbowroom::sim::WorldModel;
 use elbowroom::timed;
 
 use crate::args::{Bound, ExportArgs};
@@ -65,10 +64,7 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
         };
         prism::untimed(&task, &likelihoods, &settings)
     } else if let Some(path) = &process.world {
-        let text = input::source(path, "world")?;
-        let world = WorldModel::read(&text, task.problem()).map_err(|wrong| {
-            Failure::from(wrong).advised("docs/formats/world.md describes world files")
-        })?;
+        let world = input::world(path, &task)?;
         let bound = match process.bound {
             None | Some(Bound::Upper) => prism::Bound::Upper,
             Some(Bound::Lower) => prism::Bound::Lower,

@@ -100,8 +100,12 @@ pub(super) fn best(
     settings: &BestSettings,
     run: BestRun,
 ) -> Best {
-    let has_certificate =
-        !run.is_cancelled && (run.is_proved || matches!(run.proof.reasons, Reasons::Tree(_)));
+    // Where no box has any probability, there are no logarithms to prove anything of.
+    let is_possible =
+        settings.objective != Objective::Probability || run.bound > Rational::from(NEVER);
+    let has_certificate = is_possible
+        && !run.is_cancelled
+        && (run.is_proved || matches!(run.proof.reasons, Reasons::Tree(_)));
     let certificate = match &run.envelope {
         Ok(envelope) if has_certificate => {
             certificate(subject, settings, &run.proof, (oracle, envelope))

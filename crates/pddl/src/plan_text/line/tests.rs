@@ -50,6 +50,36 @@ fn what_is_not_an_action_is_noise() {
 }
 
 #[test]
+fn comments_are_headings_only_as_planners_print_them() {
+    for text in [
+        "; Plan found with metric 12.001",
+        "; Plan found",
+        "; States evaluated: 63",
+        "; States evaluated so far: 365188 ",
+        ";;;; Solution Found",
+    ] {
+        assert_eq!(shown(text), "Heading", "{text}");
+    }
+    for text in [
+        "; new plan",
+        "; plan",
+        ";; the plan",
+        "; Plan:",
+        "; plan found by hand",
+        "; Plan found with metric of mine",
+        "; found plan b",
+        "; solution found",
+        "; Solution number 2",
+        "; states evaluated by hand",
+    ] {
+        assert_eq!(shown(text), "Blank", "{text}");
+    }
+    assert_eq!(shown("new plan"), "Noise");
+    assert_eq!(shown("**** Plan ****"), "Heading");
+    assert_eq!(shown("Rescheduled Plan:"), "Heading");
+}
+
+#[test]
 fn a_broken_action_says_what_is_expected_where() {
     assert!(matches!(line("0.0: (a b", 0), Line::Broken(9, _)));
     assert!(matches!(line("0.0: [b]", 0), Line::Broken(0, _)));

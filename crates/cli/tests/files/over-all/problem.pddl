@@ -1,0 +1,1 @@
+(define (problem evening) (:domain lamp) (:init (lit)) (:goal (read)))
