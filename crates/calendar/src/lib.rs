@@ -54,6 +54,7 @@
 
 mod days;
 mod file;
+mod frame;
 mod hours;
 mod initials;
 mod names;

@@ -1,38 +1,22 @@
 //! Reads a calendar file for a problem.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use elbowroom_model::Problem;
-use elbowroom_text::{Diagnostic, Diagnostics, Report, Source, Span};
+use elbowroom_text::{Diagnostic, Diagnostics, Report, Source};
 use toml::{Spanned, Value};
 
 use crate::days::{Days, NamedDays};
 use crate::file::{File, text};
+use crate::frame::{Frame, instant, noted};
 use crate::sections;
 use crate::unit::{Length, Unit, length};
-use crate::zone::{Objection, Zone};
+use crate::zone::Zone;
 use crate::{Calendar, Origin};
 
 /// The text for the current time.
 const NOW: &str = "now";
-
-/// The parts of a calendar file that all its sections need.
-pub(crate) struct Frame {
-    pub(crate) zone: Zone,
-    /// The instants from time 0 to the horizon; [`i64::MAX`] where there is none.
-    pub(crate) within: Range<i64>,
-    pub(crate) named: NamedDays,
-    /// The facts and fluents that the problem sets itself, and when.
-    pub(crate) set_by_problem: BTreeMap<String, &'static str>,
-}
-
-impl Frame {
-    pub(crate) fn has_horizon(&self) -> bool {
-        self.within.end < i64::MAX
-    }
-}
 
 /// Reads a calendar file (`docs/calendars.md`) for a problem. Returns the calendar with the warnings.
 ///
@@ -101,25 +85,6 @@ fn calendar(
         facts,
         fluents,
     }))
-}
-
-/// Returns a value, or notes why there is none.
-pub(crate) fn noted<T>(
-    outcome: Result<T, Objection>,
-    span: &Span,
-    report: &mut Report,
-) -> Option<T> {
-    outcome
-        .map_err(|(message, advice)| {
-            report.error(span.clone(), message).advise(advice);
-        })
-        .ok()
-}
-
-/// Returns the instant of a date, or notes why there is none.
-pub(crate) fn instant(value: &Spanned<Value>, zone: &Zone, report: &mut Report) -> Option<i64> {
-    let written = text(value.get_ref()).unwrap_or_else(|| value.get_ref().to_string());
-    noted(zone.instant(&written), &value.span(), report)
 }
 
 fn header(file: &File, report: &mut Report) {

@@ -10,10 +10,10 @@ use toml::{Spanned, Value};
 
 use crate::days::{Days, NamedDays};
 use crate::file::{File, Section, texts};
+use crate::frame::{Frame, instant, noted};
 use crate::hours;
 use crate::names::{Kind, ground};
 use crate::ranges::Ranges;
-use crate::read::{Frame, instant, noted};
 use crate::rule::Rule;
 use crate::{CalendarFact, CalendarFluent};
 

@@ -6,9 +6,9 @@ use elbowroom_calendar::{Origin, read};
 use elbowroom_pddl::{Source, read_problem};
 use proptest::prelude::*;
 
-const DOMAIN: &str = include_str!("../../../cases/market/domain.pddl");
-const PROBLEM: &str = include_str!("../../../cases/market/problem.pddl");
-const CALENDAR: &str = include_str!("../../../cases/market/calendar.toml");
+const DOMAIN: &str = include_str!("../../../examples/market/domain.pddl");
+const PROBLEM: &str = include_str!("../../../examples/market/problem.pddl");
+const CALENDAR: &str = include_str!("../../../examples/market/calendar.toml");
 
 /// Parts of calendar files, with the ends of their ranges.
 const PARTS: [&str; 24] = [

@@ -141,5 +141,5 @@ fn plans_are_dated() {
 #[test]
 fn document_shows_the_calendar_of_the_case() {
     let document = include_str!("../../../docs/calendars.md");
-    assert!(document.contains(include_str!("../../../cases/market/calendar.toml")));
+    assert!(document.contains(include_str!("../../../examples/market/calendar.toml")));
 }

@@ -9,7 +9,7 @@ use elbowroom_calendar::{Calendar, Origin};
 use crate::args::CalendarArgs;
 use crate::clock::{self, Clock};
 use crate::exit::Failure;
-use crate::input;
+use crate::file;
 use crate::look::{HINT, styled};
 use crate::output::{self, Output};
 
@@ -37,7 +37,7 @@ pub(crate) fn timed_problem(
     let Some(path) = &arguments.calendar else {
         return Ok(None);
     };
-    let file = input::source(path, "calendar")?;
+    let file = file::source(path, "calendar")?;
     // Whatever is wrong with domain or problem is reported at its place in the original text.
     let (read, _) = pddl::read_problem(domain, problem)?;
     let origin = Origin {
@@ -67,7 +67,7 @@ pub(crate) fn dated(
     let Some(timed) = timed else {
         return Ok((problem, None));
     };
-    input::warn(&timed.warnings, output);
+    output.warn_about(&timed.warnings);
     timed.announce(factor.as_ref());
     Ok((timed.problem, timed.since))
 }

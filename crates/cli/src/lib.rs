@@ -15,6 +15,7 @@ mod commands;
 mod conversation;
 mod desk;
 mod exit;
+mod file;
 mod http;
 mod in_time;
 mod input;

@@ -72,10 +72,12 @@ impl Output {
         &self.warnings
     }
 
-    /// Writes a warning about a text to standard error.
-    pub(crate) fn warn_about(&mut self, warning: &Diagnostic) {
-        tell(&format!("{}\n", warning.render(true)));
-        self.warnings.push(warning.record());
+    /// Writes warnings about texts to standard error.
+    pub(crate) fn warn_about(&mut self, warnings: &[Diagnostic]) {
+        for warning in warnings {
+            tell(&format!("{}\n", warning.render(true)));
+            self.warnings.push(warning.record());
+        }
     }
 }
 

@@ -23,7 +23,7 @@ fn calendar(name: &str, unit: &str) -> PathBuf {
 
 /// Standard error of a run of the case with a calendar, and its exit code.
 fn run(calendar: &Path, others: &[&str]) -> (String, Option<i32>) {
-    let case = root().join("cases/market");
+    let case = root().join("examples/market");
     let file = |name: &str| case.join(name).display().to_string();
     let (domain, problem) = (file("domain.pddl"), file("problem.pddl"));
     let calendar = calendar.display().to_string();

@@ -106,7 +106,7 @@ fn timed_problem(arguments: &ExportArgs, output: &mut Output) -> Answer {
     }
     prism::refuse_what_is_about_plans(arguments, "is about plans, and this is about a problem")?;
     let (read, warnings) = input::read(&arguments.problem, &arguments.epsilon)?;
-    input::warn(&warnings, output);
+    output.warn_about(&warnings);
     write(arguments, read.problem.text())?;
     Ok(Exit::Yes)
 }

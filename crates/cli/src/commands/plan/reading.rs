@@ -45,7 +45,7 @@ pub(super) fn read(
         match receiver.recv_timeout(QUESTION) {
             Ok(read) => {
                 let (read, warnings) = read?;
-                input::warn(&warnings, output);
+                output.warn_about(&warnings);
                 return Ok(Ok(read));
             }
             Err(RecvTimeoutError::Timeout) => {
