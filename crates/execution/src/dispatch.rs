@@ -15,13 +15,13 @@ mod retry;
 mod watch;
 
 pub(crate) use overrun::{Overdue, Until};
-pub(crate) use watch::{in_words, replan, unmet};
+pub(crate) use watch::{in_words, replan};
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Action, Body};
+use elbowroom_model::ground::{Action, Body, DurationConstraint};
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::{Impossible, PlanNetwork, Reading};
 use elbowroom_plan::{
@@ -94,6 +94,8 @@ pub(crate) struct Dispatch {
     /// For each instance, the bounds on its duration.
     durations: Vec<Bounds>,
     progress: Progress,
+    /// See [`watch::numbers_of_durations`].
+    numbers_of_durations: BTreeMap<InstanceId, Vec<DurationConstraint>>,
     /// When instances that have not been seen to start were told to, on the plan's clock.
     told: BTreeMap<InstanceId, Rational>,
     /// Timed initials that have not happened, the last one first, with their times.
@@ -330,6 +332,7 @@ impl Dispatch {
             ends,
             durations,
             progress,
+            numbers_of_durations: watch::numbers_of_durations(mission),
             told: BTreeMap::new(),
             timed,
             resumed: mission.running.keys().map(|step| step.instance()).collect(),

@@ -28,7 +28,7 @@ use elbowroom_num::{Interval, Rational};
 pub(crate) use goal::Outlook;
 pub use parts::{Guards, Parts, UnderwayParts};
 pub use reading::Unreadable;
-pub(crate) use start::duration_bounds;
+pub(crate) use start::conditions_on_duration;
 
 use crate::event::{Measured, Ticket};
 use motion::{Motion, Rate};

@@ -97,6 +97,29 @@ fn durations_that_read_changed_numbers_are_executed() {
 }
 
 #[test]
+fn durations_that_read_a_number_changed_from_outside_are_chosen_anew() {
+    for bound in [
+        "(= ?duration (m))",
+        "(>= ?duration (m))",
+        "(= ?duration (+ (m) 2))",
+    ] {
+        let actions = format!(
+            "(:durative-action load :parameters () :duration (= ?duration 4) :effect (at end (p)))
+             (:durative-action drive :parameters () :duration {bound}
+               :condition (at start (p)) :effect (at end (q)))"
+        );
+        let planned = if bound.contains('+') { 5 } else { 3 };
+        let plan = format!("0: (load) [4]\n4.001: (drive) [{planned}]");
+        let scene = scene(&actions, "", "(q)", &plan);
+        for executor in ["live", "guarded", "stn", "esterel", "adaptable"] {
+            let world = scene.world("[[event]]\nfluent = \"(m)\"\nbecomes = 8\nconstant = 2\n");
+            let report = scene.run(executor, &world, 1);
+            assert_eq!(report.verdict, Verdict::GoalReached, "{bound}, {executor}");
+        }
+    }
+}
+
+#[test]
 fn duration_bound_awaits_number_that_grows() {
     let scene = scene(
         "(:durative-action fill :parameters () :duration (= ?duration 10)

@@ -38,7 +38,7 @@ pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failur
             Node::Start(id) | Node::Instant(id) => {
                 let action = dispatch.action(id);
                 let duration = dispatch.nominal_duration(id);
-                if let Some(reason) = super::unmet(action, &duration, &state) {
+                if let Some(reason) = dispatch.unmet(id, &duration, &state) {
                     return Some(Failure {
                         action: reason.action,
                         condition: reason

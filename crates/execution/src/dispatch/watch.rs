@@ -1,14 +1,16 @@
 //! What to do now, and when to look again.
 
-use elbowroom_model::ground::{Action, Body, Condition};
+use std::collections::BTreeMap;
+
+use elbowroom_model::ground::{Body, Condition, DurationConstraint, Expression};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, network_node};
 use elbowroom_stn::WindowEnd;
 
 use super::{Dispatch, explain, is_instantaneous};
-use crate::executor::{Decided, Decision, Moment, Order, StepId};
+use crate::executor::{Decided, Decision, Mission, Moment, Order, StepId};
 use crate::horizon::Horizon;
-use crate::progression::{Outlook, Progression, duration_bounds};
+use crate::progression::{Outlook, Progression, conditions_on_duration};
 use crate::reason::{About, Cause, Reason};
 
 /// An instance that may be under way, although nobody has said so.
@@ -113,7 +115,7 @@ impl Dispatch {
             };
             let action = self.action(id);
             let duration = self.told_duration(id, now);
-            if let Some(reason) = unmet(action, &duration, belief) {
+            if let Some(reason) = self.unmet(id, &duration, belief) {
                 if orders.is_empty() {
                     return replan(reason);
                 }
@@ -274,20 +276,57 @@ fn broken(moment: &Moment<'_>) -> Option<Reason> {
     Some(reason.about(about).since(moment.now.clone()))
 }
 
-/// The condition of an action's start, or the bound on its duration, that does not hold.
-pub(crate) fn unmet(action: &Action, duration: &Rational, belief: &Progression) -> Option<Reason> {
-    let condition = match &action.body {
-        Body::Instantaneous(snap) => &snap.condition,
-        Body::Durative(body) => &body.start.condition,
-    };
-    let bounds = duration_bounds(action, duration);
-    let mut unmet = belief.unmet(condition, Some(duration));
-    unmet.extend(bounds.iter().flat_map(|it| belief.unmet(it, None)));
-    if unmet.is_empty() {
-        return None;
+impl Dispatch {
+    /// Returns the condition of an action's start, or the bound on its duration, that does not hold.
+    pub(super) fn unmet(
+        &self,
+        id: InstanceId,
+        duration: &Rational,
+        belief: &Progression,
+    ) -> Option<Reason> {
+        let action = self.action(id);
+        let (condition, bounds) = match &action.body {
+            Body::Instantaneous(snap) => (&snap.condition, None),
+            Body::Durative(body) => (&body.start.condition, Some(&body.duration)),
+        };
+        let of_domain = self.numbers_of_durations.get(&id);
+        let bounds = bounds.into_iter().chain(of_domain).flatten();
+        let bounds = conditions_on_duration(bounds, duration);
+        let mut unmet = belief.unmet(condition, Some(duration));
+        unmet.extend(bounds.iter().flat_map(|it| belief.unmet(it, None)));
+        if unmet.is_empty() {
+            return None;
+        }
+        let reason = Reason::new(Cause::Condition).of(&action.name);
+        Some(reason.about(About::Conditions(in_words(belief, &unmet))))
     }
-    let reason = Reason::new(Cause::Condition).of(&action.name);
-    Some(reason.about(About::Conditions(in_words(belief, &unmet))))
+}
+
+/// Returns the bounds on durations that read numbers, of the instances whose durations are parameters of the plan and
+/// have no bounds there. The numbers may have changed since the plan was made.
+pub(super) fn numbers_of_durations(
+    mission: &Mission,
+) -> BTreeMap<InstanceId, Vec<DurationConstraint>> {
+    let steps = mission.time_triggered.steps.iter();
+    let steps = steps.zip(&mission.instances).filter_map(|(step, &id)| {
+        let planned = mission.plan.plan.instance(id).action.durative()?;
+        let body = step.action.durative()?;
+        let bounds = body.duration.iter().filter(|bound| reads_numbers(bound));
+        let bounds: Vec<_> = bounds.cloned().collect();
+        (planned.duration.is_empty() && !bounds.is_empty()).then_some((id, bounds))
+    });
+    steps.collect()
+}
+
+/// Returns `true` if the bound reads fluents, and nothing but fluents and constants.
+fn reads_numbers(bound: &DurationConstraint) -> bool {
+    let (mut reads, mut is_known) = (false, true);
+    bound.bound.visit_leaves(&mut |leaf| match leaf {
+        Expression::Fluent(_) => reads = true,
+        Expression::Constant(_) => {}
+        _ => is_known = false,
+    });
+    reads && is_known
 }
 
 pub(crate) fn in_words(belief: &Progression, conditions: &[&Condition]) -> Vec<String> {

@@ -1,6 +1,6 @@
 //! Conditions and duration bounds of starts, as far as they read numbers.
 
-use elbowroom_model::ground::{Action, Body, Condition, Expression};
+use elbowroom_model::ground::{Action, Body, Condition, DurationConstraint, Expression};
 use elbowroom_num::Rational;
 
 use super::Progression;
@@ -78,13 +78,18 @@ impl Progression {
 }
 
 /// The bounds on an action's duration that count at its start, as conditions.
-pub(crate) fn duration_bounds(action: &Action, duration: &Rational) -> Vec<Condition> {
-    let bounds = action
-        .durative()
-        .into_iter()
-        .flat_map(|body| &body.duration);
+fn duration_bounds(action: &Action, duration: &Rational) -> Vec<Condition> {
+    let body = action.durative();
+    conditions_on_duration(body.into_iter().flat_map(|body| &body.duration), duration)
+}
+
+/// Those of these bounds on a duration that count at the start, as conditions.
+pub(crate) fn conditions_on_duration<'a>(
+    bounds: impl Iterator<Item = &'a DurationConstraint>,
+    duration: &Rational,
+) -> Vec<Condition> {
     let at_start = bounds.filter(|bound| !bound.at_end);
-    let condition = |bound: &elbowroom_model::ground::DurationConstraint| {
+    let condition = |bound: &DurationConstraint| {
         let duration = Expression::Constant(duration.clone());
         Condition::Compare(bound.comparison, duration, bound.bound.clone())
     };
