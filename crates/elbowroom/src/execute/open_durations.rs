@@ -65,7 +65,7 @@ pub(super) fn choose(
 
 /// Returns a value near this one that may deviate within the interval: by 1/8 at both ends and, if that leaves
 /// enough below, by 3/10 at the upper end. An action that is too short can be repeated. One that is too long may break a
-/// condition, and fail.
+/// condition, and fail. No value becomes shorter than the middle of the interval.
 fn away_from_ends(value: &Rational, interval: &Interval) -> Rational {
     let [least, most] = Side::BOTH.map(|side| side.of(interval).value());
     let least = least.cloned().unwrap_or_default();
@@ -76,7 +76,8 @@ fn away_from_ends(value: &Rational, interval: &Interval) -> Rational {
     let above = most * Rational::new(8, 9);
     let far_above = most * Rational::new(10, 13);
     let longer = below.clone().min(far_above.clone()).max(value.clone());
-    longer.min(below.min(above).max(far_above)).max(least)
+    let middle = (least + most) / Rational::from(2);
+    longer.min(below.min(above).max(far_above).max(middle))
 }
 
 /// Returns the earliest schedule with these durations; if possible, each event happens no earlier than planned. Durations
@@ -130,13 +131,13 @@ mod tests {
             chosen((35, 2), (35, 2), Some((20, 1))),
             Rational::new(35, 2)
         );
-        // At the upper end: 3/10 less, or as much as the lower end permits.
+        // At the upper end: 3/10 less, but not below the middle.
         assert_eq!(chosen((13, 1), (1, 1), Some((13, 1))), Rational::from(10));
         assert_eq!(
             chosen((10, 1), (15, 2), Some((10, 1))),
-            Rational::new(60, 7)
+            Rational::new(35, 4)
         );
-        assert_eq!(chosen((9, 1), (17, 2), Some((9, 1))), Rational::new(17, 2));
+        assert_eq!(chosen((9, 1), (17, 2), Some((9, 1))), Rational::new(35, 4));
         assert_eq!(chosen((5, 1), (5, 1), Some((5, 1))), Rational::from(5));
     }
 }
