@@ -18,8 +18,11 @@ pub(super) fn of(plan: &StnPlan) -> BTreeSet<InstanceId> {
         let Reason::Duration(id) = constraint.reason else {
             return None;
         };
-        let body = plan.instance(id).action.durative()?;
-        let is_open = constraint.lower != constraint.upper && !body.is_under_way;
+        let action = &plan.instance(id).action;
+        let body = action.durative()?;
+        // What reads the planned duration holds for that duration alone.
+        let reads_planned = action.with_planned_duration(&Rational::ONE).is_some();
+        let is_open = constraint.lower != constraint.upper && !body.is_under_way && !reads_planned;
         is_open.then_some(id)
     });
     open.collect()

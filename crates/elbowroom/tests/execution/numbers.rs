@@ -120,6 +120,18 @@ fn durations_that_read_a_number_changed_from_outside_are_chosen_anew() {
 }
 
 #[test]
+fn open_duration_stays_as_planned_where_the_start_reads_it() {
+    let scene = scene(
+        "(:durative-action melt :parameters () :duration (and (>= ?duration 1) (<= ?duration 10))
+           :condition (at start (>= ?duration 9)) :effect (at end (q)))",
+        "",
+        "(q)",
+        "0: (melt) [10]",
+    );
+    assert_eq!(starts(&scene, "live"), owned([("(melt)", "0")]));
+}
+
+#[test]
 fn duration_bound_awaits_number_that_grows() {
     let scene = scene(
         "(:durative-action fill :parameters () :duration (= ?duration 10)
