@@ -169,7 +169,7 @@ impl Preparer for Analyst {
         }
         let mut nominal = freed.nominal.clone();
         let instances = freed.instances.clone();
-        let open = open_durations::of(&freed.plan);
+        let given = freed.plan.clone();
         let plan = Arc::new(match need {
             Need::Orderings | Need::PartialOrder | Need::Network => flow::closed(task, freed),
             Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
@@ -186,7 +186,7 @@ impl Preparer for Analyst {
         };
         let mut plan = Arc::unwrap_or_clone(plan);
         if let Some(envelope) = envelope.as_ref().filter(|_| need == Need::OpenNetwork) {
-            open_durations::choose(task, &mut plan, &mut nominal, &open, envelope);
+            open_durations::choose(task, &given, &mut plan, &mut nominal, envelope);
         }
         Ok(Prepared {
             plan,

@@ -13,7 +13,7 @@ use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 use crate::flow;
 
 /// Returns the actions to be started whose durations the domain leaves open. The executor chooses their durations.
-pub(super) fn of(plan: &StnPlan) -> BTreeSet<InstanceId> {
+fn open_durations(plan: &StnPlan) -> BTreeSet<InstanceId> {
     let open = plan.constraints.iter().filter_map(|constraint| {
         let Reason::Duration(id) = constraint.reason else {
             return None;
@@ -31,14 +31,17 @@ pub(super) fn of(plan: &StnPlan) -> BTreeSet<InstanceId> {
 /// Moves open durations away from the ends of their intervals in the envelope.
 ///
 /// Planners choose them as short or as long as the domain and the goal permit, so that the least deviation breaks the
-/// plan. Each value in the envelope is as well guaranteed as the planned one.
+/// plan. Each value in the envelope is as well guaranteed as the planned one. But the envelope permits more than the
+/// domain's bounds on durations, which may read what another duration changes. So nothing is changed unless the plan
+/// `given`, which has these bounds, is valid with all values.
 pub(super) fn choose(
     task: &Task,
+    given: &StnPlan,
     plan: &mut ParametrizedPlan,
     nominal: &mut Schedule,
-    open: &BTreeSet<InstanceId>,
     envelope: &DecoupledEnvelope,
 ) {
+    let open = open_durations(given);
     let before = plan.nominal();
     let mut chosen = before.clone();
     for (index, parameter) in plan.parameters.iter().enumerate() {
@@ -56,8 +59,7 @@ pub(super) fn choose(
     let Some(schedule) = schedule_at(plan, nominal, &chosen) else {
         return;
     };
-    let fixed = plan.plan.at(&chosen).scheduled(&schedule);
-    if !flow::judge(task, &fixed).is_valid() {
+    if !flow::judge(task, &given.scheduled(&schedule)).is_valid() {
         return;
     }
     for (parameter, value) in plan.parameters.iter_mut().zip(&chosen) {

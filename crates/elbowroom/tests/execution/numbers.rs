@@ -132,6 +132,21 @@ fn open_duration_stays_as_planned_where_the_start_reads_it() {
 }
 
 #[test]
+fn open_duration_stays_as_planned_where_another_duration_reads_its_effect() {
+    let scene = scene(
+        "(:durative-action grow :parameters () :duration (and (>= ?duration 2) (<= ?duration 10))
+           :effect (and (at end (p)) (at end (increase (n) ?duration))))
+         (:durative-action cut :parameters () :duration (= ?duration (n))
+           :condition (at start (p)) :effect (at end (q)))",
+        "",
+        "(q)",
+        "0: (grow) [2]\n2.001: (cut) [2]",
+    );
+    let expected = owned([("(grow)", "0"), ("(cut)", "2.001")]);
+    assert_eq!(starts(&scene, "live"), expected);
+}
+
+#[test]
 fn duration_bound_awaits_number_that_grows() {
     let scene = scene(
         "(:durative-action fill :parameters () :duration (= ?duration 10)
