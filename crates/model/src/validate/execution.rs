@@ -19,6 +19,7 @@
 //! ```
 
 mod course;
+mod start;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -27,8 +28,7 @@ use elbowroom_num::{Interval, Rational};
 
 use super::interference::over;
 use super::piece::Piece;
-use super::reading::Fault;
-use super::violation::{ActionInstance, Mistake, Occurrence, Point, Violation, When};
+use super::violation::{ActionInstance, Mistake, Occurrence, Point, Violation};
 use crate::derivation::{Derivation, holds};
 use crate::ground::{Action, Body, Change, Condition, FactId, FluentId, SnapAction};
 use crate::interference::Footprint;
@@ -226,7 +226,8 @@ impl Execution {
         self.refresh();
         let mistake = self
             .mistaken_duration(&own, duration)
-            .or_else(|| self.mistaken_condition(&own, duration));
+            .or_else(|| self.mistaken_condition(&own, duration))
+            .or_else(|| self.too_short_or_long(&own, duration));
         let footprint = Footprint::of_start(&self.task, &own);
         let point = match own.body {
             Body::Durative(_) => Point::Start,
@@ -401,55 +402,6 @@ impl Execution {
         end.reads(goal, None).ok()
     }
 
-    fn mistaken_duration(&self, action: &Action, duration: Option<&Rational>) -> Option<Mistake> {
-        let Body::Durative(body) = &action.body else {
-            return None;
-        };
-        let Some(duration) = duration else {
-            return Some(Mistake::NoDuration);
-        };
-        if duration.is_negative() {
-            return Some(Mistake::NegativeDuration(duration.clone()));
-        }
-        let at_start = body.duration.iter().filter(|bound| !bound.at_end);
-        for constraint in at_start {
-            let Ok(value) = self.moment(Some(duration)).value(&constraint.bound) else {
-                continue;
-            };
-            if !constraint.comparison.holds(duration, &value) {
-                return Some(Mistake::Duration {
-                    duration: duration.clone(),
-                    comparison: constraint.comparison,
-                    bound: self.task.describe_expression(&constraint.bound),
-                    value,
-                });
-            }
-        }
-        None
-    }
-
-    fn mistaken_condition(&self, action: &Action, duration: Option<&Rational>) -> Option<Mistake> {
-        let (condition, when) = match &action.body {
-            Body::Instantaneous(snap) => (&snap.condition, When::Now),
-            Body::Durative(body) => (&body.start.condition, When::Start),
-        };
-        condition.conjuncts().into_iter().find_map(|part| {
-            let described = || self.task.describe_condition(part);
-            match self.reads(part, duration) {
-                Ok(true) | Err(Lack::Doubt) => None,
-                Ok(false) => Some(Mistake::Condition {
-                    when,
-                    condition: described(),
-                    is_after: false,
-                    is_exact: true,
-                    reasons: Vec::new(),
-                    too_late: Vec::new(),
-                }),
-                Err(Lack::Fault(fault)) => undefined(&self.task, &fault, described()),
-            }
-        })
-    }
-
     fn interference(
         &self,
         footprint: &Footprint,
@@ -573,21 +525,6 @@ fn rates_of(running: &Running) -> impl Iterator<Item = RateOf<'_>> {
 fn nominal(possible: &Interval, elapsed: &Rational) -> Rational {
     let bound = possible.upper.value().or_else(|| possible.lower.value());
     bound.cloned().unwrap_or_else(|| elapsed.clone())
-}
-
-/// Returns the mistake of reading a fluent without a value or dividing by zero; `None` for other faults.
-fn undefined(task: &Task, fault: &Fault, within: String) -> Option<Mistake> {
-    match fault {
-        Fault::Undefined(fluent) => Some(Mistake::Undefined {
-            fluent: task.fluent_name(*fluent),
-            within,
-        }),
-        Fault::DivisionByZero(divisor) => Some(Mistake::DivisionByZero {
-            divisor: task.describe_expression(divisor),
-            within,
-        }),
-        _ => None,
-    }
 }
 
 /// Returns the snap action that completes an action.

@@ -104,6 +104,24 @@ fn failed_action_leaves_what_is_seen() {
 }
 
 #[test]
+fn commanded_duration_satisfies_conditions_over_all_that_read_it_alone() {
+    let world = World::new("").durative(
+        "soak",
+        &[
+            ("duration", "(<= 6)"),
+            ("over all", "(>= ?duration 3)"),
+            ("end effect", "(wet)"),
+        ],
+    );
+    let mut executed = Executed::of(world);
+    let judged = executed.command(0, "0", "soak", "2.885");
+    assert!(judged.contains("(>= ?duration 3) over all"), "{judged}");
+    assert_eq!(executed.command(1, "1", "soak", "3"), "valid");
+    // It has no moment between start and end.
+    assert_eq!(executed.command(2, "2", "soak", "0"), "valid");
+}
+
+#[test]
 fn action_is_judged_as_the_domain_has_it() {
     let mut executed = Executed::of(gone());
     let mut remainder = Action::clone(&executed.action("go"));
