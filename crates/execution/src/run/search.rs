@@ -145,7 +145,7 @@ pub(super) struct Lost {
     /// The time at which no plan was found and the executor carried on, and the verdict without it; `None` once
     /// something has happened since.
     pub(super) in_vain: Option<(Rational, Verdict)>,
-    /// `true` if a search for a better plan has used up its budget. Another one would most likely, too.
+    /// `true` if a search for a better plan has used up its budget. No other one begins until there is a new plan.
     pub(super) sought_in_vain: bool,
     /// How many plans in a row were outdated when they came.
     outdated: usize,
