@@ -36,7 +36,7 @@ const FEATURES: [(&str, &str, &str); 3] = [
 const REFUSING: [&str; 19] = [
     "plan D P",
     "plan D P --time-limit 1",
-    "plan D P --objective room",
+    "plan D P --objective slack",
     "stn D P PLAN",
     "envelope D P PLAN",
     "envelope D P PLAN --method best",

@@ -85,7 +85,7 @@ fn threads_are_the_embedded_planners_and_change_no_plan() {
             "leave out --jobs",
         ),
         (
-            &["--jobs", "2", "--objective", "room"],
+            &["--jobs", "2", "--objective", "slack"],
             "cannot be used with",
         ),
         (&["--jobs", "-1"], "--jobs"),

@@ -29,7 +29,7 @@ pub(crate) struct PlanArgs {
     /// Return the first plan, even with a time limit
     #[arg(long)]
     pub(crate) first: bool,
-    /// What the plan is to be the best by, instead of metric and makespan: `room`, the share by
+    /// What the plan is to be the best by, instead of metric and makespan: `slack`, the share by
     /// which all its durations may deviate (docs/chosen-plans.md), or `probability`, how often it
     /// works in samples of --world. Without a time limit, a fixed number of plans is compared
     #[arg(long, value_enum, conflicts_with = "first")]
@@ -70,9 +70,9 @@ pub(crate) struct PlanArgs {
 /// What plans can be made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PlanObjectiveChoice {
-    /// The room that it leaves
-    #[value(alias = "slack")]
-    Room,
+    /// The least share by which its durations may deviate
+    #[value(alias = "room")]
+    Slack,
     /// How often it works in a world
     Probability,
 }

@@ -114,10 +114,10 @@ fn best(
     let task = &Arc::new(read.task);
     let world;
     let aim = match (objective, &arguments.world) {
-        (PlanObjectiveChoice::Room, None) => PlanAim::Room,
-        (PlanObjectiveChoice::Room, Some(_)) => {
+        (PlanObjectiveChoice::Slack, None) => PlanAim::Slack,
+        (PlanObjectiveChoice::Slack, Some(_)) => {
             return Err(Failure::new(
-                "--world says nothing to `--objective room`",
+                "--world says nothing to `--objective slack`",
                 "leave it out, or ask for --objective probability",
             ));
         }

@@ -97,7 +97,7 @@ fn chosen(choice: &PlanChoice) -> String {
         compared,
     } = choice;
     let name = match objective {
-        PlanObjective::Room => "room",
+        PlanObjective::Slack => "slack",
         PlanObjective::Probability => "works in",
     };
     let plans = counted(*compared, "plan");

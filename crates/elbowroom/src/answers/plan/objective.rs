@@ -1,4 +1,4 @@
-//! Plans that are made better by the room that they leave, or by how likely they are to work.
+//! Plans that are made better by their slack, or by the probability that they work.
 
 mod worth;
 
@@ -24,22 +24,24 @@ use worth::{Judge, Judged};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PlanObjective {
-    /// Of much room: the least share of its nominal value by which any duration may deviate, all at
+    /// Of much slack: the least share of its nominal value by which any duration may deviate, all at
     /// the same time, in the plan's best box ([`elbowroom_envelope::Objective::LeastSlack`]), as large as can be.
-    Room,
+    /// Documents in JSON call it `room`.
+    #[serde(rename = "room", alias = "slack")]
+    Slack,
     /// Likely to work in a world: executed by `live`, without any new plan.
     Probability,
 }
 
 /// A name that is none of [`PlanObjective`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("plans are made for `room` or `probability`, not for `{0}`")]
+#[error("plans are made for `slack` or `probability`, not for `{0}`")]
 pub struct UnknownPlanObjective(String);
 
 impl fmt::Display for PlanObjective {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Room => "room",
+            Self::Slack => "slack",
             Self::Probability => "probability",
         })
     }
@@ -49,7 +51,8 @@ impl FromStr for PlanObjective {
     type Err = UnknownPlanObjective;
 
     fn from_str(name: &str) -> Result<Self, UnknownPlanObjective> {
-        let all = [Self::Room, Self::Probability];
+        let all = [Self::Slack, Self::Probability];
+        let name = if name == "room" { "slack" } else { name };
         let known = all.into_iter().find(|known| known.to_string() == name);
         known.ok_or_else(|| UnknownPlanObjective(name.to_owned()))
     }
@@ -74,8 +77,8 @@ pub struct BestPlanRequest<'a> {
 /// An objective with what it takes.
 #[derive(Clone, Copy, Debug)]
 pub enum PlanAim<'a> {
-    /// See [`PlanObjective::Room`].
-    Room,
+    /// See [`PlanObjective::Slack`].
+    Slack,
     /// See [`PlanObjective::Probability`].
     Probability(&'a WorldModel),
 }
@@ -85,10 +88,10 @@ pub enum PlanAim<'a> {
 #[serde(untagged)]
 pub enum PlanWorth {
     /// The share of its nominal value by which each duration may deviate.
-    Room {
+    Slack {
         /// The share.
-        #[serde(with = "exact")]
-        room: Rational,
+        #[serde(rename = "room", with = "exact")]
+        slack: Rational,
     },
     /// How often it worked.
     Sampled {
@@ -127,8 +130,8 @@ pub struct PlanChoice {
 impl fmt::Display for PlanWorth {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Room { room } => {
-                let percent = room * &Rational::from(100);
+            Self::Slack { slack } => {
+                let percent = slack * &Rational::from(100);
                 write!(f, "{} %", percent.to_decimal(1))
             }
             Self::Sampled {
@@ -167,7 +170,7 @@ pub fn best_plan(
         searches: request.most_searches.unwrap_or(usize::MAX),
     };
     let world = match request.aim {
-        PlanAim::Room => None,
+        PlanAim::Slack => None,
         PlanAim::Probability(world) => Some(world),
     };
     let begun = watcher.elapsed();
@@ -274,7 +277,7 @@ fn compared(
 impl PlanAim<'_> {
     fn objective(self) -> PlanObjective {
         match self {
-            Self::Room => PlanObjective::Room,
+            Self::Slack => PlanObjective::Slack,
             Self::Probability(_) => PlanObjective::Probability,
         }
     }

@@ -43,7 +43,7 @@ impl Judged {
     pub(super) fn is_better_than(&self, other: &Self) -> bool {
         let rank = |value: &Value| match value {
             Value::Unknown(_) => None,
-            Value::Room(room) => Some(room.clone()),
+            Value::Slack(slack) => Some(slack.clone()),
             Value::Samples(results) => {
                 let successes = results.iter().filter(|success| **success).count();
                 let of = i64::try_from(results.len().max(1)).unwrap_or(i64::MAX);
@@ -63,7 +63,7 @@ impl Judged {
 
 /// What was found out about a plan.
 pub(super) enum Value {
-    Room(Rational),
+    Slack(Rational),
     Samples(Vec<bool>),
     Unknown(String),
 }
@@ -79,7 +79,7 @@ impl Value {
 
     pub(super) fn worth(&self) -> PlanWorth {
         match self {
-            Self::Room(room) => PlanWorth::Room { room: room.clone() },
+            Self::Slack(slack) => PlanWorth::Slack { slack: slack.clone() },
             Self::Unknown(why) => PlanWorth::Unknown { why: why.clone() },
             Self::Samples(results) => {
                 let mut share = Proportion::default();
@@ -98,14 +98,14 @@ impl Value {
 
 /// Finds out what plans are worth.
 pub(super) enum Judge<'a> {
-    Room(Arc<Task>),
+    Slack(Arc<Task>),
     Probability(Box<Tryout<'a>>),
 }
 
 impl Judge<'_> {
     pub(super) fn of(request: &BestPlanRequest<'_>, task: &Task) -> Self {
         match request.aim {
-            PlanAim::Room => Self::Room(Arc::new(task.clone())),
+            PlanAim::Slack => Self::Slack(Arc::new(task.clone())),
             PlanAim::Probability(world) => {
                 let rollouts = Rollouts {
                     world: Arc::new(world.clone()),
@@ -132,13 +132,13 @@ impl Judge<'_> {
         course: &mut Course<'_>,
     ) -> Option<Value> {
         match self {
-            Self::Room(task) => room(task, plan, course),
+            Self::Slack(task) => slack(task, plan, course),
             Self::Probability(tryout) => samples(tryout, plan, best, course),
         }
     }
 }
 
-fn room(task: &Arc<Task>, plan: &TimeTriggeredPlan, course: &mut Course<'_>) -> Option<Value> {
+fn slack(task: &Arc<Task>, plan: &TimeTriggeredPlan, course: &mut Course<'_>) -> Option<Value> {
     let settings = flow::Settings {
         search: Search::best(Objective::LeastSlack),
         ..flow::Settings::default()
@@ -156,7 +156,7 @@ fn room(task: &Arc<Task>, plan: &TimeTriggeredPlan, course: &mut Course<'_>) -> 
     Some(match finding {
         EnvelopeFinding::Envelope {
             best: Some(best), ..
-        } => Value::Room(best.value),
+        } => Value::Slack(best.value),
         EnvelopeFinding::Envelope { .. } => {
             Value::Unknown("nothing in the plan may deviate".to_owned())
         }
