@@ -11,6 +11,8 @@ mod course;
 mod forgery;
 #[path = "derived_certificates/guards.rs"]
 mod guards;
+#[path = "derived_certificates/labels.rs"]
+mod labels;
 #[path = "derived_certificates/likely.rs"]
 mod likely;
 #[path = "derived_certificates/moments.rs"]
