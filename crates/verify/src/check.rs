@@ -225,7 +225,7 @@ impl<'a> Checker<'a> {
             }
             let below = parameter.most_below.as_ref().map(|most| &most.0);
             let above = parameter.most_above.as_ref().map(|most| &most.0);
-            if parameter.weight.is_negative() {
+            if !parameter.weight.is_positive() {
                 return Err(Flaw::Range("the weight of parameter", index));
             }
             let own: &[_] = if certificate.symmetric {
