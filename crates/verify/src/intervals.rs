@@ -14,8 +14,8 @@ impl Intervals {
     /// The box that the slacks are of, with some ends infinite.
     ///
     /// # Errors
-    /// When an end that is told is none, or is told twice, or slacks are missing. Symmetric boxes have no infinite
-    /// ends.
+    /// When an infinite end does not exist or is listed twice, slacks are missing, or a symmetric box has an infinite
+    /// end.
     pub(crate) fn new(certificate: &Certificate, endless: &[Endless]) -> Result<Self, Flaw> {
         let parameters = certificate.parameters.iter().enumerate();
         let intervals = parameters.map(|(index, own)| {
