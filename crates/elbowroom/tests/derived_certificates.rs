@@ -11,6 +11,8 @@ mod course;
 mod forgery;
 #[path = "derived_certificates/guards.rs"]
 mod guards;
+#[path = "derived_certificates/labels.rs"]
+mod labels;
 #[path = "derived_certificates/likely.rs"]
 mod likely;
 #[path = "derived_certificates/moments.rs"]
@@ -209,8 +211,7 @@ fn certificate_about_a_constant_of_an_action_is_not_derivable() {
 fn certificate_that_states_another_inequality_is_not_accepted() {
     let mut count = 0;
     for (name, (task, plan)) in of_numbers() {
-        let (guarantee, objective) = (Guarantee::Dynamic, Objective::Widths);
-        let Some(answer) = answer(&task, &plan, guarantee, objective) else {
+        let Some(answer) = answer(&task, &plan, Guarantee::Dynamic, Objective::Widths) else {
             continue;
         };
         for (index, broken) in tightened(&answer).iter().enumerate() {
@@ -226,8 +227,7 @@ fn certificate_that_states_another_inequality_is_not_accepted() {
 fn certificate_without_its_conditions_or_of_another_decimal_is_not_accepted() {
     let mut count = 0;
     for (name, (task, plan)) in of_numbers() {
-        let (guarantee, objective) = (Guarantee::Dynamic, Objective::LeastSlack);
-        let Some(answer) = answer(&task, &plan, guarantee, objective) else {
+        let Some(answer) = answer(&task, &plan, Guarantee::Dynamic, Objective::LeastSlack) else {
             continue;
         };
         count += 1;

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::certificate::{Certificate, Chance, End as Side, Guarantee, Parameter, Reasons};
 use crate::check::{Inside, Verified, verify};
-use crate::derive::{self, NotDerived, Plan, Quantity};
+use crate::derive::{self, NotDerived, Plan, Quantity, Told};
 use crate::flaw::Flaw;
 use crate::given::GivenPlan;
 use crate::sound::Endless;
@@ -105,6 +105,17 @@ struct Room {
     weight: Number,
     lower: End,
     upper: End,
+}
+
+impl Room {
+    fn told(&self) -> Told<'_> {
+        Told {
+            name: &self.name,
+            kind: self.kind.as_deref(),
+            action: self.action.as_deref(),
+            quantity: self.quantity.as_deref(),
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -261,16 +272,13 @@ pub fn verify_answer_in_world(
             NotDerived::Flaw(flaw) => AnswerError::Flaw(flaw),
             NotDerived::Unknown(what) => AnswerError::NotDerivable(what),
         })?;
-    for quantity in &derived.quantities {
-        let room = answer.parameters.get(quantity.parameter);
-        let room = room.ok_or(Flaw::NoSuch("parameter", quantity.parameter))?;
-        let is_kind = room.kind.as_deref().is_none_or(|own| own == quantity.kind);
-        let action = room.action.as_ref().zip(quantity.action.as_ref());
-        let words = room.quantity.as_ref().zip(quantity.words());
-        let is_told = action.is_none_or(|(own, action)| own == action)
-            && words.is_none_or(|(own, words)| *own == words);
+    let mut earlier = Vec::new();
+    for (index, room) in answer.parameters.iter().enumerate() {
+        let label = derived.labels.get(&index);
+        let label = label.ok_or(Flaw::NoSuch("parameter", index))?;
         let what = format!("{} stands for something else", room.name);
-        same(is_kind && is_told, &what)?;
+        same(label.is_told(&room.told(), &earlier), &what)?;
+        earlier.push(room.name.as_str());
     }
     verified.assumes.clear();
     if matches!(certificate.reasons, Reasons::Probability(_)) {
@@ -393,12 +401,8 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
         is_told || (best.chances.is_empty() && chances.flatten().next().is_none()),
         "the distributions",
     )?;
-    for (index, (room, own)) in answer
-        .parameters
-        .iter()
-        .zip(&certificate.parameters)
-        .enumerate()
-    {
+    let parameters = answer.parameters.iter().zip(&certificate.parameters);
+    for (index, (room, own)) in parameters.enumerate() {
         check_interval(&answer, certificate, (index, room, own))?;
     }
     same(
@@ -464,7 +468,7 @@ fn check_interval(
             own == value && end.decimal.is_none_or(|decimal| is_near(decimal, &value))
         });
         // What reaches as far as counts, and is stopped by nothing, is infinite.
-        let is_endless = end.exact == endless && *slack == counted;
+        let is_endless = end.exact == endless && *slack == counted && !certificate.symmetric;
         let is_end = match &certificate.sound {
             None => is_that || is_endless,
             Some(sound)

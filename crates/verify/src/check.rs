@@ -8,7 +8,7 @@ use crate::bounds::Ends;
 use crate::certificate::{Case, Certificate, Exact, Parameter, Proof, Reasons, Source, Stopped};
 use crate::flaw::Flaw;
 use crate::intervals::Intervals;
-use crate::probability::Chances;
+use crate::probability::{Chances, NEVER};
 use crate::sound::{Control, Sound};
 use crate::{claim, conditions, control, network, row, volume};
 
@@ -90,8 +90,11 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
             worth.ok_or(Flaw::Range("the volume of box", 0))?
         }
         Reasons::Probability(_) => {
-            let worth = checker.chances.worth(&checker.slacks);
-            worth.ok_or(Flaw::Range("the probability of box", 0))?
+            // A bound below the least value would not bound this one.
+            if bound <= Rational::from(NEVER) {
+                return Err(Flaw::Range("the probability of box", 0));
+            }
+            checker.chances.worth(&checker.slacks)
         }
     };
     let tolerance = match &certificate.reasons {
@@ -222,7 +225,7 @@ impl<'a> Checker<'a> {
             }
             let below = parameter.most_below.as_ref().map(|most| &most.0);
             let above = parameter.most_above.as_ref().map(|most| &most.0);
-            if parameter.weight.is_negative() {
+            if !parameter.weight.is_positive() {
                 return Err(Flaw::Range("the weight of parameter", index));
             }
             let own: &[_] = if certificate.symmetric {

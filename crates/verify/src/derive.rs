@@ -46,6 +46,7 @@ mod distances;
 mod failures;
 mod given;
 mod histories;
+mod labels;
 mod linear;
 mod needed;
 mod numbers;
@@ -70,6 +71,7 @@ use distances::Distances;
 use failures::Failure;
 use given::Given;
 use histories::Histories;
+pub(crate) use labels::{Label, Told};
 use linear::Linear;
 use numbers::Numbers;
 use places::Places;
@@ -205,6 +207,7 @@ pub(crate) fn check(
     // The certificate leaves out conditions that cannot fail whatever the times are.
     let told = sound.conditions.as_ref().map_or(0, Vec::len);
     Ok(Derived {
+        labels: labels::labels(&subject, &quantities),
         quantities,
         conditions: told.max(known.len()),
     })
@@ -291,8 +294,10 @@ fn is_not_narrower(
 
 /// The part of a certificate's subject that its answer is compared with.
 pub(crate) struct Derived {
-    /// The quantity of each parameter.
+    /// The quantity of each parameter that is no initial value.
     pub(crate) quantities: Vec<Quantity>,
+    /// The label of each parameter, by position.
+    pub(crate) labels: BTreeMap<usize, Label>,
     /// The number of conditions.
     pub(crate) conditions: usize,
 }
@@ -306,6 +311,8 @@ pub(crate) struct Quantity {
     pub(crate) kind: &'static str,
     /// The position of the step whose duration or number it is, if it belongs to one.
     pub(crate) step: Option<usize>,
+    /// The position of the timed initials whose time it is.
+    pub(crate) group: Option<usize>,
     /// The name of that step's action.
     pub(crate) action: Option<String>,
 }
@@ -317,17 +324,6 @@ impl Quantity {
     /// Returns `true` for durations and for times of timed initials.
     fn is_time(&self) -> bool {
         matches!(self.kind, "duration" | "timed")
-    }
-
-    /// Returns the words for the quantity in answers, if they are fixed.
-    pub(crate) fn words(&self) -> Option<String> {
-        match (self.kind, &self.action) {
-            ("duration", Some(action)) => Some(format!("duration of {action}")),
-            ("constant", Some(action)) => Some(format!("number in {action}")),
-            ("domain", _) => Some("number of the domain".to_owned()),
-            (BOUND, _) => Some("bound between two time points".to_owned()),
-            _ => None,
-        }
     }
 }
 

@@ -14,7 +14,8 @@ impl Intervals {
     /// The box that the slacks are of, with some ends infinite.
     ///
     /// # Errors
-    /// When an end that is told is none, or is told twice, or slacks are missing.
+    /// When an infinite end does not exist or is listed twice, slacks are missing, or a symmetric box has an infinite
+    /// end.
     pub(crate) fn new(certificate: &Certificate, endless: &[Endless]) -> Result<Self, Flaw> {
         let parameters = certificate.parameters.iter().enumerate();
         let intervals = parameters.map(|(index, own)| {
@@ -36,8 +37,8 @@ impl Intervals {
             let interval = intervals.get_mut(own.parameter);
             let interval = interval.ok_or(Flaw::NoSuch("parameter", own.parameter))?;
             let end = &mut interval[usize::from(own.end == End::Upper)];
-            end.take()
-                .ok_or(Flaw::Range("the interval of parameter", own.parameter))?;
+            let end = end.take().filter(|_| !certificate.symmetric);
+            end.ok_or(Flaw::Range("the interval of parameter", own.parameter))?;
         }
         Ok(Self(intervals))
     }

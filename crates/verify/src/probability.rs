@@ -11,6 +11,9 @@ use elbowroom_num::{Rational, enclosed};
 use crate::certificate::{Certificate, Exact, Total, Touch};
 use crate::flaw::Flaw;
 
+/// Value of a box without any probability, in place of the logarithm.
+pub(crate) const NEVER: i64 = -1_000_000;
+
 /// Between which numbers a variable lies in a case.
 #[derive(Clone, Debug)]
 pub(crate) struct Span {
@@ -98,8 +101,8 @@ impl Chances {
         })
     }
 
-    /// The logarithm of the probability of a box, rounded down; `None` if there is none.
-    pub(crate) fn worth(&self, slacks: &[Rational]) -> Option<Rational> {
+    /// The logarithm of the probability of a box, rounded down; [`NEVER`] if there is none, or less than that.
+    pub(crate) fn worth(&self, slacks: &[Rational]) -> Rational {
         let mut sum = Rational::ZERO;
         for (own, ends) in self.own.iter().zip(&self.ends) {
             let Some((nominal, chance)) = own else {
@@ -107,10 +110,12 @@ impl Chances {
             };
             let reach: Reach = ends.map(|variable| slacks[variable].clone());
             let [mass, _] = chance.mass(nominal, &reach);
-            let [below, _] = enclosed::ln(&mass)?;
-            sum += below;
+            match enclosed::ln(&mass) {
+                Some([below, _]) => sum += below,
+                None => return Rational::from(NEVER),
+            }
         }
-        Some(enclosed::billionths_below(&sum))
+        enclosed::billionths_below(&sum).max(Rational::from(NEVER))
     }
 
     /// What that is at most, rounded up to 10^-18, in a case in which the ends, each times its slope, add

@@ -11,7 +11,7 @@ use elbowroom::verify::{AnswerError, Plan, Verified, verify_answer_in_world, ver
 use serde_json::{Value, json};
 
 use super::forgery::Forger;
-use super::{GUARANTEES, answered, request, timed};
+use super::{GUARANTEES, answered, read, request, timed};
 
 /// Distributions of all durations in relation to the planned ones, each with a similar one.
 const WORLDS: [[&str; 2]; 4] = [
@@ -95,4 +95,40 @@ fn probability_is_checked_with_the_world_and_assumed_without_it() {
     }
     assert!(accepted >= 10, "{accepted}");
     assert!(forger.told() > 500);
+}
+
+/// Boxes that next to no drawn duration is in, for which the search knows no logarithm.
+#[test]
+fn improbable_box_is_accepted_with_its_least_value_alone() {
+    let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (open) (done))
+        (:durative-action work :parameters () :duration (= ?duration 2)
+          :condition (at end (open)) :effect (at end (done))))";
+    let problem =
+        "(define (problem p) (:domain d) (:init (open) (at 2.01 (not (open)))) (:goal (done)))";
+    let (task, plan) = read(domain, problem, "0: (work) [2]");
+    let mut accepted = 0;
+    for distribution in [
+        "lognormal = { mean = 10, deviation = 0.05 }",
+        "normal = { mean = 10, deviation = 0.01 }",
+        "normal = { mean = 10, deviation = 1 }",
+    ] {
+        let own = world(distribution, &task);
+        for guarantee in GUARANTEES {
+            let mut request = request(&task, &plan, (guarantee, Objective::Probability));
+            request.world = Some(Arc::new(own.clone()));
+            let Some(answer) = answered(&request) else {
+                continue;
+            };
+            let verdict = verified_in(&answer, (&task, &plan), &own);
+            verdict.unwrap_or_else(|wrong| panic!("{distribution}, {guarantee:?}: {wrong}"));
+            accepted += 1;
+            for value in ["-1", "-999999", "-1000001"] {
+                let mut broken = answer.clone();
+                broken["best"]["value"] = json!({ "exact": value });
+                let verdict = verified_in(&broken, (&task, &plan), &own);
+                assert!(verdict.is_err(), "{distribution}: {value}");
+            }
+        }
+    }
+    assert!(accepted >= 3, "{accepted}");
 }

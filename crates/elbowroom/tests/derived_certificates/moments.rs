@@ -1,6 +1,6 @@
 //! Conditions over all that allow an action no moment.
 
-use elbowroom::verify::verify_answer_of;
+use elbowroom::verify::{AnswerError, verify_answer_of};
 
 use crate::forgery::claim;
 use crate::{GUARANTEES, OBJECTIVES, answer, read};
@@ -49,4 +49,45 @@ fn certificates_are_accepted_if_a_condition_over_all_limits_a_duration_to_zero()
         }
     }
     assert!(accepted >= 20, "{accepted}");
+}
+
+/// Instances that take no time, so that nothing reads the condition over all. Other instances make it false, before
+/// and at the same time.
+#[test]
+fn certificates_are_accepted_if_earlier_instances_delete_a_condition_over_no_time() {
+    let mut accepted = 0;
+    for effects in [
+        "(at start (not (open)))",
+        "(at end (not (open)))",
+        "(and (at start (not (open))) (at end (not (open))))",
+    ] {
+        let domain = format!(
+            "(define (domain d) (:requirements :typing :durative-actions) (:types thing)
+               (:constants one other - thing) (:predicates (open))
+               (:durative-action look :parameters (?x - thing) :duration (= ?duration 0)
+                 :condition (over all (open)) :effect {effects}))"
+        );
+        for facts in ["", "(open)"] {
+            let problem = format!("(define (problem p) (:domain d) (:init {facts}) (:goal (and)))");
+            for steps in [
+                "0: (look other) [0]\n1: (look one) [0]",
+                "0: (look one) [0]",
+            ] {
+                let (task, plan) = read(&domain, &problem, steps);
+                for guarantee in GUARANTEES {
+                    for objective in OBJECTIVES {
+                        let Some(answer) = answer(&task, &plan, guarantee, objective) else {
+                            continue;
+                        };
+                        let verdict = verify_answer_of(&answer.to_string(), &task, &plan);
+                        accepted += usize::from(verdict.is_ok());
+                        if let Err(AnswerError::Flaw(wrong)) = verdict {
+                            panic!("{effects}, {facts}, {guarantee:?}, {objective:?}: {wrong}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(accepted >= 50, "{accepted}");
 }

@@ -239,6 +239,7 @@ impl<'a> Given<'a> {
                     parameter,
                     kind,
                     step: *step,
+                    group: None,
                     action,
                 }
             });

@@ -107,7 +107,7 @@ impl Reader<'_> {
         let is_weak = self.certificate.guarantee == Guarantee::Weak;
         let is_set = match (&constraint.lower, &constraint.upper) {
             (Limit::Parameter(lower), Limit::Parameter(upper)) if lower == upper => {
-                self.quantity(*lower, step, &planned)?;
+                self.quantity(*lower, constraint.to, &planned)?;
                 constraint.observed != is_weak
             }
             _ if constraint.observed => false,
@@ -210,11 +210,11 @@ impl Reader<'_> {
         self.subject.steps[step].action.durative()
     }
 
-    /// Records the quantity of a parameter.
+    /// Records the quantity of a parameter that sets the time of an end of an action or of timed initials.
     fn quantity(
         &mut self,
         parameter: usize,
-        step: Option<usize>,
+        point: usize,
         planned: &Rational,
     ) -> Result<(), NotDerived> {
         let Some(own) = self.certificate.parameters.get(parameter) else {
@@ -229,12 +229,18 @@ impl Reader<'_> {
             );
             return Err(NotDerived::differs(what));
         }
+        let (step, group) = match self.subject.points[point].what {
+            What::Timed(group) => (None, Some(group)),
+            What::Start(step) | What::Instant(step) | What::End(step) => (Some(step), None),
+            What::Zero => (None, None),
+        };
         let action = step.map(|step| self.subject.steps[step].action.name.clone());
         let kind = if step.is_some() { "duration" } else { "timed" };
         let quantity = Quantity {
             parameter,
             kind,
             step,
+            group,
             action,
         };
         if self.quantities.insert(parameter, quantity).is_some() {
@@ -324,8 +330,9 @@ fn keep_sides(
 }
 
 /// Adds the orders that keep a fact at its wanted truth value throughout the action. If the value must be
-/// established first, the first point that does so lastingly comes before the action. Later points that
-/// change it come after the action.
+/// established first, the first point that does so lastingly comes before the action. If none does, because an
+/// action of duration 0 does not need the value, all earlier points that change it stay before the action. Later
+/// points that change it come after the action.
 fn keep_true(
     subject: &Subject<'_>,
     step: usize,
@@ -359,6 +366,12 @@ fn keep_true(
             .iter()
             .filter(|index| subject.points[**index].time == *time);
         sides.extend(together.map(|&index| (index, start)));
+    }
+    // The action takes no time then, so nothing reads the value. If a writer before it came later, or if its own end
+    // came after its start, the value would be needed.
+    if is_needed && serving.is_empty() {
+        let writers = before.iter().filter(|index| **index != start);
+        sides.extend(writers.map(|&index| (index, start)));
     }
     let spoiling = after
         .iter()
