@@ -63,6 +63,13 @@ impl Days {
         Ok(())
     }
 
+    /// Returns `true` if the text names days without `[dates]`: `mon`, `weekdays`, `2026-12-24`. The
+    /// singular forms `weekday` and `weekend` count as such names.
+    pub(crate) fn are_named(text: &str) -> bool {
+        let is_day = |text: &str| Self::default().add(text, &NamedDays::new()).is_ok();
+        is_day(text) || is_day(&format!("{}s", text.trim()))
+    }
+
     /// Adds the weekdays from `first` to `last`, over the end of the week where `last` is smaller.
     fn add_weekdays(&mut self, first: usize, last: usize) {
         let mut day = first;

@@ -170,11 +170,13 @@ impl Calendar {
     /// where it is another one than at time 0.
     pub fn date(&self, time: &Rational) -> String {
         let scaled = time * &Rational::from(self.unit.length);
-        // Half a second more, so that the part of a second that is cut off rounds to the nearest.
-        let seconds = (scaled / Rational::from(zone::SECOND) + Rational::new(1, 2)).floor();
-        let seconds = seconds.to_decimal(0).parse::<i64>().unwrap_or(i64::MAX);
-        let begin = self.begin.div_euclid(zone::SECOND) * zone::SECOND;
-        let instant = begin.saturating_add(seconds.saturating_mul(zone::SECOND));
+        // Half a millisecond more, so that the cut rounds to the nearest.
+        let milliseconds = (scaled + Rational::new(1, 2)).floor();
+        let milliseconds = milliseconds
+            .to_decimal(0)
+            .parse::<i64>()
+            .unwrap_or(i64::MAX);
+        let instant = self.begin.saturating_add(milliseconds);
         let date = self.zone.date(instant);
         let offset = self.zone.offset(instant);
         if offset == self.zone.offset(self.begin) {

@@ -1,6 +1,6 @@
 //! Reads a calendar file for a problem.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use elbowroom_model::Problem;
@@ -8,7 +8,7 @@ use elbowroom_text::{Diagnostic, Diagnostics, Report, Source};
 use toml::{Spanned, Value};
 
 use crate::days::{Days, NamedDays};
-use crate::file::{File, text};
+use crate::file::{File, text, texts};
 use crate::frame::{Frame, instant, noted};
 use crate::sections;
 use crate::unit::{Length, Unit, length};
@@ -61,6 +61,11 @@ fn calendar(
     let horizon = horizon.map(|horizon| self::horizon(horizon, begin, &zone, report));
     let mut named = NamedDays::new();
     for (name, dates) in &file.dates {
+        if Days::are_named(name) {
+            let message = format!("`{name}` names days already");
+            let error = report.error(dates.span(), message);
+            error.advise("choose another name");
+        }
         let mut days = Days::default();
         sections::add_days(dates, &mut days, &NamedDays::new(), report);
         named.insert(name.clone(), days);
@@ -76,6 +81,9 @@ fn calendar(
     };
     let facts = sections::facts(file, problem, &frame, report);
     let fluents = sections::fluents(file, problem, &frame, report);
+    if !report.is_failed() {
+        warn_of_unused(file, report);
+    }
     let Frame { zone, .. } = frame;
     Ok(Some(Calendar {
         zone,
@@ -85,6 +93,30 @@ fn calendar(
         facts,
         fluents,
     }))
+}
+
+/// Warns of a calendar without sections, and of names that no section uses.
+fn warn_of_unused(file: &File, report: &mut Report) {
+    if file.window.is_empty() && file.value.is_empty() {
+        let warning = report.warning(0..0, "the calendar has no [[window]] and no [[value]]");
+        warning.advise("it changes nothing in the problem");
+        return;
+    }
+    let sections = file.window.iter().chain(&file.value);
+    let days = sections.flat_map(|section| [&section.get_ref().days, &section.get_ref().except]);
+    let used: BTreeSet<String> = days
+        .flatten()
+        .filter_map(|value| texts(value).ok())
+        .flat_map(|(_, texts)| texts)
+        .map(|text| text.trim().to_owned())
+        .collect();
+    for (name, dates) in &file.dates {
+        if !used.contains(name) {
+            let message = format!("no `days` or `except` uses `{name}`");
+            let warning = report.warning(dates.span(), message);
+            warning.advise("name it in a section, or remove it");
+        }
+    }
 }
 
 fn header(file: &File, report: &mut Report) {

@@ -43,7 +43,7 @@ pub(crate) fn facts(
         };
         if rule.is_always() {
             let error = report.error(section.span(), "the window has neither begin nor end");
-            error.advise("add `days`, `hours`, `from` or `to`");
+            error.advise("add `days`, `except`, `hours`, `from` or `to`; `days = \"every day\"` for all times");
             continue;
         }
         let found = rule.windows(&frame.zone, &frame.within);
@@ -87,6 +87,8 @@ pub(crate) fn fluents(
 ) -> Vec<CalendarFluent> {
     let mut order = Vec::new();
     let mut layers: BTreeMap<String, Vec<(Rational, Ranges)>> = BTreeMap::new();
+    // Names with a mistake in a section: a missing value for all other times is no second mistake.
+    let mut mistaken = BTreeSet::new();
     let mut count = 0;
     for section in &file.value {
         let given = section.get_ref();
@@ -101,6 +103,7 @@ pub(crate) fn fluents(
         );
         let value = number(section, report);
         let (Some(rule), Some(value)) = (rule(section, frame, report), value) else {
+            mistaken.extend(names.into_iter().map(|(name, _)| name));
             continue;
         };
         let windows = rule.windows(&frame.zone, &frame.within);
@@ -113,7 +116,7 @@ pub(crate) fn fluents(
             if below.is_empty() {
                 order.push(name.clone());
             }
-            if below.is_empty() != rule.is_always() {
+            if below.is_empty() != rule.is_always() && !mistaken.contains(&name) {
                 let message = if rule.is_always() {
                     format!("{name} has a value for all other times already")
                 } else {
@@ -235,44 +238,56 @@ fn number(section: &Spanned<Section>, report: &mut Report) -> Option<Rational> {
     number
 }
 
-/// Adds the days that a value names.
+/// Adds the days that a value names. Returns `false` if it names others, which is in the report.
 pub(crate) fn add_days(
     value: &Spanned<Value>,
     days: &mut Days,
     named: &NamedDays,
     report: &mut Report,
-) {
+) -> bool {
     let Some((span, texts)) = noted(texts(value), &value.span(), report) else {
-        return;
+        return false;
     };
+    let mut is_read = true;
     for text in texts {
-        noted(days.add(&text, named), &span, report);
+        is_read &= noted(days.add(&text, named), &span, report).is_some();
     }
+    is_read
 }
 
 /// Returns the rule of a section; `None` if it cannot be used, which is in the report.
 fn rule(section: &Spanned<Section>, frame: &Frame, report: &mut Report) -> Option<Rule> {
     let given = section.get_ref();
     let mut rule = Rule::default();
+    let mut is_read = true;
     if let Some(value) = &given.days {
         let mut days = Days::default();
-        add_days(value, &mut days, &frame.named, report);
+        is_read &= add_days(value, &mut days, &frame.named, report);
         rule.days = Some(days);
     }
     if let Some(value) = &given.except {
-        add_days(value, &mut rule.except, &frame.named, report);
+        is_read &= add_days(value, &mut rule.except, &frame.named, report);
     }
     if let Some(value) = &given.hours {
-        let (span, texts) = noted(texts(value), &value.span(), report)?;
-        for text in texts {
-            rule.hours.extend(noted(hours::read(&text), &span, report));
+        let read = noted(texts(value), &value.span(), report);
+        is_read &= read.is_some();
+        for (span, text) in read
+            .iter()
+            .flat_map(|(span, all)| all.iter().map(move |it| (span, it)))
+        {
+            let hours = noted(hours::read(text), span, report);
+            is_read &= hours.is_some();
+            rule.hours.extend(hours);
         }
     }
     for (value, end) in [(&given.from, &mut rule.from), (&given.to, &mut rule.to)] {
         if let Some(value) = value {
             *end = instant(value, &frame.zone, report);
-            (*end)?;
+            is_read &= end.is_some();
         }
+    }
+    if !is_read {
+        return None;
     }
     if let (Some(from), Some(to), Some(value)) = (rule.from, rule.to, &given.to)
         && to <= from

@@ -14,6 +14,8 @@ use jiff::tz::{AmbiguousOffset, Offset, TimeZone, TimeZoneDatabase};
 pub(crate) const SECOND: i64 = 1000;
 /// One day on the clock, in milliseconds.
 pub(crate) const DAY: i64 = 24 * 60 * 60 * SECOND;
+/// One year, in milliseconds.
+const YEAR: i64 = 366 * DAY;
 
 /// A time zone of the IANA database that is compiled into the program.
 #[derive(Clone, Debug)]
@@ -61,7 +63,8 @@ impl Zone {
     pub(crate) fn instant(&self, text: &str) -> Result<i64, Objection> {
         let text = text.trim();
         if let Ok(instant) = text.parse::<Timestamp>() {
-            return Ok(instant.as_millisecond());
+            let instant = instant.as_millisecond();
+            return self.with_known_offset(text, instant).map(|()| instant);
         }
         let has_time = text.contains(':') && !text.contains('[');
         let local: DateTime = match text.parse() {
@@ -97,6 +100,33 @@ impl Zone {
             (message, "choose a year from 1 to 9999".to_owned())
         };
         instant.map(Timestamp::as_millisecond).map_err(out_of_range)
+    }
+
+    /// Refuses an instant that is written with an offset which the zone does not have within a year. The
+    /// offset of UTC is always allowed.
+    fn with_known_offset(&self, text: &str, instant: i64) -> Result<(), Objection> {
+        let written = text.parse::<DateTime>().ok();
+        let written = written.and_then(|local| TimeZone::UTC.to_timestamp(local).ok());
+        // `Z` is no offset of a local time.
+        let Some(local) = written.map(Timestamp::as_millisecond) else {
+            return Ok(());
+        };
+        let offset = local.saturating_sub(instant);
+        let begin = timestamp(instant.saturating_sub(YEAR));
+        let end = timestamp(instant.saturating_add(YEAR));
+        let mut offsets = vec![self.rules.to_offset(begin)];
+        let transitions = self.rules.following(begin);
+        let transitions = transitions.take_while(|it| it.timestamp() < end);
+        offsets.extend(transitions.map(|transition| transition.offset()));
+        if offset == 0 || offsets.iter().any(|own| milliseconds(*own) == offset) {
+            return Ok(());
+        }
+        let message = format!("`{text}` has another offset than {}", self.name);
+        let own = self.offset(instant);
+        let advice = format!(
+            "the offset there is {own}: leave the offset out for the local time, or write UTC with `Z`"
+        );
+        Err((message, advice))
     }
 
     /// Returns the instant `days` days later at the same local time, or the first instant after it
@@ -143,9 +173,11 @@ impl Zone {
         found
     }
 
-    /// Returns the local date and time of an instant, to the minute where it is a full one, such as
-    /// `Mon 2026-11-30 07:30`.
+    /// Returns the local date and time of an instant, rounded to the second, and to the minute where it is
+    /// a full one, such as `Mon 2026-11-30 07:30`.
     pub(crate) fn date(&self, instant: i64) -> String {
+        let second = instant.saturating_add(SECOND / 2).div_euclid(SECOND);
+        let instant = second.saturating_mul(SECOND);
         let local = self.rules.to_datetime(timestamp(instant));
         let format = if instant.rem_euclid(60 * SECOND) == 0 {
             "%a %Y-%m-%d %H:%M"
@@ -246,6 +278,33 @@ mod tests {
             zone.date(zone.days_later(before, 2)),
             "Mon 2026-03-30 02:30"
         );
+    }
+
+    #[test]
+    fn offset_that_the_zone_does_not_have_is_refused() {
+        let zone = berlin();
+        let instant = |text: &str| zone.instant(text);
+        let utc = instant("2026-11-30T06:30Z").expect("an instant");
+        for text in [
+            "2026-11-30T07:30+01:00",
+            "2026-11-30T08:30+02:00",
+            "2026-11-30T06:30+00:00",
+        ] {
+            assert_eq!(instant(text), Ok(utc), "{text}");
+        }
+        for text in ["2026-11-30T11:30+05:00", "2026-11-30T05:30-01:00"] {
+            let (message, advice) = instant(text).unwrap_err();
+            assert!(message.ends_with("another offset than Europe/Berlin"));
+            assert!(advice.starts_with("the offset there is +01:00"), "{advice}");
+        }
+    }
+
+    #[test]
+    fn dates_are_rounded_to_the_second() {
+        let zone = berlin();
+        let eight = zone.instant("2026-11-30T08:00").expect("an instant");
+        assert_eq!(zone.date(eight - 400), "Mon 2026-11-30 08:00");
+        assert_eq!(zone.date(eight + 600), "Mon 2026-11-30 08:00:01");
     }
 
     #[test]

@@ -64,17 +64,11 @@ fn mistakes_in_the_head_are_refused() {
 #[test]
 fn mistakes_in_windows_are_refused() {
     let window = |rest: &str| wrong(&format!("[[window]]\nfact = \"(open bakery)\"\n{rest}"));
-    insta::assert_snapshot!(window("hours = \"8 to 8\""), @r#"
-c.toml:7:1: error: the window has neither begin nor end; add `days`, `hours`, `from` or `to`
-c.toml:9:9: error: `8 to 8` is a window without length; for the whole day, write `0 to 24`
-"#);
-    insta::assert_snapshot!(window("hours = \"8-17\""), @r#"
-c.toml:7:1: error: the window has neither begin nor end; add `days`, `hours`, `from` or `to`
-c.toml:9:9: error: `8-17` are no hours; write them like `8 to 17` or `8:30 to 12`
-"#);
+    insta::assert_snapshot!(window("hours = \"8 to 8\""), @"c.toml:9:9: error: `8 to 8` is a window without length; for the whole day, write `0 to 24`");
+    insta::assert_snapshot!(window("hours = \"8-17\""), @"c.toml:9:9: error: `8-17` are no hours; write them like `8 to 17` or `8:30 to 12`");
     insta::assert_snapshot!(window("days = [\"monday\", \"holidys\"]"), @"c.toml:9:8: error: `holidys` is not a day; write `weekdays`, `monday to thursday`, `2026-12-24`, `2026-12-24 to 2027-01-06`, or a name from `[dates]`");
     insta::assert_snapshot!(window("days = 7"), @"c.toml:9:8: error: expected a text in quotes, or a list of texts");
-    insta::assert_snapshot!(window(""), @"c.toml:7:1: error: the window has neither begin nor end; add `days`, `hours`, `from` or `to`");
+    insta::assert_snapshot!(window(""), @r#"c.toml:7:1: error: the window has neither begin nor end; add `days`, `except`, `hours`, `from` or `to`; `days = "every day"` for all times"#);
     insta::assert_snapshot!(window("from = \"2026-12-01T10:00\"\nto = \"2026-12-01T09:00\""), @"c.toml:10:6: error: a window without length; `to` must be later than `from`");
     insta::assert_snapshot!(window("value = 3\nhours = \"8 to 9\""), @"c.toml:9:9: error: [[window]] has no `value`; leave it out");
     insta::assert_snapshot!(window("hour = \"8 to 9\""), @"c.toml:9:1: error: unknown key `hour`; did you mean `hours`?");
@@ -135,7 +129,92 @@ fn begin_of_the_caller_replaces_that_of_the_file() {
     let (calendar, _) = read_with(HEAD, Some("2026-07-01T09:00")).expect("a calendar");
     insta::assert_snapshot!(calendar.origin(), @"time 0 is Wed 2026-07-01 09:00 +02:00 (Europe/Berlin), in minutes");
     let (calendar, _) = read_with(HEAD, Some("now")).expect("a calendar");
-    insta::assert_snapshot!(calendar.origin(), @"time 0 is Wed 2026-11-18 12:06:40 +01:00 (Europe/Berlin), in minutes");
+    insta::assert_snapshot!(calendar.origin(), @"time 0 is Wed 2026-11-18 12:06:41 +01:00 (Europe/Berlin), in minutes");
     assert!(calendar.begins_now());
     insta::assert_snapshot!(read_with(HEAD, Some("tomorrow")).expect_err("a mistake"), @"--begin:1:1: error: `tomorrow` is not a date with a time of day; write it like 2026-11-30T07:30, or 2026-11-30T07:30+01:00");
+}
+
+#[test]
+fn one_mistake_is_one_message() {
+    for rest in [
+        "hours = \"8-17\"",
+        "days = \"holidys\"",
+        "except = 3",
+        "hours = []",
+    ] {
+        let window = wrong(&format!("[[window]]\nfact = \"(open bakery)\"\n{rest}"));
+        assert_eq!(window.lines().count(), 1, "{window}");
+    }
+    let value = wrong(
+        "[[value]]\nfluent = \"(rate bank)\"\nvalue = \"high\"
+         [[value]]\nfluent = \"(rate bank)\"\nvalue = 2\nhours = \"8 to 9\"\n",
+    );
+    assert_eq!(value.lines().count(), 1, "{value}");
+}
+
+#[test]
+fn names_of_days_cannot_be_defined_anew() {
+    let window = "[[window]]\nfact = \"(open bakery)\"\nhours = \"8 to 17\"\n";
+    for name in [
+        "mon",
+        "Monday",
+        "weekday",
+        "weekends",
+        "every day",
+        "mon to fri",
+        "2026-12-24",
+    ] {
+        let found = wrong(&format!("{window}[dates]\n\"{name}\" = \"2026-12-01\"\n"));
+        let expected = format!("error: `{name}` names days already; choose another name");
+        assert!(found.ends_with(&expected), "{found}");
+    }
+}
+
+#[test]
+fn unused_parts_are_warnings() {
+    let window = "[[window]]\nfact = \"(open bakery)\"\nhours = \"8 to 17\"\nexcept = \"feast\"\n";
+    let dates = "[dates]\nfeast = \"2026-12-01\"\nrest = \"2026-12-02\"\n";
+    let (_, warnings) = read_with(&format!("{HEAD}{window}{dates}"), None).expect("a calendar");
+    assert!(
+        warnings.ends_with(
+            "warning: no `days` or `except` uses `rest`; name it in a section, or remove it"
+        ),
+        "{warnings}"
+    );
+    assert_eq!(warnings.lines().count(), 1, "{warnings}");
+    let (_, warnings) = read_with(HEAD, None).expect("a calendar");
+    assert!(
+        warnings.contains("the calendar has no [[window]] and no [[value]]"),
+        "{warnings}"
+    );
+}
+
+#[test]
+fn dates_of_windows_are_exact_from_any_instant() {
+    for milliseconds in [0, 1, 300, 500, 700, 999] {
+        let (problem, _) = read_problem(&DOMAIN.into(), &PROBLEM.into()).expect("a problem");
+        let origin = Origin {
+            begin: Some("now"),
+            now: UNIX_EPOCH + Duration::from_millis(1_795_000_000_000 + milliseconds),
+            is_live: false,
+        };
+        let text = format!("{HEAD}[[window]]\nfact = \"(open bakery)\"\nhours = \"8 to 17\"\n");
+        let (calendar, _) =
+            read(&Source::new("c.toml", text.as_str()), &problem, &origin).expect("a calendar");
+        let timed = calendar.timed_problem(&PROBLEM.into(), &Source::new("c.toml", text));
+        assert!(
+            timed
+                .text()
+                .contains("(not (open bakery))) ; Wed 2026-11-18 17:00\n"),
+            "{}",
+            timed.text()
+        );
+        assert!(
+            timed
+                .text()
+                .contains("(open bakery)) ; Thu 2026-11-19 08:00\n"),
+            "{}",
+            timed.text()
+        );
+    }
 }

@@ -113,7 +113,14 @@ impl Log {
         text.trim().chars().map(shown).collect()
     }
 
+    /// Reads a line. A carriage return inside it ends a line of its own.
     fn line(&mut self, line: &str, found: &mut impl FnMut(String)) {
+        for part in line.trim_end().split('\r') {
+            self.part(part, found);
+        }
+    }
+
+    fn part(&mut self, line: &str, found: &mut impl FnMut(String)) {
         match LineKind::of(line) {
             kind @ (LineKind::Timed | LineKind::Broken) => {
                 self.is_plan |= kind == LineKind::Timed;

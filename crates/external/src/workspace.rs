@@ -106,7 +106,7 @@ impl Workspace {
 
 /// Whether there is a plan in it. Some planners also write files to say that there is none.
 fn has_actions(text: &str) -> bool {
-    let kinds = text.lines().map(LineKind::of);
+    let kinds = text.split(['\n', '\r']).map(LineKind::of);
     kinds
         .into_iter()
         .any(|kind| matches!(kind, LineKind::Timed | LineKind::Untimed))

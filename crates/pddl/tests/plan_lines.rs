@@ -250,6 +250,84 @@ fn text_that_may_hold_an_action_is_an_error_before_and_after_a_plan() {
 }
 
 #[test]
+fn name_of_an_action_with_a_number_or_a_bracket_is_an_error_beside_a_plan() {
+    for line in [
+        "t1: ('wait') [1]",
+        "t9= (:action wait)[1]",
+        "<7.000>: (:action snap)",
+        "t7:: snap {1}",
+        "1) wait",
+        "(1) wait 1",
+        "t1: wait",
+        "8.000   （snap b1）",
+        "(1.000)：【wait】",
+        "٧: ‘wait’",
+        "12:30 -> then WAIT",
+        "{\"action\": \"wait\"}",
+        "+8->snap_b1",
+        "(1): walk-hall-kitchen",
+        "<wait_start>",
+        "[snap/b1/2]",
+        "1.000; (wait_start)",
+        "('jump') [1]",
+        "go and wait, then [3]",
+    ] {
+        for (text, number) in [
+            (format!("{line}\n0: (wait) [2]"), 1),
+            (format!("0: (wait) [2]\n{line}"), 2),
+        ] {
+            assert!(
+                errors(&text).starts_with(&format!("{number}: ")),
+                "{text}\n{}",
+                errors(&text)
+            );
+        }
+    }
+}
+
+#[test]
+fn statistics_of_planners_that_hold_the_name_of_an_action_are_skipped() {
+    let names = ["b", "load", "search", "state", "step"];
+    let actions: Vec<_> = names.map(|it| format!("(:action {it})")).into();
+    let task = task(
+        &domain(&actions.join(" ")),
+        &problem("(:init) (:goal (lit))"),
+    );
+    for line in [
+        "b (10.000 | 0.100)b (8.000 | 0.200)(G)",
+        "[t=0.003s, 10084 KB] Actual search time: 0.001s",
+        "[t=0.001s, 10084 KB] Conducting best first search with reopening closed nodes, (real) bound = 2147483647",
+        "[t=0.003s, 10084 KB] Int hash set load factor: 6/8 = 0.750000",
+        "[t=0.003s, 10084 KB] Expanded 5 state(s).",
+        "Plan length: 3 step(s).",
+        "ff: search configuration is  best-first on 1*g(s) + 5*h(s) where",
+        " Search time:     0.01",
+        "Metric (Search):5.0",
+        "Search Time (msec): 20",
+        "Fixed constraint violations during search (zero-crossing):0",
+    ] {
+        let text = format!("{line}\n0: (load)\n1: (search)\n{line}\n");
+        let read = read_plan(&Source::new("plan", text), &task);
+        let (plan, _) = read.unwrap_or_else(|found| panic!("{}", found.render(false)));
+        assert_eq!(plan.steps.len(), 2, "{line}");
+    }
+}
+
+#[test]
+fn each_line_break_ends_a_comment() {
+    let usual = "; a comment\n0: (wait) [2] ; and another\n; one more\n3: (snap b1)\n";
+    for end in [
+        "\r", "\r\n", "\u{b}", "\u{c}", "\u{85}", "\u{2028}", "\u{2029}",
+    ] {
+        assert_eq!(plan(&usual.replace('\n', end)), plan(usual), "{end:?}");
+    }
+    assert_eq!(
+        errors("; a comment\r0: (wait) [2]\rand then\r3: (snap b1)\r"),
+        "3: this line between actions is not an action of a plan"
+    );
+}
+
+#[test]
 fn action_that_is_written_in_part_or_with_unknown_words_is_an_error() {
     let timed = "0: (walk hall kitchen) [4]\n4.001: (walk kitchen hall) [4]\n";
     let untimed = "walk hall kitchen (1)\nwalk kitchen hall (1)\n";

@@ -7,7 +7,7 @@ use std::sync::Arc;
 /// A place in a text, in bytes: `start..end`.
 pub type Span = Range<usize>;
 
-/// A text with the name it is reported under. Cheap to clone.
+/// A text with the name it is reported under. Cheap to clone. Lines end with `\n`, `\r\n` or `\r`.
 ///
 /// `Source::from("…")` makes one whose name is `text`, for texts that come from no file.
 #[derive(Clone, PartialEq, Eq)]
@@ -34,8 +34,14 @@ impl Source {
         if text.starts_with(BYTE_ORDER_MARK) {
             text.remove(0);
         }
+        let is_end =
+            |at: usize, character: &str| character == "\n" || !text[at + 1..].starts_with('\n');
         let lines = std::iter::once(0)
-            .chain(text.match_indices('\n').map(|(at, _)| at + 1))
+            .chain(
+                text.match_indices(['\n', '\r'])
+                    .filter(|&(at, character)| is_end(at, character))
+                    .map(|(at, _)| at + 1),
+            )
             .collect();
         Self(Arc::new(Inner {
             name: name.into(),
@@ -84,7 +90,13 @@ impl Source {
         };
         let end = self.0.lines.get(line).map_or(end_of_text, |&next| next - 1);
         let line = &self.text()[start..end];
-        start..start + line.trim_end_matches('\r').len()
+        let line = line.strip_suffix('\r').unwrap_or(line);
+        start..start + line.len()
+    }
+
+    /// The spans of all lines, without their line breaks.
+    pub fn lines(&self) -> impl Iterator<Item = Span> + '_ {
+        (1..=self.0.lines.len()).map(|line| self.line(line))
     }
 
     /// The last position not after `at` that lies between two characters of the text.
@@ -164,6 +176,14 @@ mod tests {
         assert_eq!(source.line(3), 7..8);
         assert_eq!(source.line(4), 8..8);
         assert_eq!(source.line(0), 8..8);
+    }
+
+    #[test]
+    fn a_carriage_return_ends_a_line() {
+        let source = Source::new("f", "ab\rcd\r\ne\r");
+        let lines: Vec<_> = source.lines().collect();
+        assert_eq!(lines, [0..2, 3..5, 7..8, 9..9]);
+        assert_eq!(source.position(3), (2, 1));
     }
 
     #[test]

@@ -6,6 +6,8 @@
 
 use std::ops::Range;
 
+use elbowroom_text::{Source, Span};
+
 use super::form::Form;
 use super::line::{Line, RawStep, line};
 use super::near::{classical, known_action, possible_action, single_word};
@@ -46,8 +48,8 @@ enum Entry<'s> {
 }
 
 /// Reads the lines of a text.
-pub(super) fn last_plan<'s>(text: &'s str, vocabulary: &Vocabulary) -> LastPlan<'s> {
-    let mut sections = sections(text, vocabulary);
+pub(super) fn last_plan<'s>(source: &'s Source, vocabulary: &Vocabulary) -> LastPlan<'s> {
+    let mut sections = sections(source, vocabulary);
     let has_text = sections.iter().any(|section| !section.is_empty());
     sections.retain(|section| {
         let is_plan = |entry: &Entry<'_>| matches!(entry, Entry::Steps(_) | Entry::Misread(_));
@@ -60,7 +62,7 @@ pub(super) fn last_plan<'s>(text: &'s str, vocabulary: &Vocabulary) -> LastPlan<
         ..LastPlan::default()
     };
     let mut last = sections.pop().unwrap_or_default();
-    name_words_beside_steps(text, &mut last);
+    name_words_beside_steps(source, &mut last);
     for entry in without_log(last) {
         match entry {
             Entry::Steps(steps) => plan.steps.extend(steps),
@@ -75,11 +77,11 @@ pub(super) fn last_plan<'s>(text: &'s str, vocabulary: &Vocabulary) -> LastPlan<
 }
 
 /// The lines between headings.
-fn sections<'s>(text: &'s str, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s>>> {
+fn sections<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s>>> {
+    let text = source.text();
     let mut sections = vec![Vec::new()];
-    let mut start = 0;
-    for raw in text.split_inclusive('\n') {
-        let shown = raw.trim_end();
+    for Span { start, end } in source.lines().flat_map(|line| parts(text, line)) {
+        let shown = text[start..end].trim_end();
         let indent = shown.len() - shown.trim_start().len();
         let range = start + indent..start + shown.len();
         let entry = match line(shown, start) {
@@ -106,9 +108,22 @@ fn sections<'s>(text: &'s str, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s>>> {
         if let Some(section) = sections.last_mut() {
             section.extend(entry);
         }
-        start += raw.len();
     }
     sections
+}
+
+/// The parts of a line between the other signs that Unicode defines as line breaks. An editor may show a
+/// line break there, so a comment ends there.
+fn parts(text: &str, line: Span) -> Vec<Span> {
+    const BREAKS: [char; 5] = ['\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}'];
+    let mut parts = Vec::new();
+    let mut start = line.start;
+    for (at, sign) in text[line.clone()].match_indices(BREAKS) {
+        parts.push(start..line.start + at);
+        start = line.start + at + sign.len();
+    }
+    parts.push(start..line.end);
+    parts
 }
 
 /// Log text, unless it may hold an action.
@@ -129,7 +144,8 @@ fn possible<'s>(line: &Range<usize>, place: &Range<usize>) -> Entry<'s> {
 
 /// Marks a single word on the line before or behind the steps of a plan without times: there it may be an action
 /// without arguments.
-fn name_words_beside_steps(text: &str, section: &mut [Entry<'_>]) {
+fn name_words_beside_steps(source: &Source, section: &mut [Entry<'_>]) {
+    let text = source.text();
     let is_untimed = |entry: &Entry<'_>| match entry {
         Entry::Steps(steps) => steps.iter().all(|step| step.time.is_none()),
         _ => false,
@@ -138,7 +154,7 @@ fn name_words_beside_steps(text: &str, section: &mut [Entry<'_>]) {
         Entry::Noise(range) => Some((range.clone(), single_word(&text[range.clone()])?)),
         _ => None,
     };
-    let lines = |range: &Range<usize>| text[range.clone()].matches('\n').count();
+    let line = |at: usize| source.position(at).0;
     for index in 0..section.len() {
         let Some((range, word)) = place(&section[index]) else {
             continue;
@@ -153,8 +169,8 @@ fn name_words_beside_steps(text: &str, section: &mut [Entry<'_>]) {
                 return false;
             };
             let steps = steps.first().map_or(range.clone(), RawStep::range);
-            let between = range.end.min(steps.end)..range.start.max(steps.start);
-            is_untimed(entry) && lines(&between) == 1
+            let is_next = line(range.start).abs_diff(line(steps.start)) == 1;
+            is_untimed(entry) && is_next
         });
         if is_beside {
             section[index] = possible(&range, &word);

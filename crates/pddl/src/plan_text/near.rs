@@ -10,8 +10,24 @@ use super::form::Form;
 use super::line::{RawStep, Word};
 use super::vocabulary::Vocabulary;
 
-/// Phrases of planners with words in parentheses, in lower case.
-const HARMLESS: &[&str] = &["(ignoring no-moving-targets-rule)"];
+/// Phrases of planners that may hold the name of an action or words in parentheses, in lower case. They
+/// are blanked before the line is searched.
+const HARMLESS: &[&str] = &[
+    "(ignoring no-moving-targets-rule)",
+    "(real) bound",
+    "best first search",
+    "during search (zero-crossing)",
+    "int hash set load factor",
+    "metric (search)",
+    "search configuration",
+    "search steps",
+    "search time",
+    "state(s)",
+    "step(s)",
+];
+
+/// Opening and closing brackets apart from parentheses.
+const BRACKETS: &str = "[]{}<>（）［］｛｝＜＞【】「」〈〉《》⟨⟩";
 
 /// A piece of a line.
 #[derive(Clone, Copy)]
@@ -26,6 +42,7 @@ enum Piece<'s> {
         is_attached: bool,
     },
     Close,
+    Bracket,
     Comma,
     Other,
 }
@@ -44,15 +61,15 @@ impl Piece<'_> {
 ///
 /// Possible actions are:
 ///
-/// - the name of an action in or before parentheses, with all its arguments, or after a number;
-/// - the name of an action, and as many of the objects as it has parameters anywhere behind it;
+/// - an action of the domain ([`known_action`]);
 /// - a line that begins with the name of an action, and has one of the objects, or nothing but numbers;
 /// - words in parentheses on a line with a number;
 /// - a number, words, and a number in brackets;
 /// - words and a whole number in parentheses, or a word and nothing but objects.
 pub(super) fn possible_action(text: &str, vocabulary: &Vocabulary) -> Option<Range<usize>> {
+    let text = &without_phrases(text);
     let pieces = pieces(text);
-    known_action(text, vocabulary)
+    known(&pieces, vocabulary)
         .or_else(|| words_and_number(text, &pieces))
         .or_else(|| words_and_duration(text, &pieces))
         .or_else(|| leading_name(&pieces, vocabulary))
@@ -70,49 +87,46 @@ pub(super) fn single_word(text: &str) -> Option<Range<usize>> {
     }
 }
 
-/// Returns the place of a possible action of the domain in `text`.
+/// Returns the place of a possible action of the domain in `text`: the name of an action with a number or
+/// a bracket anywhere on the line, or with as many objects behind it as it has parameters.
 pub(super) fn known_action(text: &str, vocabulary: &Vocabulary) -> Option<Range<usize>> {
-    let pieces = pieces(text);
+    known(&pieces(&without_phrases(text)), vocabulary)
+}
+
+fn known(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> {
+    let is_sign = |piece: &Piece<'_>| match piece {
+        Piece::Open { .. } | Piece::Close | Piece::Bracket => true,
+        Piece::Word { text, .. } => is_numbered(text, vocabulary),
+        Piece::Comma | Piece::Other => false,
+    };
+    let has_sign = pieces.iter().any(is_sign);
     // Counted once, so that long lines are read in time in proportion to their length.
     let mut objects = pieces.iter().filter(|it| it.is_object(vocabulary)).count();
-    (0..pieces.len()).find_map(|index| {
-        objects -= usize::from(pieces[index].is_object(vocabulary));
-        named_action(&pieces, index, objects, vocabulary)
+    pieces.iter().find_map(|piece| {
+        objects -= usize::from(piece.is_object(vocabulary));
+        let &Piece::Word { text, at } = piece else {
+            return None;
+        };
+        let is_action = match vocabulary.parameters(text) {
+            Some(parameters) => has_sign || parameters > 0 && objects >= parameters,
+            None => is_stuck(text, vocabulary) || has_sign && vocabulary.is_joined(text),
+        };
+        is_action.then_some(at..at + text.len())
     })
 }
 
-/// Returns the place of an action name that may begin an action. `objects` of the pieces behind it are objects.
-fn named_action(
-    pieces: &[Piece<'_>],
-    index: usize,
-    objects: usize,
-    vocabulary: &Vocabulary,
-) -> Option<Range<usize>> {
-    let Piece::Word { text, at } = pieces[index] else {
-        return None;
-    };
-    let Some(parameters) = vocabulary.parameters(text) else {
-        // A number that sticks to the name: `6snap`.
-        let name = text.trim_start_matches(|c: char| !c.is_alphabetic());
-        let is_stuck = is_number(text) && vocabulary.parameters(name).is_some();
-        return is_stuck.then_some(at..at + text.len());
-    };
-    let before = index.checked_sub(1).map(|before| pieces[before]);
-    let is_opened = matches!(before, Some(Piece::Open { .. }))
-        || matches!(
-            pieces.get(index + 1),
-            Some(Piece::Open {
-                is_attached: true,
-                ..
-            })
-        );
-    let number = pieces[..index]
-        .iter()
-        .rev()
-        .find(|piece| !matches!(piece, Piece::Other | Piece::Comma));
-    let is_numbered = matches!(number, Some(Piece::Word { text, .. }) if is_number(text));
-    let has_arguments = parameters > 0 && objects >= parameters;
-    (is_opened || is_numbered || has_arguments).then_some(at..at + text.len())
+/// Returns `true` for a word with a digit that is no name of the task: `3`, `12:30`, `t1`.
+fn is_numbered(word: &str, vocabulary: &Vocabulary) -> bool {
+    word.contains(char::is_numeric)
+        && vocabulary.object(word).is_none()
+        && vocabulary.parameters(word).is_none()
+        && !vocabulary.is_joined(word)
+}
+
+/// Returns `true` for a number that sticks to the name of an action: `6snap`.
+fn is_stuck(word: &str, vocabulary: &Vocabulary) -> bool {
+    let name = word.trim_start_matches(|c: char| !c.is_alphabetic());
+    is_number(word) && vocabulary.parameters(name).is_some()
 }
 
 /// An action at the beginning of the line with a part of its arguments: `charge [3]`, `go: r1`.
@@ -154,27 +168,16 @@ fn word_and_objects(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Ran
 
 /// Words in parentheses on a line with a number.
 fn words_and_number(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
-    let lower = text.to_ascii_lowercase();
-    if HARMLESS.iter().any(|phrase| lower.contains(phrase)) {
-        return None;
-    }
     let mut group = None;
     let mut has_number = false;
-    let mut index = 0;
-    while let Some(piece) = pieces.get(index) {
-        index += 1;
+    for piece in pieces {
         match *piece {
             Piece::Open { at, is_attached } => {
                 // Up to the next parenthesis, so that all groups together are read once.
                 let inside = text[at + 1..].split(['(', ')']).next().unwrap_or("");
                 let behind = text[at + 1 + inside.len()..].strip_prefix(')');
-                // POPF: `b (10.000 | 0.100)`.
-                if inside.contains('|') && !inside.contains(char::is_alphabetic) {
-                    let rest = pieces[index..].iter();
-                    index += rest.take_while(|it| !matches!(it, Piece::Close)).count();
-                    continue;
-                }
-                let is_named = inside.trim_start().starts_with(char::is_alphabetic);
+                let begin = inside.trim_start_matches(|c: char| !c.is_alphanumeric());
+                let is_named = begin.starts_with(char::is_alphabetic);
                 let is_word = !inside.trim().contains(char::is_whitespace);
                 // A unit or kind, as in `Planning Time (msec): 200`; a plural, as in `step(s)`.
                 let is_label = is_word && behind.is_some_and(|it| it.starts_with([':', '=']))
@@ -184,7 +187,7 @@ fn words_and_number(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
                 }
             }
             Piece::Word { text, .. } => has_number |= is_number(text),
-            Piece::Close | Piece::Comma | Piece::Other => {}
+            Piece::Close | Piece::Bracket | Piece::Comma | Piece::Other => {}
         }
     }
     group.filter(|_| has_number)
@@ -246,11 +249,36 @@ pub(super) fn classical<'s>(
     })
 }
 
+/// The text with blanks in place of planners' phrases and of POPF's progress, `b (10.000 | 0.100)`. Places stay.
+fn without_phrases(text: &str) -> String {
+    let mut shown = text.to_owned();
+    let lower = text.to_ascii_lowercase();
+    for phrase in HARMLESS {
+        for (at, _) in lower.match_indices(phrase) {
+            shown.replace_range(at..at + phrase.len(), &" ".repeat(phrase.len()));
+        }
+    }
+    let mut at = 0;
+    while let Some(found) = shown[at..].find("b (") {
+        let begin = at + found;
+        let inside = begin + "b (".len();
+        let length = shown[inside..].find(|c: char| !(c.is_ascii_digit() || " .|-".contains(c)));
+        let end = inside + length.unwrap_or(0);
+        if shown[end..].starts_with(')') && shown[inside..end].contains('|') {
+            shown.replace_range(begin..=end, &" ".repeat(end + 1 - begin));
+        }
+        at = inside.max(end);
+    }
+    shown
+}
+
 fn pieces(text: &str) -> Vec<Piece<'_>> {
     let mut pieces = Vec::new();
     let mut word: Option<usize> = None;
     for (at, character) in text.char_indices().chain([(text.len(), ' ')]) {
-        let is_part = !character.is_whitespace() && !"()[]{}<>,;:=\"'`|#*".contains(character);
+        // Names are of letters, digits and signs of ASCII; any other sign separates them.
+        let is_part = character.is_alphanumeric()
+            || character.is_ascii_graphic() && !"()[]{}<>,;:=\"'`|#*".contains(character);
         if is_part {
             word.get_or_insert(at);
             continue;
@@ -273,6 +301,7 @@ fn pieces(text: &str) -> Vec<Piece<'_>> {
             '(' => pieces.push(Piece::Open { at, is_attached }),
             ')' => pieces.push(Piece::Close),
             ',' => pieces.push(Piece::Comma),
+            _ if BRACKETS.contains(character) => pieces.push(Piece::Bracket),
             _ if character.is_whitespace() => {}
             _ => pieces.push(Piece::Other),
         }
@@ -283,5 +312,5 @@ fn pieces(text: &str) -> Vec<Piece<'_>> {
 /// Returns `true` if the word is a number, perhaps with a sign before and a unit behind.
 fn is_number(word: &str) -> bool {
     word.trim_start_matches(|c: char| !c.is_alphanumeric())
-        .starts_with(|c: char| c.is_ascii_digit())
+        .starts_with(char::is_numeric)
 }

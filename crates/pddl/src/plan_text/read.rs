@@ -51,7 +51,7 @@ pub fn read_printed_plan(
     task: &Task,
 ) -> Result<(PrintedPlan, Vec<Diagnostic>), Diagnostics> {
     let mut reader = StepReader::new(source, task);
-    let lines = last_plan(source.text(), &reader.vocabulary);
+    let lines = last_plan(source, &reader.vocabulary);
     report_lines(&mut reader.report, &lines);
     if lines.steps.is_empty() && lines.mistakes.is_empty() {
         report_no_action(&mut reader.report, task, lines.has_text);

@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 use elbowroom_model::Task;
 use elbowroom_model::problem::{ObjectId, SchemaId};
 
+/// Words of more parts are not taken apart.
+const MOST_PARTS: usize = 32;
+
 /// Names of actions and objects, in lower case.
 pub(super) struct Vocabulary {
     pub(super) schemas: BTreeMap<String, SchemaId>,
@@ -45,5 +48,40 @@ impl Vocabulary {
     pub(super) fn parameters(&self, word: &str) -> Option<usize> {
         let schema = self.schema(word)?;
         self.parameters.get(schema.index()).copied()
+    }
+
+    /// Returns `true` for the name of an action joined with objects, numbers, `start` or `end`: `pick_o1`,
+    /// `pick-1`, `pick_start`.
+    pub(super) fn is_joined(&self, word: &str) -> bool {
+        let is_joint = |c: char| "_-+.@/".contains(c);
+        let mut ends = word.match_indices(is_joint).map(|(at, _)| at);
+        let Some(first) = ends.find(|&at| self.schema(&word[..at]).is_some()) else {
+            return false;
+        };
+        // From the left, the places at which a part may begin.
+        let rest = &word[first + 1..];
+        let ends: Vec<usize> = rest
+            .match_indices(is_joint)
+            .map(|(at, _)| at)
+            .chain([rest.len()])
+            .collect();
+        if ends.len() > MOST_PARTS {
+            return false;
+        }
+        let mut begins = vec![0];
+        for &end in &ends {
+            let is_part = |&begin: &usize| begin <= end && self.is_part(&rest[begin..end]);
+            if begins.iter().any(is_part) {
+                begins.push(end + 1);
+            }
+        }
+        begins.last() == Some(&(rest.len() + 1))
+    }
+
+    /// Returns `true` for an object, a number, `start` or `end`.
+    fn is_part(&self, word: &str) -> bool {
+        matches!(word.to_ascii_lowercase().as_str(), "start" | "end")
+            || word.bytes().all(|byte| byte.is_ascii_digit())
+            || self.object(word).is_some()
     }
 }

@@ -24,7 +24,7 @@ pub(crate) fn tokens<'s>(
         let (length, token) = match first {
             '(' => (1, Some(Token::Open)),
             ')' => (1, Some(Token::Close)),
-            ';' => (rest.find('\n').unwrap_or(rest.len()), None),
+            ';' => (rest.find(['\n', '\r']).unwrap_or(rest.len()), None),
             _ if first.is_whitespace() => (first.len_utf8(), None),
             _ if is_stray(first) => {
                 let length = rest.find(|c| !is_stray(c)).unwrap_or(rest.len());
