@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_model::ground::{Action, FactId, FluentId};
+use elbowroom_model::ground::{Action, Change, FactId, FluentId};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, InstanceId, ParametrizedPlan, PartialOrderPlan, Schedule};
@@ -203,6 +203,16 @@ pub enum News {
         /// Since when it should have ended.
         since: Rational,
     },
+}
+
+impl News {
+    /// Returns the news that this change has taken place.
+    pub(crate) fn of_change(change: &Change) -> Self {
+        match change {
+            Change::Add(fact) | Change::Delete(fact) => Self::Fact(*fact),
+            Change::Update { fluent, .. } => Self::Value(*fluent),
+        }
+    }
 }
 
 /// An amount that was measured, and what the domain's expression for it reads.

@@ -95,13 +95,17 @@ impl Status {
         known.goals.iter().map(|goal| goal.name.clone()).collect()
     }
 
-    /// How things stand.
+    /// Returns the present state. Its facts and numbers are those at the present time: timed initials and
+    /// continuous effects change them also while nothing is recorded.
     pub fn state(&self) -> State {
         let (mut state, belief) = {
             let known = self.known();
             (known.state(), known.belief.clone())
         };
         if let Some(belief) = belief {
+            let mut belief = Progression::clone(&belief);
+            // Timed initials and continuous effects since the last entry; what cannot be computed keeps its value.
+            let _ = belief.advance(&state.now.0);
             // What was given up for its silence is believed to run no more.
             let runs = |ticket: u64| belief.running().contains_key(&Ticket(ticket));
             let started = self.known().started.clone();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom_model::ground::{Action, Body, Change, Expression};
+use elbowroom_model::ground::{Action, Body, Expression};
 use elbowroom_num::Rational;
 
 use super::Run;
@@ -24,6 +24,7 @@ const LONG_PAST: &str = "it had ended, and was long past";
 impl Run<'_> {
     /// Believes what is reported, as far as it can be believed, and notes what is new.
     pub(super) fn take_in(&mut self, observations: Vec<Observation>) {
+        let timed_before = self.belief.timed_past();
         for observation in observations {
             let planned = self.planned_window(&observation.event);
             let remark = self.take(&observation);
@@ -37,6 +38,7 @@ impl Run<'_> {
         // Time passes for the belief when everything that happened in it is known.
         let now = self.now.clone();
         let _ = self.belief.advance(&now);
+        self.note_timed_at_rest(timed_before);
         (self.listener)(&self.belief);
     }
 
@@ -303,10 +305,7 @@ impl Run<'_> {
             Body::Durative(body) => &body.start.effects,
         };
         for effect in effects {
-            self.news.push(match &effect.change {
-                Change::Add(fact) | Change::Delete(fact) => News::Fact(*fact),
-                Change::Update { fluent, .. } => News::Value(*fluent),
-            });
+            self.news.push(News::of_change(&effect.change));
         }
     }
 

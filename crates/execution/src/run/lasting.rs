@@ -18,7 +18,7 @@
 //! Where another run would be over, because the goals are reached, no plan reaches them, none was
 //! found, or too many were needed, a lasting one *rests* ([`Entry::Resting`]): it starts nothing
 //! and says why. What is under way goes on to its end. A request ends the rest; so does, while goals
-//! are open, any news from the world, at most once in [`BREATH`] seconds.
+//! are open, any news from the world, and each timed initial, at most once in [`BREATH`] seconds.
 
 use std::sync::Arc;
 
@@ -246,6 +246,22 @@ impl<'a> Run<'a> {
         Ok(true)
     }
 
+    /// Returns `true` if the run rests although goals are open, so that a change may make them reachable.
+    fn rests_with_open_goals(&self) -> bool {
+        let lasting = self.lasting.as_ref();
+        lasting.is_some_and(|it| it.rests_since.is_some() && !it.goals.is_empty())
+    }
+
+    /// The timed initials since the first `before` of them are news for a run that rests with open goals.
+    pub(super) fn note_timed_at_rest(&mut self, before: usize) {
+        if !self.rests_with_open_goals() {
+            return;
+        }
+        let past = self.task.timed().get(before..self.belief.timed_past());
+        let changes = past.unwrap_or_default().iter().flat_map(|it| &it.changes);
+        self.news.extend(changes.map(News::of_change));
+    }
+
     /// Since when the run rests, if it does.
     pub(super) fn rests_since(&self) -> Option<&Rational> {
         self.lasting.as_ref()?.rests_since.as_ref()
@@ -382,7 +398,9 @@ impl<'a> Run<'a> {
             let is_waiting = !lasting.is_paused && !self.news.is_empty();
             is_waiting.then(|| since + Rational::from(BREATH))
         });
-        let until = timeout.into_iter().chain(soon).min();
+        let timed = self.belief.next_timed().cloned();
+        let timed = timed.filter(|_| self.rests_with_open_goals());
+        let until = timeout.into_iter().chain(soon).chain(timed).min();
         let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
         self.agenda.push(Todo::CheckTimeouts);
         self.agenda.push(Todo::Pass(until.max(self.now.clone())));
