@@ -2,9 +2,11 @@
 //!
 //! A record is a line of a trace with eight hexadecimal digits and a space before it: the CRC-32 of
 //! the digits of the record before it (zeros before the first) and of the line. So a record that is
-//! damaged, missing or out of place is noticed.
+//! damaged, missing or out of place is noticed. The last member of each line is `recorded`, the wall-clock time
+//! at which it was written, which is not part of the trace.
 
 mod segments;
+mod wall_time;
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Seek as _, SeekFrom, Write as _};
@@ -16,6 +18,7 @@ use crate::exit::Failure;
 use crate::words::plain;
 
 pub(crate) use segments::Segments;
+pub(crate) use wall_time::{Reading, WallTime};
 
 /// The digits before a line, and the space behind them.
 const HEAD: usize = 9;
@@ -48,6 +51,8 @@ pub(crate) struct JournalFile {
 pub(crate) struct Journal {
     /// Its lines as those of a trace.
     pub(crate) text: String,
+    /// For each of its lines, the time at which it was recorded; `None` in journals of earlier versions.
+    pub(crate) recorded: Vec<Option<WallTime>>,
     /// Whether something at its end is no whole record.
     pub(crate) is_torn: bool,
     /// The length of what is whole, in bytes.
@@ -130,7 +135,8 @@ impl JournalFile {
             if self.header.is_empty() {
                 line.trim_end_matches('\n').clone_into(&mut self.header);
             }
-            let (sum, record) = record(&self.last, line);
+            let line = WallTime::now().stamped(line);
+            let (sum, record) = record(&self.last, &line);
             self.error = self.file.write_all(record.as_bytes()).err();
             self.length += record.len() as u64;
             self.last = sum;
@@ -225,6 +231,7 @@ impl Journal {
     pub(crate) fn read(text: &str) -> Result<Self, String> {
         let mut journal = Self {
             text: String::with_capacity(text.len()),
+            recorded: Vec::new(),
             is_torn: false,
             length: 0,
             last: BEGINNING.to_owned(),
@@ -239,8 +246,10 @@ impl Journal {
             match parts {
                 Some((sum, line)) if !journal.is_torn && sum == checksum(&journal.last, line) => {
                     journal.before = (journal.length, journal.last.clone(), journal.text.len());
-                    journal.text.push_str(line);
+                    let (line, recorded) = wall_time::split(line);
+                    journal.text.push_str(&line);
                     journal.text.push('\n');
+                    journal.recorded.push(recorded);
                     journal.length += record.len() as u64;
                     sum.clone_into(&mut journal.last);
                 }
@@ -263,6 +272,7 @@ impl Journal {
     pub(crate) fn without_last(mut self) -> Self {
         let (length, last, text) = self.before.clone();
         self.text.truncate(text);
+        self.recorded.pop();
         Self {
             length,
             last,

@@ -8,7 +8,7 @@ use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::{BEGINNING, JournalFile, claim, record};
+use super::{BEGINNING, JournalFile, WallTime, claim, record};
 use crate::output;
 use crate::words::plain;
 
@@ -61,8 +61,10 @@ impl JournalFile {
     }
 
     fn replace(&mut self, new: &Path, snapshot: &str, kept: usize) -> io::Result<()> {
-        let (first, header) = record(BEGINNING, &format!("{}\n", self.header));
-        let (last, snapshot) = record(&first, &format!("{snapshot}\n"));
+        let now = WallTime::now();
+        let stamped = |line: &str| now.stamped(&format!("{line}\n")).into_owned();
+        let (first, header) = record(BEGINNING, &stamped(&self.header));
+        let (last, snapshot) = record(&first, &stamped(snapshot));
         let text = header + &snapshot;
         let mut file = File::create(new)?;
         claim(new, &file).map_err(|failure| io::Error::other(failure.message().to_owned()))?;

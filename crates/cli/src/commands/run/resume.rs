@@ -5,6 +5,7 @@
 //! ends, without a word to the world; there the world itself takes over. `docs/formats/journal.md`
 //! has the rules for what was under way.
 
+mod elapsed;
 mod past;
 mod under_way;
 
@@ -36,9 +37,10 @@ use crate::clock::Clock;
 use crate::exit::{Answer, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::journal::{Journal, JournalFile, Segments};
-use crate::output::Output;
+use crate::journal::{Journal, JournalFile, Segments, WallTime};
+use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
+use elapsed::Elapsed;
 use past::{Past, PastPlanner, PastRecorder, Watch};
 use under_way::UnderWay;
 
@@ -242,6 +244,7 @@ pub(in crate::commands) fn run(
                 left: stored.lines.iter().filter(|line| is_answer(line)).count(),
                 past: Arc::clone(&past),
                 under_way: UnderWay::of(&stored, snapshot.as_ref()),
+                elapsed: Elapsed::of(&journal, &stored, snapshot.as_ref()),
                 launch: Launch {
                     command,
                     task: &task,
@@ -308,6 +311,8 @@ struct PastWorld<'a> {
     left: usize,
     past: Arc<Past>,
     under_way: UnderWay,
+    /// The time since the journal ends.
+    elapsed: Elapsed,
     launch: Launch<'a>,
     present: Option<ProcessWorld>,
     /// What it is told of what the run believes.
@@ -358,8 +363,17 @@ impl PastWorld<'_> {
         let tickets: Vec<u64> = self.under_way.open.keys().copied().collect();
         let (passage, knows) = world.recall(&tickets)?;
         if !knows {
-            // It begins with its time 0, at what is now for the run.
-            self.shift = self.last.clone();
+            // The clock of the world restarts at 0. That of the run has advanced with the wall clock, except for simulations.
+            self.shift = match self.elapsed.until(WallTime::now()) {
+                Ok(elapsed) => &self.last + elapsed - &passage.now,
+                Err(why) => {
+                    output::warn(&format!(
+                        "the run resumes at {} s, the time of the last record of its journal: {why}",
+                        self.last.to_decimal(3)
+                    ));
+                    self.last.clone()
+                }
+            };
         }
         self.last = (&passage.now + &self.shift).max(self.last.clone());
         let mut news = shifted(passage.observations, &self.shift);
