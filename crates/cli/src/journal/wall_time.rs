@@ -1,4 +1,4 @@
-//! Wall-clock times of the records of a journal, from which a resumed run computes how much time has passed.
+//! Wall-clock times of journal records. A resumed run computes the elapsed time from them.
 
 use std::borrow::Cow;
 use std::time::UNIX_EPOCH;

@@ -363,7 +363,7 @@ impl PastWorld<'_> {
         let tickets: Vec<u64> = self.under_way.open.keys().copied().collect();
         let (passage, knows) = world.recall(&tickets)?;
         if !knows {
-            // Its time begins anew; that of the run has passed with the wall clock, unless the world is a simulation.
+            // The clock of the world restarts at 0. That of the run has advanced with the wall clock, except for simulations.
             self.shift = match self.elapsed.until(WallTime::now()) {
                 Ok(elapsed) => &self.last + elapsed - &passage.now,
                 Err(why) => {

@@ -79,7 +79,9 @@ impl Value {
 
     pub(super) fn worth(&self) -> PlanWorth {
         match self {
-            Self::Slack(slack) => PlanWorth::Slack { slack: slack.clone() },
+            Self::Slack(slack) => PlanWorth::Slack {
+                slack: slack.clone(),
+            },
             Self::Unknown(why) => PlanWorth::Unknown { why: why.clone() },
             Self::Samples(results) => {
                 let mut share = Proportion::default();
