@@ -80,6 +80,8 @@ pub(super) struct Lasting<'a> {
     plan: Option<TimeTriggeredPlan>,
     /// Since when the run rests.
     rests_since: Option<Rational>,
+    /// It is proved that no plan reaches the goals from there, whatever timed initials are to come.
+    is_unsolvable: bool,
     at_rest: AtRest,
 }
 
@@ -121,6 +123,7 @@ impl<'a> Run<'a> {
             change: None,
             plan: None,
             rests_since: None,
+            is_unsolvable: false,
             at_rest: AtRest::Waits,
         });
         self
@@ -246,15 +249,16 @@ impl<'a> Run<'a> {
         Ok(true)
     }
 
-    /// Returns `true` if the run rests although goals are open, so that a change may make them reachable.
-    fn rests_with_open_goals(&self) -> bool {
+    /// Returns `true` if the run rests although goals are open, and a timed initial may make them reachable.
+    fn awaits_timed_initials(&self) -> bool {
         let lasting = self.lasting.as_ref();
-        lasting.is_some_and(|it| it.rests_since.is_some() && !it.goals.is_empty())
+        lasting
+            .is_some_and(|it| it.rests_since.is_some() && !it.goals.is_empty() && !it.is_unsolvable)
     }
 
-    /// The timed initials since the first `before` of them are news for a run that rests with open goals.
+    /// Records the timed initials after the first `before` of them as news, if they may make open goals reachable.
     pub(super) fn note_timed_at_rest(&mut self, before: usize) {
-        if !self.rests_with_open_goals() {
+        if !self.awaits_timed_initials() {
             return;
         }
         let past = self.task.timed().get(before..self.belief.timed_past());
@@ -262,15 +266,17 @@ impl<'a> Run<'a> {
         self.news.extend(changes.map(News::of_change));
     }
 
-    /// Since when the run rests, if it does.
-    pub(super) fn rests_since(&self) -> Option<&Rational> {
-        self.lasting.as_ref()?.rests_since.as_ref()
+    /// Since when the run rests, if it does, and `true` if no plan reaches the open goals from there.
+    pub(super) fn rests_since(&self) -> Option<(&Rational, bool)> {
+        let lasting = self.lasting.as_ref()?;
+        Some((lasting.rests_since.as_ref()?, lasting.is_unsolvable))
     }
 
-    /// Rests since then.
-    pub(super) fn rest_since(&mut self, since: Rational) {
+    /// Rests since then; `is_unsolvable` if no plan reaches the open goals from there.
+    pub(super) fn rest_since(&mut self, since: Rational, is_unsolvable: bool) {
         if let Some(lasting) = &mut self.lasting {
             lasting.rests_since = Some(since);
+            lasting.is_unsolvable = is_unsolvable;
         }
     }
 
@@ -399,7 +405,7 @@ impl<'a> Run<'a> {
             is_waiting.then(|| since + Rational::from(BREATH))
         });
         let timed = self.belief.next_timed().cloned();
-        let timed = timed.filter(|_| self.rests_with_open_goals());
+        let timed = timed.filter(|_| self.awaits_timed_initials());
         let until = timeout.into_iter().chain(soon).chain(timed).min();
         let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
         self.agenda.push(Todo::CheckTimeouts);
@@ -444,6 +450,7 @@ impl<'a> Run<'a> {
             return;
         };
         lasting.rests_since = Some(self.now.clone());
+        lasting.is_unsolvable = verdict == Some(&Verdict::Unsolvable);
         let goals: Vec<String> = lasting.goals.iter().map(|it| it.name.clone()).collect();
         let is_reached = verdict == Some(&Verdict::GoalReached);
         if is_reached {

@@ -52,8 +52,13 @@ pub struct Stand {
 /// What a run does where its record can begin anew.
 #[derive(Clone, Debug)]
 pub enum Doing {
-    /// It rests, since then.
-    Rests(Rational),
+    /// It rests.
+    Rests {
+        /// Since then.
+        since: Rational,
+        /// `true` if it is proved that no plan reaches the open goals from there.
+        is_unsolvable: bool,
+    },
     /// It takes up a plan.
     TakesUp(Box<TakesUp>),
 }
@@ -139,7 +144,7 @@ impl Run<'_> {
 
     /// The run rests: forgets what was before, and has the recorder begin anew if it wants to.
     pub(super) fn begin_anew_at_rest(&mut self) {
-        let Some(since) = self.idle_since() else {
+        let Some((since, is_unsolvable)) = self.idle_since() else {
             return;
         };
         if self.has_no_goals() {
@@ -151,7 +156,10 @@ impl Run<'_> {
         }
         self.foreseen = None;
         self.steps = 0;
-        self.ask_to_begin_anew(&|| Doing::Rests(since.clone()));
+        self.ask_to_begin_anew(&|| Doing::Rests {
+            since: since.clone(),
+            is_unsolvable,
+        });
     }
 
     /// Has the recorder begin anew if it wants to. The report, and explanations, have what the record
@@ -182,7 +190,7 @@ impl Run<'_> {
     }
 
     /// Since when the run rests, if nothing is under way, or to be done.
-    fn idle_since(&self) -> Option<Rational> {
+    fn idle_since(&self) -> Option<(Rational, bool)> {
         let is_idle = self.goes_on_after(&Verdict::GoalReached)
             && self.search.is_none()
             && !self.is_to_turn()
@@ -191,7 +199,8 @@ impl Run<'_> {
             && self.belief.running().is_empty()
             && self.agenda.is_empty()
             && *self.belief.time() == self.now;
-        self.rests_since().filter(|_| is_idle).cloned()
+        let (since, is_unsolvable) = self.rests_since().filter(|_| is_idle)?;
+        Some((since.clone(), is_unsolvable))
     }
 
     /// The same run, where another one has been; to be called once the run is
@@ -215,7 +224,10 @@ impl Run<'_> {
         self.replans = stand.replans;
         self.refusals = stand.refusals;
         match stand.doing {
-            Doing::Rests(since) => self.rest_since(since),
+            Doing::Rests {
+                since,
+                is_unsolvable,
+            } => self.rest_since(since, is_unsolvable),
             Doing::TakesUp(takes_up) => {
                 let task = self.task_of(&problem, &takes_up.goals);
                 self.turn_again(takes_up.turn.clone());

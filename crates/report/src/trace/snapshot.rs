@@ -29,6 +29,9 @@ pub struct SnapshotLine {
     /// Since when the run rests, if it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub since: Option<Exact>,
+    /// `true` if it rests because no plan reaches the open goals from there.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub unsolvable: bool,
     /// How many actions were started.
     pub started: usize,
     /// How long making a plan is expected to take.
@@ -123,13 +126,20 @@ impl SnapshotLine {
     pub fn of(task: &Task, stand: &Stand) -> Option<Self> {
         let parts = stand.belief.parts();
         let plan = match &stand.doing {
-            Doing::Rests(_) => None,
+            Doing::Rests { .. } => None,
             Doing::TakesUp(it) => Some(TakenUpLine::of(task, it, &stand.starts)?),
         };
         let since = match &stand.doing {
-            Doing::Rests(since) => Some(Exact(since.clone())),
+            Doing::Rests { since, .. } => Some(Exact(since.clone())),
             Doing::TakesUp(_) => None,
         };
+        let unsolvable = matches!(
+            stand.doing,
+            Doing::Rests {
+                is_unsolvable: true,
+                ..
+            }
+        );
         let facts = (0..task.fact_count()).map(|index| {
             let truth = parts.facts.get(index).copied().unwrap_or(false);
             (task.fact_name(FactId(narrow(index))), truth)
@@ -148,6 +158,7 @@ impl SnapshotLine {
         Some(Self {
             now: Exact(parts.time.clone()),
             since,
+            unsolvable,
             started: stand.started,
             allowance: Exact(stand.allowance.clone()),
             answers: stand.answers.1,
@@ -227,7 +238,10 @@ impl SnapshotLine {
         };
         let doing = match (&self.plan, &self.since) {
             (Some(plan), _) => Doing::TakesUp(Box::new(plan.takes_up(task, &starts)?)),
-            (None, Some(since)) => Doing::Rests(since.0.clone()),
+            (None, Some(since)) => Doing::Rests {
+                since: since.0.clone(),
+                is_unsolvable: self.unsolvable,
+            },
             (None, None) => {
                 return Err("it says neither a plan nor since when there is none".to_owned());
             }

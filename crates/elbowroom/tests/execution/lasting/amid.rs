@@ -116,7 +116,7 @@ impl Recorder for Rotating {
 
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
         // It is asked all the time as long as it rests.
-        let is_at_rest = matches!(stand().doing, Doing::Rests(_));
+        let is_at_rest = matches!(stand().doing, Doing::Rests { .. });
         if self.dice.below(100) >= self.percent || (is_at_rest && self.dice.below(6) > 0) {
             return false;
         }

@@ -29,7 +29,7 @@ impl Recorder for Tape<'_> {
 
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
         let stand = stand();
-        if !matches!(stand.doing, Doing::Rests(_)) || !stand.goals.open.is_empty() {
+        if !matches!(stand.doing, Doing::Rests { .. }) || !stand.goals.open.is_empty() {
             return false;
         }
         let line = SnapshotLine::of(&self.task, &stand).expect("it rests");
@@ -207,7 +207,7 @@ fn a_snapshot_of_the_earlier_form_is_gone_on_from() {
     let task = day();
     let line = stored.snapshot().expect("of the form").expect("there");
     let stand = line.stand(&task).expect("of this task");
-    assert!(matches!(stand.doing, Doing::Rests(_)) && stand.goals.open.is_empty());
+    assert!(matches!(stand.doing, Doing::Rests { .. }) && stand.goals.open.is_empty());
     assert!(stand.starts.is_empty() && stand.started > 0 && !stand.is_paused);
     let (now, first) = (stand.belief.time().clone(), stand.started as u64);
     let is_to_end = Arc::new(AtomicBool::new(false));

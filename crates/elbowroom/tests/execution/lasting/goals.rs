@@ -1,12 +1,15 @@
 //! Goals that come and go.
 
-use elbowroom::execute::{Execution, read_goal};
+use elbowroom::execute::{Embedded, Execution, read_goal};
 use elbowroom::execution::run::Verdict;
-use elbowroom::execution::{Ending, Event, Observation, Request};
+use elbowroom::execution::{
+    Ending, Event, Observation, PlanAnswer, Planner, PlannerAnswer, Request,
+};
+use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 use std::sync::{Arc, PoisonError};
 
-use super::scripted::{Notes, Scripted, abandon, assert_has, has, pursue, run, task};
+use super::scripted::{Notes, Scripted, abandon, assert_has, has, pursue, run, scripted, task};
 
 #[test]
 fn a_goal_is_reached_and_the_run_waits_for_the_next_one() {
@@ -174,5 +177,43 @@ fn a_goal_is_read_as_in_a_problem_and_mistakes_are_named() {
         let told = read_goal(&task, goal).expect_err(goal);
         assert!(told.contains(why), "{goal}: {told}");
         assert!(!told.contains('\n'), "{told}");
+    }
+}
+
+/// Answers this until the power is back, and plans then.
+struct Powered(PlanAnswer);
+
+impl Planner for Powered {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        let answer = Embedded::default().plan(task, situation);
+        let is_powered = situation.time >= Rational::from(30);
+        PlannerAnswer {
+            seconds: None,
+            answer: if is_powered {
+                answer.answer
+            } else {
+                self.0.clone()
+            },
+            ..answer
+        }
+    }
+}
+
+#[test]
+fn timed_initial_ends_a_rest_unless_no_plan_exists() {
+    let task = task("(at 1 (not (power))) (at 30 (power))", "(have book)");
+    let not_found = PlanAnswer::NotFound {
+        why: "the budget is used up".to_owned(),
+    };
+    for (answer, is_reached) in [(not_found, true), (PlanAnswer::Unsolvable, false)] {
+        let script: Vec<(i64, Event)> = Vec::new();
+        let planner = Powered(answer.clone());
+        let told = scripted(&task, 100, script, |execution| {
+            execution.planned_by(planner).lasting(true)
+        });
+        let reached = has(&told, "rest: goal-reached problem");
+        assert_eq!(reached, is_reached, "{answer:?}: {:#?}", told.notes);
+        let is_started = has(&told, "start (fetch r book)");
+        assert_eq!(is_started, is_reached, "{answer:?}: {:#?}", told.notes);
     }
 }
