@@ -1,4 +1,4 @@
-//! Plans that are chosen for their odds, or for their room, among many.
+//! Plans that are chosen for their probability, or for their slack, among many.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 use std::collections::BTreeSet;
@@ -406,14 +406,14 @@ fn choice(outcome: &PlanOutcome) -> &PlanChoice {
 }
 
 #[test]
-fn where_the_shortest_plan_has_no_room_a_longer_one_is_chosen() {
+fn where_the_shortest_plan_has_no_slack_a_longer_one_is_chosen() {
     let task = task("cases/crossing");
-    let outcome = best(&task, PlanAim::Room, &mut Unwatched);
+    let outcome = best(&task, PlanAim::Slack, &mut Unwatched);
     let choice = choice(&outcome);
     // As worked by hand in the problem.
-    let room = |room: Rational| PlanWorth::Room { room };
-    assert_eq!(choice.value, room(Rational::new(2999, 7000)));
-    assert_eq!(choice.shortest, room(Rational::ZERO));
+    let worth = |slack: Rational| PlanWorth::Slack { slack };
+    assert_eq!(choice.value, worth(Rational::new(2999, 7000)));
+    assert_eq!(choice.shortest, worth(Rational::ZERO));
     let plan = outcome.plan.as_ref().unwrap();
     assert_eq!(starts(plan), ["(go-round)", "(hand-over)"]);
     assert!(validate(&task, plan, &Settings::default()).is_valid());
@@ -429,7 +429,7 @@ fn no_plan_is_worse_than_the_shortest_and_none_is_claimed_to_be_more_when_it_is_
     for name in ["crossing", "delivery", "battery", "errand", "match", "tank"] {
         let task = task(&format!("cases/{name}"));
         for patience in [40, 400, usize::MAX] {
-            let outcome = best(&task, PlanAim::Room, &mut Impatient(patience));
+            let outcome = best(&task, PlanAim::Slack, &mut Impatient(patience));
             let Some(plan) = &outcome.plan else {
                 assert_eq!(outcome.answer.stop, PlanStop::Cancelled, "{name}");
                 continue;
@@ -437,11 +437,13 @@ fn no_plan_is_worse_than_the_shortest_and_none_is_claimed_to_be_more_when_it_is_
             assert!(validate(&task, plan, &Settings::default()).is_valid());
             let choice = choice(&outcome);
             match (&choice.value, &choice.shortest) {
-                (PlanWorth::Room { room }, PlanWorth::Room { room: shortest }) => {
-                    assert!(room >= shortest, "{name}: {choice:?}");
+                (PlanWorth::Slack { slack }, PlanWorth::Slack { slack: shortest }) => {
+                    assert!(slack >= shortest, "{name}: {choice:?}");
                 }
-                (PlanWorth::Room { .. } | PlanWorth::Unknown { .. }, PlanWorth::Unknown { .. }) => {
-                }
+                (
+                    PlanWorth::Slack { .. } | PlanWorth::Unknown { .. },
+                    PlanWorth::Unknown { .. },
+                ) => {}
                 _ => panic!("{name}: {choice:?}"),
             }
         }

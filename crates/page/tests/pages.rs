@@ -303,6 +303,7 @@ fn a_journal_that_begins_anew_has_a_page_with_the_starts_from_before() {
     let snapshot = SnapshotLine {
         now: exact(100),
         since: None,
+        unsolvable: false,
         started: 9,
         allowance: exact(1),
         answers: 0,

@@ -327,3 +327,43 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
     assert_eq!(tickets.len(), begun.len(), "begun twice: {begun:#?}");
     fs::remove_dir_all(&place).expect("the folder is there");
 }
+
+/// Returns the records of a journal in which the world tells its time.
+fn passed(journal: &str) -> Vec<Value> {
+    let text = fs::read_to_string(journal).expect("a journal");
+    let lines = text.lines().filter_map(|line| line.split_once(' '));
+    let lines = lines.filter_map(|(_, line)| serde_json::from_str(line).ok());
+    lines
+        .filter(|line: &Value| line["event"] == "passed")
+        .collect()
+}
+
+/// The time while no executive is there counts also, for a world on the real clock that has forgotten it.
+#[test]
+fn time_passes_between_kill_and_resume() {
+    if !python_is_there() {
+        return;
+    }
+    let pause = std::time::Duration::from_secs(3);
+    let place = folder("time-between");
+    let journal = place.join("journal").display().to_string();
+    let robot = "python3 crates/cli/tests/files/forgetful.py";
+    let line = ["--world-process", robot, "--journal", &journal];
+    let line = [&[super::DOMAIN, super::PROBLEM], &line[..]].concat();
+    let mut own = Executive::start(&place, &line);
+    own.await_state(|state| state["activity"] == "executing");
+    own.kill();
+    std::thread::sleep(pause);
+    let mut again = Executive::start(&place, &["--resume", &journal]);
+    again.await_state(|state| super::exact(&state["now"]) >= pause.as_secs_f64());
+    again.post("/v1/stop", &Value::Null);
+    assert_eq!(again.end().status.code(), Some(0));
+    let lines = passed(&journal);
+    let times = lines.iter().map(|line| super::exact(&line["now"]));
+    let times: Vec<f64> = times.collect();
+    let is_gap = |pair: &[f64]| pair[1] - pair[0] >= pause.as_secs_f64();
+    assert!(times.windows(2).any(is_gap), "{times:?}");
+    let replayed = command::elbowroom(&["run", "--replay", &journal]);
+    assert_eq!(replayed.status.code(), Some(0), "{replayed:?}");
+    fs::remove_dir_all(&place).expect("the folder is there");
+}
