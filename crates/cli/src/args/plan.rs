@@ -29,9 +29,9 @@ pub(crate) struct PlanArgs {
     /// Return the first plan, even with a time limit
     #[arg(long)]
     pub(crate) first: bool,
-    /// What the plan is to be the best by, instead of metric and makespan: `slack`, the share by
-    /// which all its durations may deviate (docs/chosen-plans.md), or `probability`, how often it
-    /// works in samples of --world. Without a time limit, a fixed number of plans is compared
+    /// Compare plans by this in place of metric and makespan: `slack`, the deviation that all durations
+    /// may have at the same time, in relation to their nominal values (docs/chosen-plans.md), or
+    /// `probability`, the share of --world samples with success. Without a time limit, a fixed number of plans is compared
     #[arg(long, value_enum, conflicts_with = "first")]
     pub(crate) objective: Option<PlanObjectiveChoice>,
     /// The world file (docs/formats/world.md) for --objective probability
@@ -70,7 +70,7 @@ pub(crate) struct PlanArgs {
 /// What plans can be made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PlanObjectiveChoice {
-    /// The least share by which its durations may deviate
+    /// The relative deviation that all its durations may have
     #[value(alias = "room")]
     Slack,
     /// How often it works in a world

@@ -328,7 +328,7 @@ fn a_journal_that_was_about_to_begin_anew_is_gone_on_with() {
     fs::remove_dir_all(&place).expect("the folder is there");
 }
 
-/// Returns the records of a journal in which the world tells its time.
+/// Returns the records of a journal that hold a time of the world.
 fn passed(journal: &str) -> Vec<Value> {
     let text = fs::read_to_string(journal).expect("a journal");
     let lines = text.lines().filter_map(|line| line.split_once(' '));

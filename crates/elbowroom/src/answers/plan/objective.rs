@@ -24,8 +24,8 @@ use worth::{Judge, Judged};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PlanObjective {
-    /// Of much slack: the least share of its nominal value by which any duration may deviate, all at
-    /// the same time, in the plan's best box ([`elbowroom_envelope::Objective::LeastSlack`]), as large as can be.
+    /// Great slack: the relative deviation from its nominal value that each duration may have, all at the same
+    /// time, in the plan's best box ([`elbowroom_envelope::Objective::LeastSlack`]).
     /// Documents in JSON call it `room`.
     #[serde(rename = "room", alias = "slack")]
     Slack,
