@@ -11,6 +11,15 @@ const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
 /// How long clients have to fetch the end of the run.
 const FAREWELL: Duration = Duration::from_secs(2);
 
+/// How often a client that waits for news is looked after.
+const GLANCE: Duration = Duration::from_millis(250);
+
+/// A client that is told what is new.
+pub(crate) trait Client: Write {
+    /// Returns `true` if it is not there any more.
+    fn has_left(&mut self) -> bool;
+}
+
 /// The name of the trace on its page.
 pub(crate) const NAME: &str = "the run";
 
@@ -186,7 +195,7 @@ impl Board {
     }
 
     /// Tells a client of every change, until the run is over or the client has gone.
-    pub(crate) fn tell_changes(&self, client: &mut dyn Write) -> io::Result<()> {
+    pub(crate) fn tell_changes(&self, client: &mut dyn Client) -> io::Result<()> {
         self.listened(|| self.tell_all_changes(client))
     }
 
@@ -195,7 +204,7 @@ impl Board {
     pub(crate) fn tell_lines(
         &self,
         after: Option<usize>,
-        client: &mut dyn Write,
+        client: &mut dyn Client,
     ) -> io::Result<()> {
         self.listened(|| self.tell_all_lines(after, client))
     }
@@ -209,19 +218,36 @@ impl Board {
     }
 
     /// Waits until there are more than `told` lines, or none will come, or for a while.
-    fn await_lines(&self, told: usize) -> MutexGuard<'_, State> {
-        let state = self.lock();
+    ///
+    /// # Errors
+    /// When the client has left.
+    fn await_lines(
+        &self,
+        told: usize,
+        client: &mut dyn Client,
+    ) -> io::Result<MutexGuard<'_, State>> {
         let waits = |state: &mut State| state.lines() <= told && !state.is_over;
-        let changed = &self.0.changed;
-        let waited = changed.wait_timeout_while(state, SIGN_OF_LIFE, waits);
-        waited.unwrap_or_else(PoisonError::into_inner).0
+        let mut waited = Duration::ZERO;
+        loop {
+            let changed = &self.0.changed;
+            let state = changed.wait_timeout_while(self.lock(), GLANCE, waits);
+            let (state, timeout) = state.unwrap_or_else(PoisonError::into_inner);
+            waited += GLANCE;
+            if !timeout.timed_out() || waited >= SIGN_OF_LIFE {
+                return Ok(state);
+            }
+            drop(state);
+            if client.has_left() {
+                return Err(io::ErrorKind::ConnectionAborted.into());
+            }
+        }
     }
 
-    fn tell_all_changes(&self, client: &mut dyn Write) -> io::Result<()> {
+    fn tell_all_changes(&self, client: &mut dyn Client) -> io::Result<()> {
         let mut told = 0;
         loop {
             let (lines, is_over) = {
-                let state = self.await_lines(told);
+                let state = self.await_lines(told, client)?;
                 (state.lines(), state.is_over)
             };
             if is_over {
@@ -239,11 +265,11 @@ impl Board {
         }
     }
 
-    fn tell_all_lines(&self, after: Option<usize>, client: &mut dyn Write) -> io::Result<()> {
+    fn tell_all_lines(&self, after: Option<usize>, client: &mut dyn Client) -> io::Result<()> {
         let mut told = after.unwrap_or_else(|| self.lock().lines());
         loop {
             let (news, missed, lines, is_over) = {
-                let state = self.await_lines(told);
+                let state = self.await_lines(told, client)?;
                 told = told.min(state.lines());
                 let (news, missed) = state.behind(told);
                 (news, missed, state.lines(), state.is_over)
@@ -271,7 +297,13 @@ impl Board {
 
 #[cfg(test)]
 mod tests {
-    use super::Board;
+    use super::{Board, Client};
+
+    impl Client for Vec<u8> {
+        fn has_left(&mut self) -> bool {
+            false
+        }
+    }
 
     /// Lines of which every fifth is where a plan is asked for.
     fn line(number: usize) -> String {

@@ -1,13 +1,13 @@
 //! As much of HTTP/1.1 as an executive and its client need, over TCP and Unix sockets: one request
 //! a connection, bodies of a known length, and limits on everything.
 
+mod admission;
 mod client;
 mod stream;
 
 use std::collections::BTreeMap;
 use std::io::{self, Read as _, Write as _};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -15,9 +15,7 @@ pub(crate) use client::{Answer, Target, ask};
 pub(crate) use stream::{Listener, Stream};
 
 use crate::clock::Clock;
-
-/// The limit on clients that are served at once; others are asked to come back.
-const MOST_CLIENTS: usize = 64;
+use admission::Admission;
 
 /// How long a client has to say what it wants.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -30,6 +28,9 @@ const LONGEST_HEAD: usize = 16 << 10;
 
 /// The limit on a body, in bytes.
 pub(crate) const LONGEST_BODY: usize = 4 << 20;
+
+/// Headers that differ in meaning from one reader to the next if they are there twice.
+const SINGLE: [&str; 4] = ["host", "content-length", "authorization", "origin"];
 
 /// What a client wants.
 #[derive(Debug, Default)]
@@ -53,16 +54,18 @@ impl Request {
 /// Why a client is not understood: a status and a sentence.
 pub(crate) struct Misunderstood(pub(crate) u16, pub(crate) &'static str);
 
-/// Serves clients, each in a thread of its own, until the program ends.
+/// Serves clients, each in a thread of its own, until the program ends. `is_known` is `true` for requests with the
+/// token, for which there is always room.
 pub(crate) fn serve(
     listener: Listener,
-    clients: &Arc<AtomicUsize>,
+    is_known: impl Fn(&Request) -> bool + Send + Sync + 'static,
     handler: impl Fn(Result<Request, Misunderstood>, &mut Stream) -> io::Result<()>
     + Send
     + Sync
     + 'static,
 ) {
-    let (clients, handler) = (Arc::clone(clients), Arc::new(handler));
+    let (admission, is_known, handler) =
+        (Admission::default(), Arc::new(is_known), Arc::new(handler));
     thread::spawn(move || {
         loop {
             let Ok(mut stream) = listener.accept() else {
@@ -70,28 +73,49 @@ pub(crate) fn serve(
                 thread::sleep(Duration::from_millis(50));
                 continue;
             };
-            let (clients, handler) = (Arc::clone(&clients), Arc::clone(&handler));
-            let is_too_many = clients.fetch_add(1, Ordering::SeqCst) >= MOST_CLIENTS;
-            let served = thread::Builder::new().spawn({
-                let clients = Arc::clone(&clients);
-                move || {
-                    let _ = stream.set_write_timeout(READING_TIME);
-                    let request = if is_too_many {
-                        Err(Misunderstood(503, "too many clients; come back later"))
-                    } else {
-                        read(&mut stream)
-                    };
-                    // A client that has gone away needs no answer.
-                    let _ = handler(request, &mut stream);
-                    stream.close();
-                    clients.fetch_sub(1, Ordering::SeqCst);
-                }
+            let (admission, is_known) = (admission.clone(), Arc::clone(&is_known));
+            let handler = Arc::clone(&handler);
+            // Where there can be no thread, the client is left.
+            let _ = thread::Builder::new().spawn(move || {
+                let _ = stream.set_write_timeout(READING_TIME);
+                let reading = admission.read(&stream);
+                let request = read(&mut stream);
+                drop(reading);
+                let admitted = request.and_then(|request| {
+                    refuse_foreign(&request)?;
+                    let served = admission.serve(&request, stream.peer(), is_known(&request));
+                    served.map(|served| (request, served))
+                });
+                // A client that has gone away needs no answer.
+                let _ = match admitted {
+                    Ok((request, _served)) => handler(Ok(request), &mut stream),
+                    Err(why) => handler(Err(why), &mut stream),
+                };
+                stream.close();
             });
-            if served.is_err() {
-                clients.fetch_sub(1, Ordering::SeqCst);
-            }
         }
     });
+}
+
+/// Refuses requests that a browser sends for a page of somebody else, and those for another protocol.
+fn refuse_foreign(request: &Request) -> Result<(), Misunderstood> {
+    if request.header("upgrade").is_some() {
+        return Err(Misunderstood(400, "this is HTTP/1.1 and nothing else"));
+    }
+    let host = request.header("host").unwrap_or_default();
+    let is_own = |origin: &str| {
+        let own = origin.strip_prefix("http://");
+        let own = own.or_else(|| origin.strip_prefix("https://"));
+        own.is_some_and(|own| own.eq_ignore_ascii_case(host))
+    };
+    let is_foreign = !request.header("origin").is_none_or(is_own);
+    let site = request.header("sec-fetch-site");
+    let is_elsewhere = matches!(site, Some("cross-site" | "same-site"));
+    let is_visit = request.header("sec-fetch-mode") == Some("navigate") && request.verb == "GET";
+    if is_foreign || is_elsewhere && !is_visit {
+        return Err(Misunderstood(403, "a page from elsewhere may not ask this"));
+    }
+    Ok(())
 }
 
 const CUT_OFF: Misunderstood = Misunderstood(400, "the request ends in the middle");
@@ -179,7 +203,13 @@ fn head_of(head: &str) -> Result<Request, Misunderstood> {
     for line in lines.filter(|line| !line.is_empty()) {
         let (name, value) = line.split_once(':').ok_or_else(nonsense)?;
         let (name, value) = (name.to_ascii_lowercase(), value.trim().to_owned());
-        request.headers.insert(name, value);
+        let is_single = SINGLE.contains(&name.as_str());
+        if request.headers.insert(name, value).is_some() && is_single {
+            return Err(Misunderstood(
+                400,
+                "a header that may be there once is there twice",
+            ));
+        }
     }
     Ok(request)
 }

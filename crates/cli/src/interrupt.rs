@@ -2,18 +2,32 @@
 //! order.
 
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use elbowroom::num::work::Stop;
 
+use crate::clock::Clock;
 use crate::exit::Exit;
+
+/// A second signal within this time of the first is the same request: `timeout` sends two, to the program and to its
+/// group.
+const SAME_REQUEST: Duration = Duration::from_millis(300);
+
+/// The limit on the time in which actions are cancelled and the world is stopped, during which a second signal does
+/// nothing.
+const IN_ORDER: Duration = Duration::from_secs(5);
+
+/// `true` if actions are to be cancelled, and a world is to be stopped, before the program ends.
+static HAS_WORLD: AtomicBool = AtomicBool::new(false);
 
 /// A request of the user to stop.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Interrupt(Stop);
 
 impl Interrupt {
-    /// From now on, the first Ctrl-C (SIGINT, SIGTERM or SIGHUP) asks to stop, and the second ends
-    /// the program. A process has one handler of signals, so this is the same flag whenever it is
+    /// From now on, the first Ctrl-C (SIGINT, SIGTERM or SIGHUP) asks to stop, and a later one ends
+    /// the program: see [`is_to_end`]. A process has one handler of signals, so this is the same flag whenever it is
     /// asked for. Computations of this thread end early as well.
     pub(crate) fn listen() -> Self {
         static LISTENED: OnceLock<Interrupt> = OnceLock::new();
@@ -21,8 +35,11 @@ impl Interrupt {
             let interrupt = Self::default();
             let flag = interrupt.clone();
             // Where no handler can be installed, Ctrl-C ends the program, as it does anyway.
+            let (mut count, mut first) = (0, None);
             let _ = ctrlc::set_handler(move || {
-                if flag.is_requested() {
+                count += 1;
+                let since = first.get_or_insert_with(Clock::start).elapsed();
+                if is_to_end(count, since, HAS_WORLD.load(Ordering::SeqCst)) {
                     std::process::exit(Exit::Interrupted as i32);
                 }
                 flag.request();
@@ -31,6 +48,12 @@ impl Interrupt {
         });
         listened.0.obey();
         listened.clone()
+    }
+
+    /// The same, for a command that has to cancel actions and to stop a world before it ends.
+    pub(crate) fn listen_with_world() -> Self {
+        HAS_WORLD.store(true, Ordering::SeqCst);
+        Self::listen()
     }
 
     /// Asks to stop, as the first Ctrl-C does.
@@ -44,11 +67,40 @@ impl Interrupt {
     }
 }
 
+/// Returns `true` if the signal with this number ends the program at once, so long after the first one: the third always
+/// does, the second unless it is the same request, or a world is being stopped.
+fn is_to_end(number: u32, since_first: Duration, has_world: bool) -> bool {
+    let patience = if has_world { IN_ORDER } else { SAME_REQUEST };
+    match number {
+        0 | 1 => false,
+        2 => since_first >= patience,
+        _ => true,
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use elbowroom::num::work::Stop;
 
-    use super::Interrupt;
+    use super::{Interrupt, is_to_end};
+
+    #[test]
+    fn second_signal_waits_for_the_world_and_third_never_does() {
+        let after = Duration::from_millis;
+        for (milliseconds, has_world, expected) in [
+            (1, false, false),
+            (400, false, true),
+            (400, true, false),
+            (5001, true, true),
+        ] {
+            let told = is_to_end(2, after(milliseconds), has_world);
+            assert_eq!(told, expected, "{milliseconds}, {has_world}");
+            assert!(!is_to_end(1, after(milliseconds), has_world));
+            assert!(is_to_end(3, after(milliseconds), has_world));
+        }
+    }
 
     #[test]
     fn whoever_listens_again_hears_the_same() {

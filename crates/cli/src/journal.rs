@@ -62,13 +62,21 @@ pub(crate) struct Journal {
     before: (u64, String, usize),
 }
 
+/// Options with which files are created for their owner alone: a journal holds all that is known of the robots.
+fn for_owner() -> OpenOptions {
+    let mut options = OpenOptions::new();
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options
+}
+
 impl JournalFile {
     /// An empty journal. One that has something in it is not overwritten; `resume` is the command that
     /// goes on with it.
     pub(crate) fn create(path: &Path, resume: &str) -> Result<Self, Failure> {
         let name = path.display();
         let open = || {
-            let mut options = OpenOptions::new();
+            let mut options = for_owner();
             options.write(true).create(true).truncate(false).open(path)
         };
         let file = open().map_err(|error| cannot_write(path, &error))?;

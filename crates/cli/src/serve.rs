@@ -4,25 +4,20 @@
 //! by threads of the server, each of which serves one client.
 
 use std::fmt;
-use std::io::{self, Read as _, Write};
-use std::net::{IpAddr, SocketAddr, ToSocketAddrs as _};
+use std::io::{self, Read as _};
+use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs as _};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
 use elbowroom::execution::run::FIRST_GOAL;
-use tiny_http::{Header, Method, Request, Response, Server};
 
 pub(crate) use crate::board::{Board, NAME};
 use crate::desk::{Ask, Desk};
 use crate::exit::Failure;
+use crate::http::{self, Listener, Misunderstood, Request, Stream, respond, respond_with_events};
 use crate::interrupt::Interrupt;
 use crate::output;
 use crate::words::plain;
-
-/// The limit on clients that are served at once; others are asked to come back.
-const MOST_CLIENTS: usize = 64;
 
 /// The least length of a token, in bytes.
 const LEAST_TOKEN: usize = 16;
@@ -60,11 +55,8 @@ impl Control {
     }
 
     fn allows(&self, request: &Request) -> bool {
-        let headers = request.headers().iter();
-        let mut given = headers.filter(|header| header.field.equiv("Authorization"));
-        given
-            .next()
-            .is_some_and(|header| self.is_known_to(header.value.as_str()))
+        let given = request.header("authorization");
+        given.is_some_and(|given| self.is_known_to(given))
     }
 
     /// Whether this is the header of somebody who knows the token. Compares all bytes, so that the
@@ -137,107 +129,94 @@ pub(crate) fn start(
             "choose another port; with port 0, a free one is taken",
         )
     };
-    let server = Server::http(address.0).map_err(|error| failure(&error))?;
-    let own = server.server_addr().to_ip().unwrap_or(address.0);
+    let listener = TcpListener::bind(address.0).map_err(|error| failure(&plain(&error)))?;
+    let own = listener.local_addr().unwrap_or(address.0);
     let with_token = if control.is_some() {
         "; with #token=TOKEN at its end, the run can be paused, cancelled and stopped there"
     } else {
         ""
     };
     output::tell(&format!("the run is shown at http://{own}/{with_token}"));
-    let doorman = Arc::new(Doorman {
-        clients: AtomicUsize::new(0),
+    let shown = Arc::new(Shown {
         board,
         control,
         desk,
         own,
     });
-    thread::spawn(move || {
-        for request in server.incoming_requests() {
-            Arc::clone(&doorman).admit(request);
-        }
+    let known = Arc::clone(&shown);
+    let is_known = move |request: &Request| {
+        let control = known.control.as_ref();
+        control.is_some_and(|control| control.allows(request))
+    };
+    http::serve(Listener::Tcp(listener), is_known, move |request, stream| {
+        shown.serve(request, stream)
     });
     Ok(())
 }
 
-struct Doorman {
-    clients: AtomicUsize,
+/// A run that clients look at.
+struct Shown {
     board: Board,
     control: Option<Control>,
     desk: Option<Desk>,
     own: SocketAddr,
 }
 
-impl Doorman {
-    /// Serves a client in a thread of its own.
-    fn admit(self: Arc<Self>, request: Request) {
-        let clients = &self.clients;
-        if clients.fetch_add(1, Ordering::SeqCst) >= MOST_CLIENTS {
-            clients.fetch_sub(1, Ordering::SeqCst);
-            let _ = request.respond(plain_text(503, "too many clients; come back later\n"));
-            return;
+impl Shown {
+    fn serve(
+        &self,
+        request: Result<Request, Misunderstood>,
+        stream: &mut Stream,
+    ) -> io::Result<()> {
+        let mut plain = |status, text: &str| respond(stream, status, TEXT, text);
+        let request = match request {
+            Ok(request) => request,
+            Err(Misunderstood(status, why)) => return plain(status, &format!("{why}\n")),
+        };
+        let host = request.header("host");
+        if self.own.ip().is_loopback() && !host.is_some_and(is_local_name) {
+            return plain(403, "this is not the page of that host\n");
         }
-        thread::spawn(move || {
-            // A client that has gone away needs no answer.
-            let _ = self.serve(request);
-            self.clients.fetch_sub(1, Ordering::SeqCst);
-        });
-    }
-
-    fn serve(&self, request: Request) -> io::Result<()> {
-        if !self.is_asked_for(&request) {
-            return request.respond(plain_text(403, "this is not the page of that host\n"));
-        }
-        let path = request.url().split(['?', '#']).next().unwrap_or_default();
-        match (request.method(), path) {
-            (Method::Get, "/") => match self.board.page() {
-                Ok(page) => request.respond(typed(200, page, "text/html; charset=utf-8")),
-                Err(why) => request.respond(plain_text(500, &format!("{why}\n"))),
+        match (request.verb.as_str(), request.path.as_str()) {
+            ("GET", "/") => match self.board.page() {
+                Ok(page) => respond(stream, 200, "text/html; charset=utf-8", &page),
+                Err(why) => plain(500, &format!("{why}\n")),
             },
-            (Method::Get, "/document") => match self.board.document() {
-                Ok(document) => request.respond(typed(200, document.to_string(), JSON)),
-                Err(why) => request.respond(plain_text(500, &format!("{why}\n"))),
+            ("GET", "/document") => match self.board.document() {
+                Ok(document) => respond(stream, 200, "application/json", &document),
+                Err(why) => plain(500, &format!("{why}\n")),
             },
-            (Method::Get, "/events") => self.tell(request.into_writer()),
-            (Method::Post, "/stop" | "/pause" | "/resume" | "/cancel") => {
-                let answer = self.change(path, &request);
-                request.respond(answer)
+            ("GET", "/events") => {
+                respond_with_events(stream)?;
+                self.board.tell_changes(stream)
+            }
+            ("POST", path @ ("/stop" | "/pause" | "/resume" | "/cancel")) => {
+                let (status, text) = self.change(path, &request);
+                plain(status, text)
             }
             (_, "/" | "/document" | "/events" | "/stop" | "/pause" | "/resume" | "/cancel") => {
-                request.respond(plain_text(405, "not this way\n"))
+                plain(405, "not this way\n")
             }
-            _ => request.respond(plain_text(404, "there is only one page here: /\n")),
+            _ => plain(404, "there is only one page here: /\n"),
         }
     }
 
-    /// Whether the client wants this server.
-    fn is_asked_for(&self, request: &Request) -> bool {
-        if !self.own.ip().is_loopback() {
-            return true;
-        }
-        let headers = request.headers().iter();
-        let mut hosts = headers.filter(|header| header.field.equiv("Host"));
-        hosts
-            .next()
-            .is_some_and(|header| is_local_name(header.value.as_str()))
-    }
-
-    fn change(&self, path: &str, request: &Request) -> Response<io::Cursor<Vec<u8>>> {
+    fn change(&self, path: &str, request: &Request) -> (u16, &'static str) {
         let control = match &self.control {
             None => {
-                return plain_text(
+                return (
                     403,
                     "this page is for looking only: run it with --control FILE\n",
                 );
             }
             Some(control) if !control.allows(request) => {
-                return plain_text(401, "this is not the token\n");
+                return (401, "this is not the token\n");
             }
             Some(control) => control,
         };
         if path == "/stop" {
             control.interrupt.request();
-            return plain_text(202, "The run is being stopped.\n");
+            return (202, "The run is being stopped.\n");
         }
         let (ask, words) = match path {
             "/pause" => (
@@ -257,40 +236,11 @@ impl Doorman {
             .as_ref()
             .map(|desk| desk.hand_in(vec![Ask::Request(ask)]));
         match handed {
-            Some(Some(_)) => plain_text(202, words),
-            Some(None) => plain_text(503, "too many requests wait for the run\n"),
-            None => plain_text(409, "this run takes no requests but /stop\n"),
+            Some(Some(_)) => (202, words),
+            Some(None) => (503, "too many requests wait for the run\n"),
+            None => (409, "this run takes no requests but /stop\n"),
         }
     }
-
-    fn tell(&self, mut client: Box<dyn Write + Send>) -> io::Result<()> {
-        client.write_all(
-            b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n\
-              X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n",
-        )?;
-        client.flush()?;
-        self.board.tell_changes(client.as_mut())
-    }
 }
 
-const JSON: &str = "application/json";
-
-fn plain_text(status: u16, text: &str) -> Response<io::Cursor<Vec<u8>>> {
-    typed(status, text.to_owned(), "text/plain; charset=utf-8")
-}
-
-fn typed(status: u16, text: String, kind: &str) -> Response<io::Cursor<Vec<u8>>> {
-    let headers = [
-        ("Content-Type", kind),
-        ("Cache-Control", "no-store"),
-        ("X-Content-Type-Options", "nosniff"),
-    ];
-    let response = Response::from_string(text).with_status_code(status);
-    headers.into_iter().fold(
-        response,
-        |response, (name, value)| match Header::from_bytes(name, value) {
-            Ok(header) => response.with_header(header),
-            Err(()) => response,
-        },
-    )
-}
+const TEXT: &str = "text/plain; charset=utf-8";

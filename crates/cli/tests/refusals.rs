@@ -68,6 +68,14 @@ fn options_of_run_that_could_do_nothing_are_refused() {
             "leave out --jobs",
         ),
         (&["--jobs", "-1"], "--jobs"),
+        (
+            &["--realtime", "9", "--journal", "journal"],
+            "cannot be used with",
+        ),
+        (
+            &["--seed", "9", "--journal", "journal"],
+            "cannot be used with",
+        ),
     ] {
         let said = refusal(&[&RUN[..], options].concat());
         assert!(said.contains(words), "{options:?}: {said}");
@@ -86,6 +94,14 @@ fn threads_are_the_embedded_planners_and_change_no_plan() {
         ),
         (
             &["--jobs", "2", "--objective", "slack"],
+            "cannot be used with",
+        ),
+        (
+            &["--jobs", "2", "--world", "cases/delivery/world.toml"],
+            "cannot be used with",
+        ),
+        (
+            &["--first", "--world", "cases/delivery/world.toml"],
             "cannot be used with",
         ),
         (&["--jobs", "-1"], "--jobs"),

@@ -183,7 +183,7 @@ pub(crate) struct RunArgs {
         long,
         value_name = "FILE",
         requires = "world_process",
-        conflicts_with_all = ["trace", "world"]
+        conflicts_with_all = ["trace", "world", "realtime", "seed"]
     )]
     pub(crate) journal: Option<PathBuf>,
     /// Show the page of `elbowroom report` while the run goes on, at this port or HOST:PORT of this

@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     spec.is_attended = arguments.control.is_some();
     let (task, first) = checked(arguments, &spec, world.as_ref(), output)?;
     let attendance = attendance(arguments);
-    let interrupt = Interrupt::listen();
+    let interrupt = Interrupt::listen_with_world();
     let job = Job {
         journal: journal(arguments, RESUME)?,
         begun: &|| (),

@@ -45,7 +45,7 @@ const GIVEN: &str = "the problem that was given";
 /// Executes what is asked for, until it is asked to end.
 pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     check(arguments)?;
-    let interrupt = Interrupt::listen();
+    let interrupt = Interrupt::listen_with_world();
     // A token that cannot be read is told before anything is done.
     control(arguments, &interrupt)?;
     if let Some(journal) = &arguments.run.resume {
@@ -140,7 +140,7 @@ fn await_problem(
     (spec, world): (&mut RunSpec, Option<&Source>),
     output: &mut Output,
 ) -> Option<(Begun, Option<Clock>, Client)> {
-    let interrupt = Interrupt::listen();
+    let interrupt = Interrupt::listen_with_world();
     loop {
         let (text, client) = front.first.wait(&interrupt)?.parts();
         let given = Source::new(GIVEN, text);
@@ -287,8 +287,9 @@ fn open(
         (socket, false),
     ] {
         let Some(listener) = listener else { continue };
-        let served = Arc::clone(&front);
-        http::serve(listener, front.clients(), move |request, stream| {
+        let (served, known) = (Arc::clone(&front), Arc::clone(&front));
+        let is_known = move |request: &http::Request| known.is_known(request);
+        http::serve(listener, is_known, move |request, stream| {
             served.serve(request, is_local_only, stream)
         });
     }

@@ -1,10 +1,13 @@
 //! Connections, whatever they go through.
 
 use std::io::{self, Read, Write};
-use std::net::{Shutdown, TcpListener, TcpStream};
+use std::net::{IpAddr, Shutdown, TcpListener, TcpStream};
 #[cfg(unix)]
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::time::Duration;
+
+use crate::board::Client;
+use crate::clock::Clock;
 
 /// Where clients are awaited.
 pub(crate) enum Listener {
@@ -51,17 +54,57 @@ impl Stream {
         either!(self, it => it.set_write_timeout(Some(limit)))
     }
 
+    /// Returns another handle of the same connection.
+    pub(super) fn try_clone(&self) -> io::Result<Self> {
+        match self {
+            Self::Tcp(stream) => stream.try_clone().map(Self::Tcp),
+            #[cfg(unix)]
+            Self::Unix(stream) => stream.try_clone().map(Self::Unix),
+        }
+    }
+
+    /// Returns the address of the client, if it has one.
+    pub(super) fn peer(&self) -> Option<IpAddr> {
+        match self {
+            Self::Tcp(stream) => Some(stream.peer_addr().ok()?.ip()),
+            #[cfg(unix)]
+            Self::Unix(_) => None,
+        }
+    }
+
+    /// Ends the connection at once; who reads from it or writes to it fails.
+    pub(super) fn shut_down(&self) {
+        let _ = either!(self, it => it.shutdown(Shutdown::Both));
+    }
+
     /// Ends the connection. What the client still says is read for a moment, so that it gets the
     /// answer before it hears that nobody listens.
     pub(super) fn close(mut self) {
+        const MOMENT: Duration = Duration::from_millis(200);
         let _ = either!(&self, it => it.shutdown(Shutdown::Write));
-        let _ = self.set_read_timeout(Duration::from_millis(200));
-        let mut bytes = [0; 8192];
-        for _ in 0..64 {
+        let _ = self.set_read_timeout(MOMENT);
+        let (clock, mut bytes) = (Clock::start(), [0; 8192]);
+        while clock.elapsed() < MOMENT {
             match self.read(&mut bytes) {
                 Ok(0) | Err(_) => break,
                 Ok(_) => {}
             }
+        }
+    }
+}
+
+impl Client for Stream {
+    /// Looks whether the client has closed the connection. What it has sent meanwhile is dropped.
+    fn has_left(&mut self) -> bool {
+        let _ = either!(self, it => it.set_nonblocking(true));
+        let read = self.read(&mut [0; 1024]);
+        let _ = either!(self, it => it.set_nonblocking(false));
+        match read {
+            Ok(count) => count == 0,
+            Err(error) => !matches!(
+                error.kind(),
+                io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
+            ),
         }
     }
 }

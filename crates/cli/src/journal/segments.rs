@@ -8,7 +8,7 @@ use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::{BEGINNING, JournalFile, WallTime, claim, record};
+use super::{BEGINNING, JournalFile, WallTime, claim, for_owner, record};
 use crate::output;
 use crate::words::plain;
 
@@ -66,7 +66,8 @@ impl JournalFile {
         let (first, header) = record(BEGINNING, &stamped(&self.header));
         let (last, snapshot) = record(&first, &stamped(snapshot));
         let text = header + &snapshot;
-        let mut file = File::create(new)?;
+        let mut options = for_owner();
+        let mut file = options.write(true).create(true).truncate(true).open(new)?;
         claim(new, &file).map_err(|failure| io::Error::other(failure.message().to_owned()))?;
         file.write_all(text.as_bytes())?;
         file.sync_all()?;

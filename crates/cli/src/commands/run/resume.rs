@@ -205,7 +205,7 @@ pub(in crate::commands) fn run(
     let first = spec.has_plan.then(|| stored.first_plan(&task));
     let first = first.transpose().map_err(|error| wrong(&error))?.flatten();
     let mut file = JournalFile::go_on(path, &journal, length)?.in_segments(host.segments());
-    let interrupt = Interrupt::listen();
+    let interrupt = Interrupt::listen_with_world();
     let attendance = host.attend(&spec, &task, &interrupt)?;
     let aside = super::aside(arguments, &interrupt);
     if let Some(snapshot) = &snapshot {

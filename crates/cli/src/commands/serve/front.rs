@@ -2,8 +2,8 @@
 
 use std::io;
 use std::net::SocketAddr;
-use std::sync::atomic::{AtomicU64, AtomicUsize};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::atomic::AtomicU64;
+use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use elbowroom::execute::NamedText;
@@ -55,7 +55,6 @@ pub(super) struct Front {
     /// How many requests that change something are being answered.
     changing: Mutex<usize>,
     answered: Condvar,
-    clients: Arc<AtomicUsize>,
     /// How many goals were named here.
     pub(super) named: AtomicU64,
 }
@@ -72,13 +71,8 @@ impl Front {
             first: First::default(),
             changing: Mutex::new(0),
             answered: Condvar::new(),
-            clients: Arc::default(),
             named: AtomicU64::new(0),
         }
-    }
-
-    pub(super) fn clients(&self) -> &Arc<AtomicUsize> {
-        &self.clients
     }
 
     pub(super) fn desk(&self) -> &Desk {
@@ -219,6 +213,11 @@ impl Front {
                 respond(stream, status, JSON, &text(&taken))
             }
         })
+    }
+
+    /// Returns `true` if the request has the token.
+    pub(super) fn is_known(&self, request: &Request) -> bool {
+        self.control.is_some() && self.allow(request).is_ok()
     }
 
     /// Whether the client may change something.

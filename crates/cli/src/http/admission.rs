@@ -1,0 +1,199 @@
+//! Limits on the clients of a listener, which clients without the token cannot use up for those that have it.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::net::IpAddr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::{Misunderstood, Request, Stream};
+
+/// The limit on clients whose requests are being read. Beyond it, the connection that has been open longest is closed: a
+/// request usually arrives at once, so that those who say nothing delay nobody.
+const MOST_READING: usize = 64;
+
+/// The limit on clients with the token that are served at once, and on those without.
+const MOST_SERVED: usize = 64;
+
+/// The limit on streams of events without the token.
+const MOST_STREAMS: usize = 32;
+
+/// The limit on clients without the token from one address that is not of this machine.
+const MOST_OF_PEER: usize = 16;
+
+/// The clients of a listener.
+#[derive(Clone, Default)]
+pub(super) struct Admission(Arc<Mutex<Clients>>);
+
+#[derive(Default)]
+struct Clients {
+    /// The number of connections so far.
+    connections: u64,
+    /// Connections whose requests are being read, the oldest first.
+    reading: VecDeque<(u64, Stream)>,
+    /// The number of clients with the token that are being served.
+    known: usize,
+    /// The number of the others.
+    others: usize,
+    /// The number of streams of events among these.
+    streams: usize,
+    /// The number of clients without the token from each address.
+    of_peer: BTreeMap<IpAddr, usize>,
+}
+
+/// A client whose request is being read, until this is dropped.
+pub(super) struct Reading {
+    admission: Admission,
+    connection: u64,
+}
+
+/// A client that is being served, until this is dropped.
+pub(super) struct Served {
+    admission: Admission,
+    class: Class,
+}
+
+/// A class of clients.
+#[derive(Clone, Copy)]
+enum Class {
+    /// Those with the token.
+    Known,
+    /// Those without, with their address unless it is of this machine.
+    Other {
+        peer: Option<IpAddr>,
+        is_stream: bool,
+    },
+}
+
+impl Admission {
+    fn clients(&self) -> MutexGuard<'_, Clients> {
+        // Each change is one statement.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins to read the request of a client.
+    pub(super) fn read(&self, stream: &Stream) -> Reading {
+        let mut clients = self.clients();
+        clients.connections += 1;
+        let connection = clients.connections;
+        if clients.reading.len() >= MOST_READING
+            && let Some((_, oldest)) = clients.reading.pop_front()
+        {
+            oldest.shut_down();
+        }
+        if let Ok(stream) = stream.try_clone() {
+            clients.reading.push_back((connection, stream));
+        }
+        let admission = self.clone();
+        Reading {
+            admission,
+            connection,
+        }
+    }
+
+    /// Begins to serve a client; `is_known` if it has the token.
+    ///
+    /// # Errors
+    /// When too many clients of its kind are being served.
+    pub(super) fn serve(
+        &self,
+        request: &Request,
+        peer: Option<IpAddr>,
+        is_known: bool,
+    ) -> Result<Served, Misunderstood> {
+        let class = if is_known {
+            Class::Known
+        } else {
+            let is_stream = request.path.ends_with("/events");
+            let peer = peer.filter(|peer| !peer.is_loopback());
+            Class::Other { peer, is_stream }
+        };
+        let mut clients = self.clients();
+        match class {
+            Class::Known if clients.known >= MOST_SERVED => {
+                return Err(Misunderstood(
+                    503,
+                    "too many clients with the token; come back later",
+                ));
+            }
+            Class::Known => clients.known += 1,
+            Class::Other { peer, is_stream } => {
+                let of_peer = peer.and_then(|peer| clients.of_peer.get(&peer).copied());
+                let is_too_many = clients.others >= MOST_SERVED
+                    || of_peer.unwrap_or(0) >= MOST_OF_PEER
+                    || is_stream && clients.streams >= MOST_STREAMS;
+                if is_too_many {
+                    return Err(Misunderstood(
+                        503,
+                        "too many clients without the token; come back later",
+                    ));
+                }
+                clients.others += 1;
+                clients.streams += usize::from(is_stream);
+                if let Some(peer) = peer {
+                    *clients.of_peer.entry(peer).or_default() += 1;
+                }
+            }
+        }
+        let admission = self.clone();
+        Ok(Served { admission, class })
+    }
+}
+
+impl Drop for Reading {
+    fn drop(&mut self) {
+        let mut clients = self.admission.clients();
+        clients.reading.retain(|(own, _)| *own != self.connection);
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let mut clients = self.admission.clients();
+        match self.class {
+            Class::Known => clients.known -= 1,
+            Class::Other { peer, is_stream } => {
+                clients.others -= 1;
+                clients.streams -= usize::from(is_stream);
+                let count = peer.and_then(|peer| clients.of_peer.get_mut(&peer));
+                if let Some(count) = count {
+                    *count -= 1;
+                }
+                clients.of_peer.retain(|_, count| *count > 0);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(path: &str) -> Request {
+        Request {
+            path: path.to_owned(),
+            ..Request::default()
+        }
+    }
+
+    #[test]
+    fn clients_without_the_token_leave_room_for_those_with_it() {
+        let admission = Admission::default();
+        let (state, events) = (request("/v1/state"), request("/v1/events"));
+        let serve = |request, peer: Option<&str>, is_known| {
+            let peer = peer.map(|peer| peer.parse().expect("an address"));
+            admission.serve(request, peer, is_known).ok()
+        };
+        let local = Some("127.0.0.1");
+        let streams: Vec<_> = std::iter::from_fn(|| serve(&events, local, false)).collect();
+        assert_eq!(streams.len(), MOST_STREAMS);
+        let far: Vec<_> = std::iter::from_fn(|| serve(&state, Some("192.0.2.1"), false)).collect();
+        assert_eq!(far.len(), MOST_OF_PEER);
+        let others: Vec<_> = std::iter::from_fn(|| serve(&state, None, false)).collect();
+        assert_eq!(streams.len() + far.len() + others.len(), MOST_SERVED);
+        let known: Vec<_> = std::iter::from_fn(|| serve(&events, local, true)).collect();
+        assert_eq!(known.len(), MOST_SERVED);
+        drop((streams, far, others, known));
+        let clients = admission.clients();
+        assert_eq!((clients.known, clients.others, clients.streams), (0, 0, 0));
+        assert!(clients.of_peer.is_empty());
+    }
+}
