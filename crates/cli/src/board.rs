@@ -11,12 +11,12 @@ const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
 /// How long clients have to fetch the end of the run.
 const FAREWELL: Duration = Duration::from_secs(2);
 
-/// How often a client that waits for news is looked after.
+/// Interval between two checks that a waiting client is still connected.
 const GLANCE: Duration = Duration::from_millis(250);
 
-/// A client that is told what is new.
+/// A client that receives new lines.
 pub(crate) trait Client: Write {
-    /// Returns `true` if it is not there any more.
+    /// Returns `true` if it has closed its connection.
     fn has_left(&mut self) -> bool;
 }
 

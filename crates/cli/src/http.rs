@@ -97,7 +97,7 @@ pub(crate) fn serve(
     });
 }
 
-/// Refuses requests that a browser sends for a page of somebody else, and those for another protocol.
+/// Refuses requests that a browser sends for a page of another origin, and requests for another protocol.
 fn refuse_foreign(request: &Request) -> Result<(), Misunderstood> {
     if request.header("upgrade").is_some() {
         return Err(Misunderstood(400, "this is HTTP/1.1 and nothing else"));

@@ -14,8 +14,7 @@ use crate::exit::Exit;
 /// group.
 const SAME_REQUEST: Duration = Duration::from_millis(300);
 
-/// The limit on the time in which actions are cancelled and the world is stopped, during which a second signal does
-/// nothing.
+/// While actions are cancelled and the world is stopped, a second signal is ignored for this time.
 const IN_ORDER: Duration = Duration::from_secs(5);
 
 /// `true` if actions are to be cancelled, and a world is to be stopped, before the program ends.
@@ -67,8 +66,8 @@ impl Interrupt {
     }
 }
 
-/// Returns `true` if the signal with this number ends the program at once, so long after the first one: the third always
-/// does, the second unless it is the same request, or a world is being stopped.
+/// Returns `true` if a signal ends the program at once. `number` counts signals, `since_first` is the time since the first
+/// one. The third always ends it, the second unless it is the same request or a world is being stopped.
 fn is_to_end(number: u32, since_first: Duration, has_world: bool) -> bool {
     let patience = if has_world { IN_ORDER } else { SAME_REQUEST };
     match number {

@@ -62,7 +62,7 @@ pub(crate) struct Journal {
     before: (u64, String, usize),
 }
 
-/// Options with which files are created for their owner alone: a journal holds all that is known of the robots.
+/// Returns options for files that only their owner can read. A journal holds all facts about the robots.
 fn for_owner() -> OpenOptions {
     let mut options = OpenOptions::new();
     #[cfg(unix)]

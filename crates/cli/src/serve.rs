@@ -154,7 +154,7 @@ pub(crate) fn start(
     Ok(())
 }
 
-/// A run that clients look at.
+/// A run, with its page for clients.
 struct Shown {
     board: Board,
     control: Option<Control>,

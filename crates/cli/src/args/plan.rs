@@ -35,7 +35,7 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_enum, conflicts_with = "first")]
     pub(crate) objective: Option<PlanObjectiveChoice>,
     /// The world file (docs/formats/world.md) for --objective probability
-    // As in `RunArgs::spoil`: what the objective conflicts with conflicts with its world, too.
+    // As in `RunArgs::spoil`: conflicts of the objective are conflicts of its world also.
     #[arg(long, value_name = "WORLD.toml", requires = "objective", conflicts_with_all = ["first", "jobs"])]
     pub(crate) world: Option<PathBuf>,
     /// Let a ground action overlap itself in the plan: start again before it has ended. Without it, no plan of

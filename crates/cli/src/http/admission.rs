@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::{Misunderstood, Request, Stream};
 
-/// The limit on clients whose requests are being read. Beyond it, the connection that has been open longest is closed: a
-/// request usually arrives at once, so that those who say nothing delay nobody.
+/// The limit on clients whose requests are being read. Beyond it, the connection that has been open longest is closed. A
+/// request usually arrives at once, so idle connections are closed first.
 const MOST_READING: usize = 64;
 
 /// The limit on clients with the token that are served at once, and on those without.

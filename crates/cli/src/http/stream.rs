@@ -72,7 +72,7 @@ impl Stream {
         }
     }
 
-    /// Ends the connection at once; who reads from it or writes to it fails.
+    /// Ends the connection at once. Reads and writes through other handles fail then.
     pub(super) fn shut_down(&self) {
         let _ = either!(self, it => it.shutdown(Shutdown::Both));
     }
@@ -94,7 +94,7 @@ impl Stream {
 }
 
 impl Client for Stream {
-    /// Looks whether the client has closed the connection. What it has sent meanwhile is dropped.
+    /// Reads without waiting, and drops the bytes that the client has sent.
     fn has_left(&mut self) -> bool {
         let _ = either!(self, it => it.set_nonblocking(true));
         let read = self.read(&mut [0; 1024]);
