@@ -101,6 +101,7 @@ class Executive:
 
     def __init__(self, line, folder):
         (folder / "token").write_text(TOKEN)
+        (folder / "token").chmod(0o600)
         line = [*map(str, line), "--http", "0", "--token", "token", "--max-replans", "100"]
         self.process = subprocess.Popen(
             line, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True

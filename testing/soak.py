@@ -69,6 +69,7 @@ class Executive:
         texts["token"] = TOKEN
         for name, text in texts.items():
             (folder / name).write_text(text)
+        (folder / "token").chmod(0o600)
         file = {name: str(folder / name) for name in [*texts, "trace.jsonl"]}
         line = [program, "serve", file["domain.pddl"], file["problem.pddl"], "--world", file["world.toml"]]
         line += ["--realtime", str(PACE), "--http", "0", "--token", file["token"]]

@@ -33,14 +33,25 @@ impl Control {
     pub(crate) fn read(path: &Path, interrupt: Interrupt) -> Result<Self, Failure> {
         let name = path.display();
         let mut text = String::new();
-        std::fs::File::open(path)
-            .and_then(|file| file.take(4096).read_to_string(&mut text))
-            .map_err(|error| {
+        let read = std::fs::File::open(path).and_then(|file| {
+            let is_shared = is_shared(&file);
+            file.take(4096).read_to_string(&mut text)?;
+            Ok(is_shared)
+        });
+        let is_shared = read.map_err(|error| {
                 Failure::new(
                     format!("cannot read the token in {name}: {}", plain(&error)),
                     "the option names a file with a token in it, for example one that `openssl rand -hex 16` has made",
                 )
             })?;
+        if is_shared {
+            return Err(Failure::new(
+                format!("other users can read or change the token in {name}"),
+                format!(
+                    "`chmod 600 {name}`, and make a new token if others may have seen this one"
+                ),
+            ));
+        }
         let token = text.trim().to_owned();
         let is_safe = token.bytes().all(|byte| byte.is_ascii_graphic());
         if token.len() < LEAST_TOKEN || !is_safe {
@@ -77,6 +88,21 @@ impl Control {
     /// Has the run end in order.
     pub(crate) fn stop(&self) {
         self.interrupt.request();
+    }
+}
+
+/// Returns `true` for a file that users other than its owner can read or write.
+fn is_shared(file: &std::fs::File) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let metadata = file.metadata();
+        metadata.is_ok_and(|it| it.is_file() && it.permissions().mode() & 0o077 != 0)
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = file;
+        false
     }
 }
 

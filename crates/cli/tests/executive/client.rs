@@ -3,6 +3,7 @@
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read, Write};
 use std::net::TcpStream;
+use std::os::unix::fs::PermissionsExt as _;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -57,6 +58,8 @@ impl Executive {
     fn with_token(folder: &Path, line: &[&str], most_blocks: Option<u32>) -> Self {
         let token = folder.join("token");
         fs::write(&token, TOKEN).expect("written");
+        let for_owner = fs::Permissions::from_mode(0o600);
+        fs::set_permissions(&token, for_owner).expect("allowed");
         let token = token.display().to_string();
         Self::launch(folder, &[line, &["--token", &token]].concat(), most_blocks)
     }

@@ -129,3 +129,23 @@ fn journals_are_for_their_owner_alone() {
         "{modes:?}"
     );
 }
+
+#[test]
+fn token_that_others_can_read_is_refused() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let token = folder("shared-token").join("token");
+    fs::write(&token, TOKEN).expect("written");
+    let name = token.display().to_string();
+    for mode in [0o644, 0o640, 0o602, 0o666] {
+        fs::set_permissions(&token, fs::Permissions::from_mode(mode)).expect("allowed");
+        for line in [
+            &["serve", DOMAIN, PROBLEM, "--http", "0", "--token", &name][..],
+            &["ctl", "--token", &name, "stop"],
+        ] {
+            let done = super::command::elbowroom(line);
+            let said = String::from_utf8_lossy(&done.stderr);
+            assert_eq!(done.status.code(), Some(2), "{mode:o}: {said}");
+            assert!(said.contains("chmod 600"), "{mode:o}: {said}");
+        }
+    }
+}

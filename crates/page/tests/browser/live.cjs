@@ -10,7 +10,7 @@ const { accessible, cellsOf, close, file, open, pddl, rowsOf, run, screenshots, 
 
 const elbowroom = path.resolve(process.argv[2]);
 const TOKEN = "a-word-of-sixteen-letters";
-fs.writeFileSync(file("token"), `${TOKEN}\n`);
+fs.writeFileSync(file("token"), `${TOKEN}\n`, { mode: 0o600 });
 
 // Starts a run whose page is served, and waits until it says where.
 function served(pace, ...more) {
