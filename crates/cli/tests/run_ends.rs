@@ -199,13 +199,17 @@ fn a_world_that_does_not_obey_is_not_waited_for_for_long() {
     assert_eq!(last_entry(&place)["verdict"], "interrupted");
 }
 
+/// The world is given its time to stop, unless the user insists.
 #[test]
-fn a_second_ctrl_c_ends_the_run_at_once() {
-    let place = Place::new("twice");
-    let child = place.run(STUBBORN, "", &["--executor", "esterel"]);
+fn third_ctrl_c_ends_the_run_at_once_and_the_second_does_not() {
+    let place = Place::new("thrice");
+    let mut child = place.run(STUBBORN, "", &["--executor", "esterel"]);
     place.wait_until_told("\"wait\"", 2);
-    send(&child, 2);
-    sleep(Duration::from_millis(300));
+    for _ in 0..2 {
+        send(&child, 2);
+        sleep(Duration::from_millis(500));
+    }
+    assert_eq!(child.try_wait().expect("it can be asked"), None);
     let begun = Instant::now();
     send(&child, 2);
     let output = child.wait_with_output().expect("it ends");

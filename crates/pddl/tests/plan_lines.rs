@@ -341,6 +341,15 @@ fn action_that_is_written_in_part_or_with_unknown_words_is_an_error() {
         "walk: hall",
         "walk:",
         "jump hall kitchen",
+        "- jump hall kitchen",
+        "- jump(hall, kitchen)",
+        "- (jump hall kitchen)",
+        "40.0 jump hall kitchen",
+        "6. jump hall",
+        "walk_hall_kitchen",
+        "walk-hall-kitchen",
+        "walk.hall.kitchen",
+        "then snap/b1",
         "wait [3]",
         "wait 8",
         "{\"time\": 7, \"name\": \"walk\", \"args\": [\"hall\", \"kitchen\"]}",
@@ -357,6 +366,9 @@ fn action_that_is_written_in_part_or_with_unknown_words_is_an_error() {
     // A blank line separates a word of a log.
     assert_eq!(errors(&format!("{untimed}\nDone\n")), "none");
     assert_eq!(errors(&format!("{timed}Done\n")), "none");
+    let log =
+        "[ INFO] [1515.9]: KCL: (/rosplan_planner_interface) (problem.pddl) Planning complete";
+    assert_eq!(errors(&format!("{log}\n{timed}")), "none");
 }
 
 #[test]

@@ -403,10 +403,17 @@ fn a_start_that_is_late_is_no_excuse_for_what_has_left_its_interval() {
 }
 
 /// In worlds without a clock, as in the papers' experiments, that is the end. That no plan exists is not
-/// proved: the running action might end at any moment.
+/// proved: the running action might end at any moment. A fact that changes when the action is cancelled permits another plan.
 #[test]
 fn where_room_is_not_watched_a_run_ends_when_no_plan_can_bear_what_is_late() {
-    let (report, _) = walking(Rational::from(1000), false);
+    let (scene, mut world) = walker(Rational::from(1000));
+    world.on_cancel = None;
+    let settings = RunSettings {
+        watches_room: false,
+        ..scene.settings.clone()
+    };
+    let execution = scene.execution("guarded").with_settings(settings);
+    let report = execution.run_in(&mut world);
     let is_none_found = matches!(
         report.verdict,
         Verdict::NoPlan {
@@ -415,6 +422,8 @@ fn where_room_is_not_watched_a_run_ends_when_no_plan_can_bear_what_is_late() {
         }
     );
     assert!(is_none_found, "{report:#?}");
+    let (report, _) = walking(Rational::from(1000), false);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
 }
 
 /// At the warning the planner is told from where a plan will be needed, and when it is needed it is

@@ -168,3 +168,42 @@ fn repeated_action_has_its_whole_duration_after_a_new_plan() {
         assert!(repeated > 0, "{executor}");
     }
 }
+
+/// An action fails late, and its failure makes the goal true, or possible again, when no plan was known any more.
+#[test]
+fn verdict_heeds_facts_that_change_while_actions_end() {
+    for (body, step) in [
+        (":precondition (p) :effect (g))", "0: (a)"),
+        (
+            ":duration (= ?duration 2) :condition (at start (p)) :effect (at end (g)))",
+            "0: (a) [2]",
+        ),
+    ] {
+        let kind = if step.ends_with(']') {
+            ":durative-action"
+        } else {
+            ":action"
+        };
+        let domain = format!(
+            "(define (domain late) (:requirements :durative-actions) (:predicates (p) (g)) ({kind} a :parameters () {body})"
+        );
+        let problem = "(define (problem q) (:domain late) (:init (p)) (:goal (g)))";
+        let scene = Scene::new(&domain, problem, Some(step));
+        for becomes in ["(g)", "(p)"] {
+            let world = scene.world(&format!(
+                "[[failure]]\naction = \"a\"\nprobability = 0.5\nwhen = \"start\"\n[[failure.outcome]]\nprobability = 1\n\
+                 becomes_true = [\"{becomes}\"]\ndelay = 3\n[[event]]\nfact = \"(p)\"\nbecomes = false\nconstant = 1\n"
+            ));
+            for executor in ["live", "guarded", "stn", "esterel"] {
+                for seed in 1..=8 {
+                    let report = scene.run(executor, &world, seed);
+                    assert_eq!(
+                        report.verdict,
+                        Verdict::GoalReached,
+                        "{executor} {seed} {becomes} {step}: {report:#?}"
+                    );
+                }
+            }
+        }
+    }
+}

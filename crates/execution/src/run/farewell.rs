@@ -5,7 +5,8 @@ use elbowroom_num::Rational;
 use super::agenda::Todo;
 use super::{Next, Report, Run, Stop, Verdict};
 use crate::event::Ticket;
-use crate::reason::{Cause, Reason};
+use crate::executor::News;
+use crate::reason::{About, Cause, Reason};
 use crate::record::Entry;
 
 /// How many seconds of the world's time cancelled actions have to stop when a run ends.
@@ -35,6 +36,7 @@ impl Run<'_> {
     /// failed is told nothing more; one that fails meanwhile changes nothing any more.
     pub(super) fn stop(&mut self, stop: Stop) {
         self.agenda.clear();
+        self.news.clear();
         self.give_up_search();
         if self.closing.is_some() {
             self.conclude();
@@ -92,7 +94,14 @@ impl Run<'_> {
         }
     }
 
-    /// The run is over.
+    /// Returns `true` if facts or numbers have changed since the verdict, which was that no plan is known from there.
+    fn is_verdict_outdated(&self, verdict: &Verdict) -> bool {
+        let is_change = |news: &News| matches!(news, News::Fact(_) | News::Value(_));
+        matches!(verdict, Verdict::Unsolvable | Verdict::NoPlan { .. })
+            && self.news.iter().any(is_change)
+    }
+
+    /// Ends the run, or requests another plan if facts or numbers have changed since the verdict.
     fn conclude(&mut self) {
         let Some(Closing {
             verdict, dead_end, ..
@@ -100,6 +109,11 @@ impl Run<'_> {
         else {
             return;
         };
+        if self.is_verdict_outdated(&verdict) {
+            let reason = Reason::new(Cause::Surprise).about(About::AnyObservation);
+            self.agenda = vec![Todo::Replan(reason)];
+            return;
+        }
         let report = Report {
             verdict,
             time: self.now.clone(),

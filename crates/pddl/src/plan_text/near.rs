@@ -109,7 +109,7 @@ fn known(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> 
         };
         let is_action = match vocabulary.parameters(text) {
             Some(parameters) => has_sign || parameters > 0 && objects >= parameters,
-            None => is_stuck(text, vocabulary) || has_sign && vocabulary.is_joined(text),
+            None => is_stuck(text, vocabulary) || vocabulary.is_joined(text, has_sign),
         };
         is_action.then_some(at..at + text.len())
     })
@@ -120,7 +120,7 @@ fn is_numbered(word: &str, vocabulary: &Vocabulary) -> bool {
     word.contains(char::is_numeric)
         && vocabulary.object(word).is_none()
         && vocabulary.parameters(word).is_none()
-        && !vocabulary.is_joined(word)
+        && !vocabulary.is_joined(word, true)
 }
 
 /// Returns `true` for a number that sticks to the name of an action: `6snap`.
@@ -155,14 +155,24 @@ fn words_and_cost(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
     (is_cost && is_name && before.chars().all(is_plain)).then_some(at..at + text.len())
 }
 
-/// `jump r1 l2`: every word behind the first is an object.
+/// `jump r1 l2`, `- jump(r1, l2)`, `40.0 jump r1 l2`: every word behind the first is an object. A bullet or a number may
+/// stand before it, and brackets and commas between.
 fn word_and_objects(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> {
-    let (&Piece::Word { text, at }, objects) = pieces.split_first()? else {
+    let is_before = |piece: &Piece<'_>| match piece {
+        Piece::Word { text, .. } => is_number(text),
+        _ => true,
+    };
+    let first = pieces.iter().position(|piece| !is_before(piece))?;
+    let Piece::Word { text, at } = pieces[first] else {
         return None;
     };
+    let mut objects = pieces[first + 1..].iter().filter(|piece| {
+        let is_bracket = matches!(piece, Piece::Open { .. } | Piece::Close | Piece::Bracket);
+        !is_bracket && !matches!(piece, Piece::Comma)
+    });
     let is_action = text.starts_with(char::is_alphabetic)
-        && !objects.is_empty()
-        && objects.iter().all(|piece| piece.is_object(vocabulary));
+        && objects.clone().next().is_some()
+        && objects.all(|piece| piece.is_object(vocabulary));
     is_action.then_some(at..at + text.len())
 }
 
@@ -182,7 +192,9 @@ fn words_and_number(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
                 // A unit or kind, as in `Planning Time (msec): 200`; a plural, as in `step(s)`.
                 let is_label = is_word && behind.is_some_and(|it| it.starts_with([':', '=']))
                     || is_attached && matches!(inside, "s" | "es" | "n");
-                if is_named && !is_label {
+                // As in ROSPlan's log: `KCL: (/rosplan_planner_interface) (problem.pddl) Planning complete`.
+                let is_path = inside.starts_with('/') || inside.contains(".pddl");
+                if is_named && !is_label && !(is_word && is_path) {
                     group.get_or_insert(at..at + 1);
                 }
             }

@@ -50,9 +50,9 @@ impl Vocabulary {
         self.parameters.get(schema.index()).copied()
     }
 
-    /// Returns `true` for the name of an action joined with objects, numbers, `start` or `end`: `pick_o1`,
-    /// `pick-1`, `pick_start`.
-    pub(super) fn is_joined(&self, word: &str) -> bool {
+    /// Returns `true` for the name of an action joined with objects: `pick_o1`. With `may_be_numbered`, numbers, `start`
+    /// and `end` alone are enough: `pick-1`, `pick_start`.
+    pub(super) fn is_joined(&self, word: &str, may_be_numbered: bool) -> bool {
         let is_joint = |c: char| "_-+.@/".contains(c);
         let mut ends = word.match_indices(is_joint).map(|(at, _)| at);
         let Some(first) = ends.find(|&at| self.schema(&word[..at]).is_some()) else {
@@ -60,6 +60,9 @@ impl Vocabulary {
         };
         // From the left, the places at which a part may begin.
         let rest = &word[first + 1..];
+        if !may_be_numbered && rest.split(is_joint).all(is_counted) {
+            return false;
+        }
         let ends: Vec<usize> = rest
             .match_indices(is_joint)
             .map(|(at, _)| at)
@@ -80,8 +83,12 @@ impl Vocabulary {
 
     /// Returns `true` for an object, a number, `start` or `end`.
     fn is_part(&self, word: &str) -> bool {
-        matches!(word.to_ascii_lowercase().as_str(), "start" | "end")
-            || word.bytes().all(|byte| byte.is_ascii_digit())
-            || self.object(word).is_some()
+        is_counted(word) || self.object(word).is_some()
     }
+}
+
+/// Returns `true` for a number, `start` or `end`.
+fn is_counted(word: &str) -> bool {
+    matches!(word.to_ascii_lowercase().as_str(), "start" | "end")
+        || word.bytes().all(|byte| byte.is_ascii_digit())
 }
