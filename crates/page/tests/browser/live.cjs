@@ -10,7 +10,9 @@ const { accessible, cellsOf, close, file, open, pddl, rowsOf, run, screenshots, 
 
 const elbowroom = path.resolve(process.argv[2]);
 const TOKEN = "a-word-of-sixteen-letters";
-fs.writeFileSync(file("token"), `${TOKEN}\n`, { mode: 0o600 });
+fs.writeFileSync(file("token"), `${TOKEN}\n`);
+// An earlier run may have left the file, with its mode.
+fs.chmodSync(file("token"), 0o600);
 
 // Starts a run whose page is served, and waits until it says where.
 function served(pace, ...more) {
