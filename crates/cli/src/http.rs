@@ -100,7 +100,10 @@ pub(crate) fn serve(
 /// Refuses requests that a browser sends for a page of another origin, and requests for another protocol.
 fn refuse_foreign(request: &Request) -> Result<(), Misunderstood> {
     if request.header("upgrade").is_some() {
-        return Err(Misunderstood(400, "this is HTTP/1.1 and nothing else"));
+        return Err(Misunderstood(
+            400,
+            "this is HTTP/1.1 alone; ask without the header `Upgrade`",
+        ));
     }
     let host = request.header("host").unwrap_or_default();
     let is_own = |origin: &str| {

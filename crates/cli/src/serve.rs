@@ -39,11 +39,14 @@ impl Control {
             Ok(is_shared)
         });
         let is_shared = read.map_err(|error| {
-                Failure::new(
-                    format!("cannot read the token in {name}: {}", plain(&error)),
-                    "the option names a file with a token in it, for example one that `openssl rand -hex 16` has made",
-                )
-            })?;
+            Failure::new(
+                format!("cannot read the token in {name}: {}", plain(&error)),
+                format!(
+                    "the option names a file with a token in it; {}",
+                    making(path)
+                ),
+            )
+        })?;
         if is_shared {
             return Err(Failure::new(
                 format!("other users can read or change the token in {name}"),
@@ -59,7 +62,7 @@ impl Control {
                 format!(
                     "the token in {name} is not one word of {LEAST_TOKEN} or more printable ASCII characters"
                 ),
-                "make one, for example with `openssl rand -hex 16`",
+                making(path),
             ));
         }
         Ok(Self { token, interrupt })
@@ -89,6 +92,12 @@ impl Control {
     pub(crate) fn stop(&self) {
         self.interrupt.request();
     }
+}
+
+/// Returns the advice how to make a file with a token that only its owner can read.
+fn making(path: &Path) -> String {
+    let name = path.display();
+    format!("make one, for example with `(umask 077; openssl rand -hex 16 > {name})`")
 }
 
 /// Returns `true` for a file that users other than its owner can read or write.

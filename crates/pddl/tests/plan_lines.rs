@@ -143,6 +143,8 @@ fn log_text() -> impl Strategy<Value = &'static str> {
         "80% of the ground temporal actions in this problem are compression-safe",
         "Solution with original makespan 12 found (ignoring no-moving-targets-rule).",
         "Plan length: 3 step(s).",
+        "Plan cost: 2",
+        "Plan quality: 8.0",
         "Planning Time (msec): 200",
         "[t=0.003s, 10084 KB] Evaluated 6 state(s).",
         "Cueing down from goal distance:    4 into depth [1][2]",
@@ -287,7 +289,7 @@ fn name_of_an_action_with_a_number_or_a_bracket_is_an_error_beside_a_plan() {
 
 #[test]
 fn statistics_of_planners_that_hold_the_name_of_an_action_are_skipped() {
-    let names = ["b", "load", "search", "state", "step"];
+    let names = ["b", "load", "plan", "search", "state", "step"];
     let actions: Vec<_> = names.map(|it| format!("(:action {it})")).into();
     let task = task(
         &domain(&actions.join(" ")),

@@ -65,7 +65,7 @@ enum Class {
 
 impl Admission {
     fn clients(&self) -> MutexGuard<'_, Clients> {
-        // Each change is one statement.
+        // No change of the counters can panic half-way.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
