@@ -57,7 +57,7 @@ pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
 pub use preparation::{PrepareError, Prepared, Preparer, Region, Wanted};
 pub use progression::{Doubt, Guards, Parts, Progression, Underway, UnderwayParts, Unreadable};
 pub use reason::{About, Behind, Cause, Changed, Promise, Reason};
-pub use record::{Entry, NoRecord, Recorder, WarningCause};
+pub use record::{Entry, GoalChange, NoRecord, Recorder, WarningCause};
 pub use rehearsal::{Rehearsal, Rehearsed, Rehearsing, Scene, SeenChange, Tells};
 pub use request::{Answer, PlanRequest, PortWorkers, PrepareRequest, RequestId, Urgency, Workers};
 pub use world::{Passage, World, WorldError};

@@ -8,6 +8,20 @@ use crate::executor::{Decided, Mission, Planned};
 use crate::reason::Reason;
 use crate::run::{Report, Stand, Verdict};
 
+/// A change of a goal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GoalChange<'a> {
+    /// The goal is achieved, and closed.
+    Achieved,
+    /// The goal is not pursued while others are, because no plan reaches it together with these.
+    SetAside {
+        /// The reason.
+        why: &'a str,
+    },
+    /// The goal is pursued again.
+    Pursued,
+}
+
 /// The cause of a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WarningCause {
@@ -169,6 +183,15 @@ pub enum Entry<'a> {
         now: &'a Rational,
         /// How the goals have changed, or why the plan was given up.
         reason: &'a Reason,
+    },
+    /// One of several goals of a lasting run is closed, set aside, or pursued again.
+    Goal {
+        /// The time.
+        now: &'a Rational,
+        /// The name of the goal.
+        name: &'a str,
+        /// The change.
+        change: GoalChange<'a>,
     },
     /// A lasting run has nothing to do, or cannot do it, and waits for a change.
     Resting {

@@ -77,6 +77,7 @@ mod amid;
 mod beginning;
 mod better;
 mod carrying_on;
+mod choosing;
 mod dead_end;
 mod doubts;
 mod drive;
@@ -94,6 +95,7 @@ mod progress;
 mod refusals;
 mod room;
 mod search;
+mod selection;
 mod settings;
 mod stand;
 mod timeout;
@@ -114,7 +116,7 @@ pub use refusals::Refusals;
 pub use settings::{
     MissingPlan, PlanningTime, Report, RunSettings, RunningRule, UnknownSetting, Verdict,
 };
-pub use stand::{Doing, Goals, Stand, TakesUp};
+pub use stand::{Doing, GivenGoal, Goals, Stand, TakesUp};
 pub use timeout::TimeoutRule;
 
 use crate::event::{Command, Ticket};
@@ -320,6 +322,7 @@ impl<'a> Run<'a> {
     /// One decision; what follows from it goes onto the agenda.
     fn decide_and_follow(&mut self) -> Result<(), Stop> {
         self.heed()?;
+        self.close_achieved_goals();
         if self.tend_search()? || self.attend()? {
             return Ok(());
         }

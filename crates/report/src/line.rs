@@ -6,6 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::exact::{self, Exact};
 
+mod goal;
+
+pub use goal::{GoalChangeLine, GoalState};
+
 /// A line of a trace, but for its first one.
 ///
 /// A number is [`Exact`]; the decimal beside it is for people, and is ignored when read.
@@ -33,6 +37,8 @@ pub enum Line {
     Warning(WarningLine),
     /// The goals have changed, and the rest of the plan is kept.
     Kept(KeptLine),
+    /// A goal is closed, set aside, or pursued again.
+    Goal(GoalChangeLine),
     /// A lasting run waits for a change.
     Resting(RestingLine),
     /// Somebody asked the run to end.
@@ -581,6 +587,7 @@ impl Line {
             Planned(&'a PlannedLine),
             Warning(&'a WarningLine),
             Kept(&'a KeptLine),
+            Goal(&'a GoalChangeLine),
             Resting(&'a RestingLine),
             Interrupted(&'a InterruptedLine),
         }
@@ -600,6 +607,7 @@ impl Line {
             Self::Planned(line) => Named::Planned(line),
             Self::Warning(line) => Named::Warning(line),
             Self::Kept(line) => Named::Kept(line),
+            Self::Goal(line) => Named::Goal(line),
             Self::Resting(line) => Named::Resting(line),
             Self::Interrupted(line) => Named::Interrupted(line),
         };

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use elbowroom_execution::run::{FIRST_GOAL, GoalReader, Stand, Verdict};
 use elbowroom_execution::{
-    Command, Ending, Entry, Event, Measured, Observation, Progression, Request, Ticket,
+    Command, Ending, Entry, Event, GoalChange, Measured, Observation, Progression, Request, Ticket,
 };
 use elbowroom_model::ground::{Action, Body, Condition};
 use elbowroom_model::validate::{Execution, MeasuredAmount, Violation};
@@ -129,9 +129,9 @@ impl<'a> Validation<'a> {
         if stand.goals.are_others {
             let task = Arc::clone(&self.task);
             let open = stand.goals.open.iter();
-            let read = open.filter_map(|(name, text)| match text {
-                None => Some((name.clone(), task.goal().clone())),
-                Some(text) => Some((name.clone(), self.read(text)?)),
+            let read = open.filter_map(|given| match &given.text {
+                None => Some((given.name.clone(), task.goal().clone())),
+                Some(text) => Some((given.name.clone(), self.read(text)?)),
             });
             self.goals = read.collect();
         }
@@ -193,6 +193,10 @@ impl<'a> Validation<'a> {
             | Entry::Kept { now, .. }
             | Entry::Warning { now, .. }
             | Entry::Interrupted { now } => self.pass(now),
+            Entry::Goal { now, name, change } => {
+                self.pass(now);
+                self.change_goal(name, *change);
+            }
             Entry::Resting { now, verdict, .. } => {
                 self.pass(now);
                 if let Some(verdict) = verdict {
@@ -347,18 +351,41 @@ impl<'a> Validation<'a> {
         Some(self.task.with_goal(condition).goal().clone())
     }
 
+    /// Compares a change of a goal with the state.
+    fn change_goal(&mut self, name: &str, change: GoalChange<'_>) {
+        if change != GoalChange::Achieved {
+            return;
+        }
+        let Some(index) = self.goals.iter().position(|(known, _)| known == name) else {
+            return;
+        };
+        let (_, goal) = self.goals.remove(index);
+        let unmet = self.unmet([&goal], Execution::holds);
+        if !unmet.is_empty() {
+            let time = self.now.clone();
+            self.find(Invalid::NotReached { time, unmet });
+        }
+    }
+
+    /// The parts of goals that do not hold, in words.
+    fn unmet<'g>(
+        &self,
+        goals: impl IntoIterator<Item = &'g Condition>,
+        holds: impl Fn(&Execution, &Condition) -> Option<bool>,
+    ) -> Vec<String> {
+        let parts = goals.into_iter().flat_map(Condition::conjuncts);
+        let unmet = parts.filter(|part| holds(&self.execution, part) == Some(false));
+        let unmet = unmet.map(|part| self.task.describe_condition(part));
+        unmet.collect()
+    }
+
     /// Compares a verdict of the run with the state. Goals that are reported as reached are closed.
     fn judge(&mut self, verdict: &Verdict) {
         let time = self.now.clone();
         match verdict {
             Verdict::GoalReached => {
                 let goals = std::mem::take(&mut self.goals);
-                let goals = goals.iter().map(|(_, goal)| goal);
-                let unmet: Vec<String> = goals
-                    .flat_map(Condition::conjuncts)
-                    .filter(|part| self.execution.reaches(part) == Some(false))
-                    .map(|part| self.task.describe_condition(part))
-                    .collect();
+                let unmet = self.unmet(goals.iter().map(|(_, goal)| goal), Execution::reaches);
                 if !unmet.is_empty() {
                     self.find(Invalid::NotReached { time, unmet });
                 } else if !self.execution.is_idle() {

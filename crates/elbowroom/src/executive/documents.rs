@@ -158,6 +158,8 @@ documents! {
         pub name: String,
         /// The goal, in PDDL.
         pub goal: String,
+        /// Why it is set aside while other goals are pursued; none if it is pursued.
+        pub aside: Option<String>,
     }
 
     /// An action under way.

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::run::{FIRST_GOAL, TimeoutRule, Verdict};
 use elbowroom_execution::{
-    Cause, Command, Decided, Decision, Doubt, Entry, Event, Mission, Observation, Progression,
-    Promise, Request, StepId, Ticket, WarningCause,
+    Cause, Command, Decided, Decision, Doubt, Entry, Event, GoalChange, Mission, Observation,
+    Progression, Promise, Request, StepId, Ticket, WarningCause,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Task};
@@ -58,7 +58,11 @@ impl Status {
         let mut goals = Vec::new();
         if !task.problem().goal.is_trivial() {
             let name = FIRST_GOAL.to_owned();
-            goals.push(OpenGoal { name, goal });
+            goals.push(OpenGoal {
+                name,
+                goal,
+                aside: None,
+            });
         }
         let known = Known {
             timeout,
@@ -260,7 +264,11 @@ impl Known {
             let own = of_the_problem.first().map(|it| it.goal.clone());
             let goal = line.goal.clone().or(own).unwrap_or_default();
             let name = line.name.clone();
-            OpenGoal { name, goal }
+            OpenGoal {
+                name,
+                goal,
+                aside: line.aside.clone(),
+            }
         });
         self.goals = goals.collect();
         if snapshot.plan.is_none() {
@@ -325,6 +333,11 @@ impl Known {
                 }
             }
             Entry::Kept { .. } | Entry::Interrupted { .. } => {}
+            Entry::Goal { name, change, .. } => match change {
+                GoalChange::Achieved => self.goals.retain(|known| known.name != *name),
+                GoalChange::SetAside { why } => self.set_aside(name, Some((*why).to_owned())),
+                GoalChange::Pursued => self.set_aside(name, None),
+            },
             Entry::Resting {
                 now,
                 verdict,
@@ -522,6 +535,12 @@ impl Known {
         }
     }
 
+    fn set_aside(&mut self, name: &str, why: Option<String>) {
+        if let Some(goal) = self.goals.iter_mut().find(|known| known.name == name) {
+            goal.aside = why;
+        }
+    }
+
     fn asked(&mut self, request: &Request) {
         match request {
             Request::Pursue { name, goal } => {
@@ -529,6 +548,7 @@ impl Known {
                 self.goals.push(OpenGoal {
                     name: name.clone(),
                     goal: goal.clone(),
+                    aside: None,
                 });
             }
             Request::Abandon { name } => self.goals.retain(|known| known.name != *name),

@@ -240,7 +240,7 @@ fn a_search_for_abandoned_goals_is_not_let_go_on_for_ever() {
             // The fourth search has gone on for five seconds.
             "9: plan",
             "10: the plan is there",
-            "rest: goal-reached problem key",
+            "rest: goal-reached key",
         ],
     );
     let desk = planner.desk();
@@ -309,7 +309,7 @@ fn a_plan_that_is_outdated_when_it_comes_is_made_again() {
             "8: plan, because what has happened while the plan was made",
             "10: start (fetch r cup)",
             "14: the plan is there",
-            "rest: goal-reached problem key",
+            "rest: goal-reached key",
         ],
     );
     assert_eq!(told.report.starts, 3, "{:#?}", told.notes);

@@ -5,6 +5,7 @@ mod amid;
 mod anew;
 mod attended;
 mod changes;
+mod choosing;
 mod goals;
 mod pauses;
 pub(crate) mod scripted;

@@ -73,7 +73,9 @@ impl Fate {
 /// anything, and nothing was started in a pause. `name` says which run it is.
 pub(crate) fn assert_in_order(task: &Task, told: &Told, (seed, name): (u64, &str)) {
     let notes = &told.notes;
-    let is_last = |it: &String| it.contains("rest: goal-reached") && it.contains("last");
+    let is_last = |it: &String| {
+        it.contains("rest: goal-reached") && it.contains("last") || it.contains("`last` achieved")
+    };
     assert!(notes.iter().any(is_last), "{name}, {seed}: {notes:#?}");
     let executed = told.report.executed.iter();
     let steps: Vec<Step> = executed.map(|it| it.step.clone()).collect();

@@ -61,7 +61,7 @@ impl Run<'_> {
         goals: &Goals,
         mission: &Mission,
     ) -> Result<(), Stop> {
-        self.note_plan(course.plan);
+        self.note_plan(course.plan, goals);
         self.begin_anew_with(course, goals);
         self.begin_mission(mission)
     }

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use elbowroom_model::ground::Condition;
 use elbowroom_model::{Task, problem};
 
 use super::Run;
 use super::lasting::{FIRST_GOAL, Turn};
-use super::stand::Goals;
+use super::stand::{GivenGoal, Goals};
 use crate::reason::{About, Cause, Reason};
 
 /// A goal that is open.
@@ -15,22 +16,51 @@ pub(super) struct OpenGoal {
     /// As it was given; `None` for that of the problem.
     pub(super) text: Option<String>,
     pub(super) condition: problem::Condition,
+    /// The same, grounded.
+    pub(super) ground: Condition,
+    /// The reason for which it can never become true, if that is known.
+    pub(super) hopeless: Option<String>,
+    /// The reason for which it is set aside while other goals are pursued.
+    pub(super) aside: Option<String>,
+    /// `true` if the record says that it is set aside.
+    pub(super) is_announced: bool,
 }
 
 impl OpenGoal {
-    /// The goal that the problem itself has.
-    pub(super) fn of_the_problem(condition: problem::Condition) -> Self {
+    /// Creates a goal of a task from its text and the condition that the text means.
+    pub(super) fn new(
+        task: &Task,
+        name: String,
+        text: Option<String>,
+        condition: problem::Condition,
+    ) -> Self {
         Self {
-            name: FIRST_GOAL.to_owned(),
-            text: None,
+            name,
+            text,
+            ground: task.with_goal(condition.clone()).goal().clone(),
             condition,
+            hopeless: None,
+            aside: None,
+            is_announced: false,
         }
+    }
+
+    /// Returns the goal that the problem itself has.
+    pub(super) fn of_the_problem(task: &Task) -> Self {
+        let condition = task.problem().goal.clone();
+        Self::new(task, FIRST_GOAL.to_owned(), None, condition)
+    }
+
+    /// Returns `true` unless it is set aside.
+    pub(super) fn is_pursued(&self) -> bool {
+        self.aside.is_none()
     }
 }
 
-/// All of them together.
+/// Returns the conjunction of all goals that are pursued.
 fn together(goals: &[OpenGoal]) -> problem::Condition {
-    let mut goals: Vec<_> = goals.iter().map(|it| it.condition.clone()).collect();
+    let goals = goals.iter().filter(|it| it.is_pursued());
+    let mut goals: Vec<_> = goals.map(|it| it.condition.clone()).collect();
     match (goals.pop(), goals.is_empty()) {
         (None, _) => problem::Condition::TRUE,
         (Some(only), true) => only,
@@ -57,7 +87,7 @@ impl Run<'_> {
         lasting.change = Some(Turn::of(what, may_keep));
     }
 
-    /// All open goals together are the goal.
+    /// All goals that are pursued are the goal of the task.
     pub(super) fn set_goal(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;
@@ -77,7 +107,7 @@ impl Run<'_> {
         };
         let open = lasting.goals.iter();
         Goals {
-            open: open.map(|it| (it.name.clone(), it.text.clone())).collect(),
+            open: open.map(GivenGoal::of).collect(),
             are_others: lasting.has_other_goals,
         }
     }
@@ -87,14 +117,18 @@ impl Run<'_> {
         let Some(lasting) = &self.lasting else {
             return Vec::new();
         };
-        let goals = goals.open.iter().filter_map(|(name, text)| {
-            let Some(text) = text else {
-                return Some(OpenGoal::of_the_problem(problem.problem().goal.clone()));
+        let goals = goals.open.iter().filter_map(|given| {
+            let goal = match &given.text {
+                None => OpenGoal::of_the_problem(problem),
+                Some(text) => {
+                    let condition = lasting.reader.read(problem, text).ok()?;
+                    OpenGoal::new(problem, given.name.clone(), Some(text.clone()), condition)
+                }
             };
             Some(OpenGoal {
-                name: name.clone(),
-                text: Some(text.clone()),
-                condition: lasting.reader.read(problem, text).ok()?,
+                aside: given.aside.clone(),
+                is_announced: given.aside.is_some(),
+                ..goal
             })
         });
         goals.collect()

@@ -20,6 +20,7 @@
 //! and says why. What is under way goes on to its end. A request ends the rest; so does, while goals
 //! are open, any news from the world, and each timed initial, at most once in [`BREATH`] seconds.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan, problem};
@@ -27,11 +28,13 @@ use elbowroom_num::Rational;
 
 use super::agenda::Todo;
 use super::beginning::Course;
+use super::choosing::Choosing;
 use super::goals::OpenGoal;
 use super::here::{Guess, rest_of};
 use super::intake::Remark;
 use super::pending::Otherwise;
 use super::search::Lost;
+use super::stand::Goals;
 use super::{Run, Stop, Verdict};
 use crate::event::{Request, Ticket};
 use crate::executor::News;
@@ -76,8 +79,14 @@ pub(super) struct Lasting<'a> {
     pub(super) is_paused: bool,
     /// How the goals have changed since the present plan was made.
     pub(super) change: Option<Turn>,
+    /// The selection among the goals that is under way.
+    pub(super) choosing: Option<Choosing>,
+    /// `true` if goals were closed while the last search for a plan was under way.
+    pub(super) has_closed_goals: bool,
     /// The plan that is executed, on the world's clock.
-    plan: Option<TimeTriggeredPlan>,
+    pub(super) plan: Option<TimeTriggeredPlan>,
+    /// The names of the goals that it is for.
+    pub(super) planned_goals: BTreeSet<String>,
     /// Since when the run rests.
     rests_since: Option<Rational>,
     /// It is proved that no plan reaches the goals from there, whatever timed initials are to come.
@@ -109,11 +118,10 @@ impl<'a> Run<'a> {
     /// fails, or a request to end.
     #[must_use]
     pub fn lasting(mut self, reader: impl GoalReader + 'a) -> Self {
-        let goal = self.task.problem().goal.clone();
-        let goals = if goal.is_trivial() {
+        let goals = if self.task.problem().goal.is_trivial() {
             Vec::new()
         } else {
-            vec![OpenGoal::of_the_problem(goal)]
+            vec![OpenGoal::of_the_problem(&self.task)]
         };
         self.lasting = Some(Lasting {
             reader: Box::new(reader),
@@ -121,7 +129,10 @@ impl<'a> Run<'a> {
             has_other_goals: false,
             is_paused: false,
             change: None,
+            choosing: None,
+            has_closed_goals: false,
             plan: None,
+            planned_goals: BTreeSet::new(),
             rests_since: None,
             is_unsolvable: false,
             at_rest: AtRest::Waits,
@@ -155,16 +166,18 @@ impl<'a> Run<'a> {
                 let Ok(condition) = lasting.reader.read(&self.task, goal) else {
                     return Some("it is no goal of this problem; nothing was made of it");
                 };
-                let given = OpenGoal {
-                    name: name.clone(),
-                    text: Some(goal.clone()),
-                    condition,
-                };
+                let text = Some(goal.clone());
+                let given = OpenGoal::new(&self.task, name.clone(), text, condition);
                 let known = lasting.goals.iter_mut().find(|known| known.name == *name);
                 let is_new = known.is_none();
                 match known {
                     Some(known) => *known = given,
                     None => lasting.goals.push(given),
+                }
+                if is_new {
+                    self.add_to_choice();
+                } else {
+                    self.pursue_all();
                 }
                 self.turn(format!("`{name}` is to be reached"), is_new);
                 None
@@ -175,6 +188,7 @@ impl<'a> Run<'a> {
                 if lasting.goals.len() == before {
                     return Some("no goal of that name is open");
                 }
+                self.pursue_all();
                 self.turn(format!("`{name}` is abandoned"), false);
                 None
             }
@@ -284,6 +298,7 @@ impl<'a> Run<'a> {
         if let Some(lasting) = &mut self.lasting {
             lasting.rests_since = None;
         }
+        self.pursue_all();
     }
 
     /// Keeps the rest of the plan, or makes another one.
@@ -336,11 +351,15 @@ impl<'a> Run<'a> {
         });
     }
 
-    /// A plan is taken up.
-    pub(super) fn note_plan(&mut self, plan: &TimeTriggeredPlan) {
+    /// A plan for these goals is taken up.
+    pub(super) fn note_plan(&mut self, plan: &TimeTriggeredPlan, goals: &Goals) {
         if let Some(lasting) = &mut self.lasting {
             lasting.plan = Some(plan.clone());
             lasting.rests_since = None;
+            lasting.has_closed_goals = false;
+            let pursued = goals.open.iter().filter(|it| it.aside.is_none());
+            lasting.planned_goals = pursued.map(|it| it.name.clone()).collect();
+            self.choose_after_success();
         }
     }
 
@@ -349,6 +368,7 @@ impl<'a> Run<'a> {
         self.account.begin_plan(&std::collections::BTreeMap::new());
         if let Some(lasting) = &mut self.lasting {
             lasting.plan = None;
+            lasting.planned_goals.clear();
         }
     }
 
@@ -437,6 +457,9 @@ impl<'a> Run<'a> {
 
     /// Waits for a change, after the goals were reached, or because they cannot be.
     pub(super) fn rest(&mut self, verdict: &Verdict) {
+        if self.choose_after(verdict) {
+            return;
+        }
         let dead_end = match verdict {
             Verdict::Unsolvable if self.is_explaining => self.dead_end(),
             _ => Vec::new(),
@@ -451,6 +474,7 @@ impl<'a> Run<'a> {
         };
         lasting.rests_since = Some(self.now.clone());
         lasting.is_unsolvable = verdict == Some(&Verdict::Unsolvable);
+        lasting.has_closed_goals = false;
         let goals: Vec<String> = lasting.goals.iter().map(|it| it.name.clone()).collect();
         let is_reached = verdict == Some(&Verdict::GoalReached);
         if is_reached {

@@ -505,6 +505,7 @@ impl Run<'_> {
             _ if self.is_to_turn() => Ok(()),
             // There was none from there; from here, there may be.
             _ if search.is_overtaken => self.search_again(&search.reason),
+            _ if search.course != Goes::UnderWay && self.leave_out_new_goals() => Ok(()),
             // What the present plan leads to was only expected.
             _ if search.is_guess
                 || !search.expected.is_empty()

@@ -17,6 +17,7 @@ use elbowroom_num::Rational;
 use super::account::KnownStart;
 use super::agenda::Todo;
 use super::beginning::Course;
+use super::goals::OpenGoal;
 use super::{Refusals, Run, Verdict};
 use crate::event::Ticket;
 use crate::executor::News;
@@ -86,10 +87,31 @@ pub struct TakesUp {
 /// Goals that are open, as they were given.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Goals {
-    /// Their names and texts; without a text, it is that of the problem.
-    pub open: Vec<(String, Option<String>)>,
+    /// The goals, in the order in which they were given.
+    pub open: Vec<GivenGoal>,
     /// Whether they are not, or no longer, those of the problem.
     pub are_others: bool,
+}
+
+/// A goal as it was given.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GivenGoal {
+    /// Its name.
+    pub name: String,
+    /// Its text in PDDL; `None` for the goal of the problem.
+    pub text: Option<String>,
+    /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
+    pub aside: Option<String>,
+}
+
+impl GivenGoal {
+    pub(super) fn of(goal: &OpenGoal) -> Self {
+        Self {
+            name: goal.name.clone(),
+            text: goal.text.clone(),
+            aside: goal.aside.clone(),
+        }
+    }
 }
 
 impl Run<'_> {
@@ -123,6 +145,7 @@ impl Run<'_> {
             )
         };
         let is_whole = self.search.is_none()
+            && !self.is_choosing_goals()
             && self.rests_since().is_none()
             && *self.belief.time() == self.now
             && !news.iter().any(is_of_a_step);

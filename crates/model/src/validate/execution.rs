@@ -396,10 +396,17 @@ impl Execution {
         {
             end.advance(&last);
         }
-        let time = end.time().clone();
-        end.course.end_group(&time);
-        end.refresh();
-        end.reads(goal, None).ok()
+        end.holds(goal)
+    }
+
+    /// Returns whether `condition` holds now, after all that has happened by this time. Returns `None` if it reads a
+    /// doubtful fact or value, or a fluent without a value.
+    pub fn holds(&self, condition: &Condition) -> Option<bool> {
+        let mut now = self.clone();
+        let time = now.time().clone();
+        now.course.end_group(&time);
+        now.refresh();
+        now.reads(condition, None).ok()
     }
 
     fn interference(

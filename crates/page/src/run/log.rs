@@ -86,6 +86,11 @@ impl Log {
                 let what = "the rest of the plan is kept".to_owned();
                 self.add(&kept.now.0, "planning", what, String::new(), why);
             }
+            Line::Goal(goal) => {
+                let what = format!("{}: {}", goal.becomes.in_words(), goal.name);
+                let why = goal.why.clone().unwrap_or_default();
+                self.add(&goal.now.0, "goal", what, String::new(), why);
+            }
             Line::Resting(rest) => {
                 let what = match rest.verdict.as_deref() {
                     None => "there is no goal".to_owned(),

@@ -2,8 +2,8 @@
 
 use elbowroom_execution::run::{ExecutedStep, Report, Verdict};
 use elbowroom_execution::{
-    Command, Decision, Ending, Entry, Event, Measured, Mission, Observation, Order, Planned,
-    Reason, Request, WarningCause,
+    Command, Decision, Ending, Entry, Event, GoalChange, Measured, Mission, Observation, Order,
+    Planned, Reason, Request, WarningCause,
 };
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -12,10 +12,10 @@ use indexmap::IndexMap;
 
 use super::line::{
     BoundLine, CommandLine, ConstraintLine, DecidedLine, DecisionLine, ExecutedLine, GivenLine,
-    InstanceLine, InterruptedLine, IntervalLine, KeptLine, Line, LookedLine, NetworkLine,
-    ObservationLine, ObservedLine, OrderLine, ParameterLine, PassedLine, PlanLine, PlannedLine,
-    PlanningLine, ReasonLine, ReportLine, RestingLine, RunningLine, SituationLine, StepLine,
-    WarningLine, WindowLine,
+    GoalChangeLine, GoalState, InstanceLine, InterruptedLine, IntervalLine, KeptLine, Line,
+    LookedLine, NetworkLine, ObservationLine, ObservedLine, OrderLine, ParameterLine, PassedLine,
+    PlanLine, PlannedLine, PlanningLine, ReasonLine, ReportLine, RestingLine, RunningLine,
+    SituationLine, StepLine, WarningLine, WindowLine,
 };
 use crate::exact::Exact;
 
@@ -111,6 +111,19 @@ impl Line {
                 now: exact(now),
                 reason: ReasonLine::of(reason),
             }),
+            Entry::Goal { now, name, change } => {
+                let (becomes, why) = match change {
+                    GoalChange::Achieved => (GoalState::Achieved, None),
+                    GoalChange::SetAside { why } => (GoalState::SetAside, Some(why.to_owned())),
+                    GoalChange::Pursued => (GoalState::Pursued, None),
+                };
+                Self::Goal(GoalChangeLine {
+                    now: exact(now),
+                    name: name.to_owned(),
+                    becomes,
+                    why,
+                })
+            }
             Entry::Resting {
                 now,
                 verdict,

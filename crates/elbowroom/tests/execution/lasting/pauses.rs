@@ -26,7 +26,7 @@ fn in_a_pause_nothing_is_started_and_what_runs_goes_on() {
         told.notes
     );
     assert_eq!(told.report.executed[0].ending, Some(Ending::Succeeded));
-    assert_has(&told, &["50: plan", "rest: goal-reached problem key"]);
+    assert_has(&told, &["50: plan", "rest: goal-reached key"]);
 }
 
 #[test]

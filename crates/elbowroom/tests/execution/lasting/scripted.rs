@@ -3,8 +3,8 @@
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom::execution::run::{Report, RunSettings, Verdict};
 use elbowroom::execution::{
-    Command, Ending, Entry, Event, Observation, Passage, Planner, PlannerAnswer, Recorder, Request,
-    World, WorldError,
+    Command, Ending, Entry, Event, GoalChange, Observation, Passage, Planner, PlannerAnswer,
+    Recorder, Request, World, WorldError,
 };
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
@@ -150,6 +150,14 @@ impl Recorder for Notes {
                 self.note(format!("{}: plan, because {}", at(now), reason));
             }
             Entry::Kept { now, .. } => self.note(format!("{}: the plan is kept", at(now))),
+            Entry::Goal { now, name, change } => {
+                let change = match change {
+                    GoalChange::Achieved => "achieved".to_owned(),
+                    GoalChange::SetAside { why } => format!("set aside, because {why}"),
+                    GoalChange::Pursued => "pursued again".to_owned(),
+                };
+                self.note(format!("{}: `{name}` {change}", at(now)));
+            }
             Entry::Resting {
                 now,
                 verdict,

@@ -1,6 +1,6 @@
 //! A plan that is taken up, in a snapshot.
 
-use elbowroom_execution::run::{Goals, KnownStart, TakesUp};
+use elbowroom_execution::run::{GivenGoal, Goals, KnownStart, TakesUp};
 use elbowroom_execution::{Guards, News, Ticket};
 use elbowroom_model::{RunningAction, Situation, State, Task};
 use elbowroom_num::Interval;
@@ -72,6 +72,9 @@ pub struct GoalLine {
     /// As it was given; none if it is that of the problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal: Option<String>,
+    /// The reason for which it is set aside while others are pursued; none if it is pursued.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub aside: Option<String>,
 }
 
 /// Something that a plan does not know of.
@@ -97,15 +100,20 @@ pub struct TurnLine {
 }
 
 pub(super) fn goal_lines(goals: &Goals) -> Vec<GoalLine> {
-    let lines = goals.open.iter().map(|(name, goal)| GoalLine {
-        name: name.clone(),
-        goal: goal.clone(),
+    let lines = goals.open.iter().map(|given| GoalLine {
+        name: given.name.clone(),
+        goal: given.text.clone(),
+        aside: given.aside.clone(),
     });
     lines.collect()
 }
 
-pub(super) fn goals_of(lines: &[GoalLine]) -> Vec<(String, Option<String>)> {
-    let goals = lines.iter().map(|it| (it.name.clone(), it.goal.clone()));
+pub(super) fn goals_of(lines: &[GoalLine]) -> Vec<GivenGoal> {
+    let goals = lines.iter().map(|line| GivenGoal {
+        name: line.name.clone(),
+        text: line.goal.clone(),
+        aside: line.aside.clone(),
+    });
     goals.collect()
 }
 

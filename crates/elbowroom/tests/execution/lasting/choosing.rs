@@ -1,0 +1,140 @@
+//! Goals that cannot all be reached together.
+
+use std::sync::Arc;
+
+use elbowroom::model::Task;
+use elbowroom::pddl::{self, Source};
+
+use super::scripted::{abandon, assert_has, has, pursue, run, task};
+
+const NEVER: &str = "because (not (here book)) can never become true";
+
+#[test]
+fn an_impossible_goal_does_not_keep_the_others_from_being_reached() {
+    let task = task("", "(have book)");
+    let script = vec![
+        (0, pursue("moon", "(not (here book))")),
+        (0, pursue("cup", "(have cup)")),
+    ];
+    let told = run(&task, 100, script);
+    assert_has(
+        &told,
+        &[
+            "start (fetch r book)",
+            &format!("`moon` set aside, {NEVER}"),
+            "`problem` achieved",
+            "start (fetch r cup)",
+            "`cup` achieved",
+            "rest: unsolvable-from-here moon",
+        ],
+    );
+}
+
+#[test]
+fn goals_are_selected_if_no_plan_reaches_all_of_them_at_first() {
+    let task = task("", "(and)");
+    let script = vec![
+        (0, pursue("moon", "(not (here book))")),
+        (0, pursue("cup", "(have cup)")),
+    ];
+    let told = run(&task, 100, script);
+    assert_has(
+        &told,
+        &[
+            &format!("`moon` set aside, {NEVER}"),
+            "start (fetch r cup)",
+            "`cup` achieved",
+            "rest: unsolvable-from-here moon",
+        ],
+    );
+}
+
+#[test]
+fn a_goal_that_is_achieved_is_closed_while_others_are_pursued() {
+    let task = task("", "(have book)");
+    let told = run(&task, 100, vec![(0, pursue("cup", "(have cup)"))]);
+    assert_has(&told, &["achieved", "rest: goal-reached"]);
+    assert!(
+        !has(&told, "rest: goal-reached problem cup"),
+        "{:#?}",
+        told.notes
+    );
+}
+
+#[test]
+fn an_impossible_goal_that_is_given_later_leaves_the_plan_as_it_is() {
+    let task = task("", "(and (have book) (have cup))");
+    let told = run(&task, 100, vec![(5, pursue("moon", "(not (here book))"))]);
+    assert_has(
+        &told,
+        &[
+            "0: start (fetch r book)",
+            "5: `moon` set aside",
+            "start (fetch r cup)",
+            "rest: unsolvable-from-here moon",
+        ],
+    );
+    assert!(!has(&told, "cancel"), "{:#?}", told.notes);
+}
+
+/// A robot that moves between rooms, each move in ten seconds.
+fn rooms(goal: &str) -> Arc<Task> {
+    let domain = "(define (domain rooms) (:requirements :durative-actions :typing)
+      (:types room) (:predicates (at ?x - room))
+      (:durative-action move :parameters (?x ?y - room) :duration (= ?duration 10)
+        :condition (at start (at ?x)) :effect (and (at start (not (at ?x))) (at end (at ?y)))))";
+    let problem = format!(
+        "(define (problem p) (:domain rooms) (:objects home lab ward - room)
+           (:init (at home)) (:goal {goal}))"
+    );
+    let source = |text: &str| Source::new("test", text);
+    let read = pddl::read_problem(&source(domain), &source(&problem));
+    Arc::new(Task::new(read.expect("a correct test").0))
+}
+
+#[test]
+fn goals_that_exclude_each_other_are_reached_one_after_the_other() {
+    let script = vec![(0, pursue("ward", "(at ward)"))];
+    let told = run(&rooms("(at lab)"), 100, script);
+    assert_has(
+        &told,
+        &[
+            "0: start (move home lab)",
+            "0: `ward` set aside, because no plan reaches it together with `problem`",
+            "10: `problem` achieved",
+            "10: `ward` pursued again",
+            "start (move lab ward)",
+            "rest: goal-reached ward",
+        ],
+    );
+}
+
+#[test]
+fn many_goals_are_reached_in_parts() {
+    let names = ["lab", "ward"];
+    let goal = |i: usize| {
+        (
+            0,
+            pursue(&format!("g{i}"), &format!("(at {})", names[i % 2])),
+        )
+    };
+    let told = run(&rooms("(at lab)"), 200, (0..12).map(goal).collect());
+    let achieved = told.notes.iter().filter(|it| it.ends_with("achieved"));
+    assert_eq!(achieved.count(), 7, "{:#?}", told.notes);
+    assert_has(&told, &["rest: goal-reached g1 g3 g5 g7 g9 g11"]);
+    assert_eq!(told.report.starts, 2, "{:#?}", told.notes);
+}
+
+#[test]
+fn a_goal_that_was_set_aside_is_pursued_again_when_another_one_is_abandoned() {
+    let task = task("", "(have book)");
+    let script = vec![
+        (0, pursue("moon", "(not (here book))")),
+        (5, abandon("problem")),
+    ];
+    let told = run(&task, 100, script);
+    assert_has(
+        &told,
+        &["0: `moon` set aside", "5: rest: unsolvable-from-here moon"],
+    );
+}

@@ -1,0 +1,352 @@
+//! Pursuit of those goals that can be reached together.
+//!
+//! All open goals of a lasting run are pursued together at first. If there is no plan for all of them, a part is
+//! selected ([`Selection`]) and the other goals are set aside; they are pursued when the selected ones are achieved, or
+//! when the goals change. Goals that are given while a plan is executed are added to those of the plan; if no
+//! plan reaches all of them, the new goals are set aside and the plan continues. Of several goals, each is closed as soon as
+//! it is achieved.
+
+use std::collections::BTreeSet;
+
+use super::dead_end::hopeless_conditions;
+use super::goals::OpenGoal;
+use super::search::Lost;
+use super::selection::{Selection, Set, Step};
+use super::{Run, Verdict};
+use crate::record::{Entry, GoalChange};
+
+/// The greatest number of goals that are listed in a reason.
+const MOST_LISTED: usize = 5;
+
+/// A selection among the open goals.
+pub(super) struct Choosing {
+    /// The names of the goals, in order of preference.
+    names: Vec<String>,
+    selection: Selection,
+    /// The goals that are pursued meanwhile.
+    tried: Set,
+}
+
+impl Choosing {
+    /// All these goals are tried.
+    fn all(names: Vec<String>, selection: impl FnOnce(usize) -> Selection) -> Self {
+        let count = names.len();
+        Self {
+            names,
+            selection: selection(count),
+            tried: (0..count).collect(),
+        }
+    }
+
+    fn position(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|it| it == name)
+    }
+
+    /// Returns the names of those goals of the set that are open.
+    fn open(&self, set: &Set, goals: &[OpenGoal]) -> BTreeSet<String> {
+        let names = set.iter().map(|it| &self.names[*it]);
+        let is_open = |name: &&String| goals.iter().any(|goal| goal.name == **name);
+        names.filter(is_open).cloned().collect()
+    }
+}
+
+impl Run<'_> {
+    /// Returns `true` while goals are selected.
+    pub(super) fn is_choosing_goals(&self) -> bool {
+        let lasting = self.lasting.as_ref();
+        lasting.is_some_and(|lasting| lasting.choosing.is_some())
+    }
+
+    /// Closes the goals that are achieved while others are still pursued.
+    pub(super) fn close_achieved_goals(&mut self) {
+        let Some(lasting) = self.lasting.as_mut().filter(|it| it.goals.len() > 1) else {
+            return;
+        };
+        let belief = &self.belief;
+        let is_achieved = |goal: &OpenGoal| belief.is_certain(&goal.ground) == Ok(true);
+        let is_left = |goal: &OpenGoal| goal.is_pursued() && !is_achieved(goal);
+        if !lasting.goals.iter().any(is_left) || !lasting.goals.iter().any(is_achieved) {
+            return;
+        }
+        let (achieved, left): (Vec<_>, Vec<_>) = lasting.goals.drain(..).partition(is_achieved);
+        lasting.goals = left;
+        lasting.has_closed_goals = self.search.is_some();
+        self.record_achieved(&achieved);
+        self.set_goal();
+    }
+
+    fn record_achieved(&mut self, goals: &[OpenGoal]) {
+        for goal in goals {
+            self.ports.recorder.record(&Entry::Goal {
+                now: &self.now,
+                name: &goal.name,
+                change: GoalChange::Achieved,
+            });
+        }
+    }
+
+    /// Pursues all open goals again, from the next plan on.
+    pub(super) fn pursue_all(&mut self) {
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        lasting.choosing = None;
+        let mut is_changed = false;
+        for goal in &mut lasting.goals {
+            is_changed |= goal.aside.take().is_some();
+            goal.hopeless = None;
+        }
+        if is_changed {
+            self.set_goal();
+        }
+    }
+
+    /// Goals were given while a plan is executed: if no plan reaches these as well, the present plan continues.
+    pub(super) fn add_to_choice(&mut self) {
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        let (mut planned, mut new) = (Vec::new(), Vec::new());
+        for goal in &mut lasting.goals {
+            if lasting.planned_goals.contains(&goal.name) {
+                planned.push(goal.name.clone());
+            } else if !goal.is_announced {
+                goal.aside = None;
+                new.push(goal.name.clone());
+            }
+        }
+        lasting.choosing = (!planned.is_empty()).then(|| {
+            let selected = planned.len();
+            let names = [planned, new].concat();
+            Choosing::all(names, |count| Selection::grown(selected, count))
+        });
+    }
+
+    /// Continues with other goals where the run would otherwise rest with this verdict. Returns `false` if there are
+    /// none.
+    pub(super) fn choose_after(&mut self, verdict: &Verdict) -> bool {
+        match verdict {
+            Verdict::GoalReached => self.pursue_goals_set_aside(),
+            Verdict::Unsolvable | Verdict::NoPlan { .. } => {
+                self.choose_after_closing() || self.choose_after_failure()
+            }
+            _ => {
+                self.pursue_all();
+                false
+            }
+        }
+    }
+
+    /// The goals that are pursued are achieved: closes them and turns to those that were set aside.
+    fn pursue_goals_set_aside(&mut self) -> bool {
+        let Some(lasting) = &mut self.lasting else {
+            return false;
+        };
+        lasting.choosing = None;
+        if lasting.goals.iter().all(OpenGoal::is_pursued) {
+            return false;
+        }
+        let (achieved, left) = lasting.goals.drain(..).partition(OpenGoal::is_pursued);
+        lasting.goals = left;
+        self.record_achieved(&achieved);
+        self.pursue_all();
+        self.announce_goals();
+        self.set_goal();
+        self.drop_plan();
+        self.history.clear();
+        self.beginning = self.belief.clone();
+        self.reasons.clear();
+        self.replans = 0;
+        self.lost = Lost::default();
+        self.turn("the others are reached".to_owned(), true);
+        true
+    }
+
+    /// Tries again if goals were closed since the plan was requested: there may be one for the others.
+    fn choose_after_closing(&mut self) -> bool {
+        let Some(lasting) = &mut self.lasting else {
+            return false;
+        };
+        let has_closed = std::mem::take(&mut lasting.has_closed_goals);
+        if has_closed {
+            self.turn("some are reached".to_owned(), true);
+        }
+        has_closed
+    }
+
+    /// No plan was found for the goals that are pursued: chooses others.
+    fn choose_after_failure(&mut self) -> bool {
+        let Some(lasting) = &mut self.lasting else {
+            return false;
+        };
+        if let Some(mut choosing) = lasting.choosing.take() {
+            self.note_hopeless_goals();
+            let step = choosing.selection.after_failure(choosing.tried.clone());
+            return self.follow(choosing, step, true);
+        }
+        if lasting.goals.len() < 2 {
+            return false;
+        }
+        let tried = lasting.goals.iter().filter(|goal| goal.is_pursued());
+        let tried: BTreeSet<String> = tried.map(|goal| goal.name.clone()).collect();
+        let names = self.set_hopeless_goals_aside();
+        let mut choosing = Choosing::all(names, Selection::among);
+        let positions = tried.iter().map(|name| choosing.position(name));
+        let step = match positions.collect::<Option<Set>>() {
+            Some(tried) => choosing.selection.after_failure(tried),
+            // Some were hopeless.
+            None => Step::Try(choosing.tried.clone()),
+        };
+        self.follow(choosing, step, true)
+    }
+
+    /// Sets those open goals aside that can never become true. Returns the names of the others.
+    fn set_hopeless_goals_aside(&mut self) -> Vec<String> {
+        self.pursue_all();
+        self.note_hopeless_goals();
+        let mut others = Vec::new();
+        for goal in self.lasting.iter_mut().flat_map(|it| &mut it.goals) {
+            goal.aside.clone_from(&goal.hopeless);
+            if goal.is_pursued() {
+                others.push(goal.name.clone());
+            }
+        }
+        others
+    }
+
+    /// Notes which of the goals that are pursued can never become true.
+    fn note_hopeless_goals(&mut self) {
+        let hopeless = hopeless_conditions(&self.belief);
+        let goals = self.lasting.iter_mut().flat_map(|it| &mut it.goals);
+        for goal in goals.filter(|goal| goal.is_pursued()) {
+            let parts = goal.ground.conjuncts().into_iter();
+            let lost = parts.filter(|part| hopeless.contains(part));
+            let lost: Vec<String> = lost.map(|it| self.task.describe_condition(it)).collect();
+            let why = || format!("{} can never become true", lost.join(", "));
+            goal.hopeless = (!lost.is_empty()).then(why);
+        }
+    }
+
+    /// A plan was taken up: continues a choice that was waiting for it.
+    pub(super) fn choose_after_success(&mut self) {
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        let (goals, planned) = (&lasting.goals, &lasting.planned_goals);
+        let is_tried = |choosing: &mut Choosing| {
+            let tried = choosing.open(&choosing.tried, goals);
+            let open = goals.iter().map(|goal| &goal.name);
+            tried
+                .iter()
+                .eq(planned.intersection(&open.cloned().collect()))
+        };
+        if let Some(mut choosing) = lasting.choosing.take_if(is_tried) {
+            let step = choosing.selection.after_success(choosing.tried.clone());
+            self.follow(choosing, step, false);
+        } else if lasting.choosing.is_none() {
+            self.announce_goals();
+        }
+    }
+
+    /// No plan was found for new goals in addition to those of the present plan, which continues. Returns `false` if
+    /// the failure was another one.
+    pub(super) fn leave_out_new_goals(&mut self) -> bool {
+        if self.choose_after_closing() {
+            return true;
+        }
+        let Some(lasting) = &mut self.lasting else {
+            return false;
+        };
+        let has_plan = lasting.plan.is_some();
+        let grows = |choosing: &mut Choosing| matches!(choosing.selection, Selection::Growth(_));
+        let Some(mut choosing) = lasting.choosing.take_if(|it| has_plan && grows(it)) else {
+            return false;
+        };
+        self.note_hopeless_goals();
+        let step = choosing.selection.after_failure(choosing.tried.clone());
+        self.follow(choosing, step, false)
+    }
+
+    /// Pursues the goals of the next step. Returns `false` if there is no plan for any goal. A plan is requested or kept
+    /// for goals that are tried, and if `is_to_plan` for the selected ones.
+    fn follow(&mut self, mut choosing: Choosing, mut step: Step, is_to_plan: bool) -> bool {
+        let Some(lasting) = &mut self.lasting else {
+            return false;
+        };
+        let (set, pursued, is_last) = loop {
+            let (set, is_last) = match step {
+                Step::Try(set) => (set, false),
+                Step::Select(set) => (set, true),
+            };
+            let pursued = choosing.open(&set, &lasting.goals);
+            if is_last || !pursued.is_empty() {
+                break (set, pursued, is_last);
+            }
+            // All of these were closed meanwhile.
+            step = choosing.selection.after_failure(set);
+        };
+        if pursued.is_empty() {
+            self.pursue_all();
+            self.announce_goals();
+            return false;
+        }
+        let list = self::list(&choosing, &set, &pursued);
+        let candidates = lasting.goals.iter_mut();
+        for goal in candidates.filter(|goal| choosing.names.contains(&goal.name)) {
+            let is_aside = !pursued.contains(&goal.name);
+            let is_alone = choosing.position(&goal.name);
+            let is_alone = is_alone.is_some_and(|it| choosing.selection.is_excluded(it));
+            let why = || match &goal.hopeless {
+                Some(why) => why.clone(),
+                None if is_alone => "no plan reaches it".to_owned(),
+                None => format!("no plan reaches it together with {list}"),
+            };
+            goal.aside = is_aside.then(why);
+        }
+        choosing.tried = set;
+        lasting.choosing = (!is_last).then_some(choosing);
+        if is_last {
+            self.announce_goals();
+        }
+        if is_last && !is_to_plan {
+            self.set_goal();
+        } else {
+            self.turn(format!("{list} are pursued"), true);
+        }
+        true
+    }
+
+    /// Records which goals are set aside, and which are pursued again.
+    fn announce_goals(&mut self) {
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        for goal in &mut lasting.goals {
+            if goal.is_announced == goal.aside.is_some() {
+                continue;
+            }
+            goal.is_announced = goal.aside.is_some();
+            let change = match &goal.aside {
+                Some(why) => GoalChange::SetAside { why },
+                None => GoalChange::Pursued,
+            };
+            self.ports.recorder.record(&Entry::Goal {
+                now: &self.now,
+                name: &goal.name,
+                change,
+            });
+        }
+    }
+}
+
+/// The names of goals, in words.
+fn list(choosing: &Choosing, set: &Set, open: &BTreeSet<String>) -> String {
+    let names = set.iter().map(|it| &choosing.names[*it]);
+    let names = names.filter(|name| open.contains(*name));
+    let listed = names.take(MOST_LISTED).map(|name| format!("`{name}`"));
+    let listed: Vec<String> = listed.collect();
+    match open.len() - listed.len() {
+        0 => listed.join(", "),
+        more => format!("{} and {more} others", listed.join(", ")),
+    }
+}
