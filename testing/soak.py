@@ -161,6 +161,8 @@ class Trace:
         elif line["event"] == "looked":
             facts = {it["fact"] for it in line["observations"] if it["type"] == "fact" and it["becomes"]}
             self.looked = (decimal(line["now"]), facts)
+        elif line["event"] == "goal" and line["becomes"] == "achieved":
+            self.reached.add(line["name"])
         elif line["event"] == "resting" and line["verdict"] == "goal-reached":
             at, facts = self.looked
             for name in line["goals"]:
@@ -188,7 +190,7 @@ def step(own, dice, jobs, tally):
             # It is closed, as it was reached: one that we cancelled is not in our list any more.
             del tally["open"][name]
             tally["reached"].add(name)
-    # Goals are closed when all of them are reached: so they come by the dozen, and then it has time.
+    # Goals come by the dozen, and then it has time.
     if not tally["open"]:
         tally["burst"] = dice.randrange(8, 24)
     busy = {*tally["open"].values(), *facts}

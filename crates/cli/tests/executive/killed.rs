@@ -101,7 +101,9 @@ fn reached(journal: &str) -> BTreeSet<String> {
     for segment in segments(journal) {
         // While the segments get their next numbers, one is not where it was.
         let text = fs::read_to_string(&segment).unwrap_or_default();
-        for line in text.lines().filter(|line| line.contains("\"resting\"")) {
+        let is_about_goals =
+            |line: &&str| line.contains("\"resting\"") || line.contains("\"event\":\"goal\"");
+        for line in text.lines().filter(is_about_goals) {
             // The last line may be in the writing.
             let Ok(line) = serde_json::from_str::<Value>(&line[9..]) else {
                 continue;
@@ -109,6 +111,8 @@ fn reached(journal: &str) -> BTreeSet<String> {
             if line["verdict"] == "goal-reached" {
                 let names = line["goals"].as_array().expect("goals").iter();
                 reached.extend(names.filter_map(Value::as_str).map(str::to_owned));
+            } else if line["becomes"] == "achieved" {
+                reached.extend(line["name"].as_str().map(str::to_owned));
             }
         }
     }

@@ -194,7 +194,7 @@ fn plans_that_are_ready_at_once_lead_to_the_same_as_plans_that_are_waited_for() 
 fn whatever_happens_while_plans_are_made_ready_what_is_done_is_valid_and_plays_back() {
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
     let mut records = Vec::new();
-    for seed in 0..360 {
+    for seed in 0..420 {
         let slowly = |dice: &mut Dice| -> Vec<Rational> {
             (0..16)
                 .map(|_| Rational::new(dice.small(160), 10))
