@@ -1,6 +1,6 @@
 //! A run that is attended: people ask what it does, and ask for something else, while it goes on.
 //!
-//! Requests wait at a [`Desk`]. The run fetches them as observations of its world ([`Attended`]), so
+//! Requests wait at a [`RequestQueue`]. The run fetches them as observations of its world ([`Attended`]), so
 //! that they stand in its record and it never waits for anybody.
 
 mod held;
@@ -16,8 +16,8 @@ use elbowroom::report::trace::{Line, SnapshotLine, snapshot_text};
 
 pub(crate) use world::Attended;
 
-use crate::desk::Desk;
-use crate::serve::Board;
+use elbowroom_executive::request_queue::RequestQueue;
+use elbowroom_executive::trace_buffer::TraceBuffer;
 
 /// Who attends a run, if anybody does.
 #[derive(Clone, Default)]
@@ -25,34 +25,34 @@ pub(crate) struct Attendance(Option<Attendants>);
 
 #[derive(Clone)]
 struct Attendants {
-    desk: Desk,
+    queue: RequestQueue,
     /// Where they ask, if not at the page alone.
-    asked: Option<(Status, Board)>,
+    asked: Option<(Status, TraceBuffer)>,
 }
 
 impl Attendance {
-    /// By those who hand in requests at `desk`, and ask `status` and `board`.
-    pub(crate) fn by(desk: Desk, status: Status, board: Board) -> Self {
-        let asked = Some((status, board));
-        Self(Some(Attendants { desk, asked }))
+    /// By those who hand in requests at `queue`, and ask `status` and `buffer`.
+    pub(crate) fn by(queue: RequestQueue, status: Status, buffer: TraceBuffer) -> Self {
+        let asked = Some((status, buffer));
+        Self(Some(Attendants { queue, asked }))
     }
 
     /// By those who only hand in requests.
-    pub(crate) fn at(desk: Desk) -> Self {
-        Self(Some(Attendants { desk, asked: None }))
+    pub(crate) fn at(queue: RequestQueue) -> Self {
+        Self(Some(Attendants { queue, asked: None }))
     }
 
     /// The run goes on as it stood, and what was before is no longer known.
     pub(crate) fn begin_at(&self, snapshot: &SnapshotLine) {
-        if let Some((status, board)) = self.0.as_ref().and_then(|it| it.asked.as_ref()) {
+        if let Some((status, buffer)) = self.0.as_ref().and_then(|it| it.asked.as_ref()) {
             status.begin_at(snapshot);
-            board.add(&format!("{}\n", snapshot_text(snapshot)));
+            buffer.add(&format!("{}\n", snapshot_text(snapshot)));
         }
     }
 
     /// Where requests wait.
-    pub(crate) fn desk(&self) -> Option<&Desk> {
-        self.0.as_ref().map(|attendants| &attendants.desk)
+    pub(crate) fn queue(&self) -> Option<&RequestQueue> {
+        self.0.as_ref().map(|attendants| &attendants.queue)
     }
 
     /// Where they ask how it stands.
@@ -103,17 +103,17 @@ impl<R: Recorder> Recorder for Witnessed<R> {
     fn record(&mut self, entry: &Entry<'_>) {
         self.inner.record(entry);
         if let Some(attendants) = &self.attendants {
-            if let Some((status, board)) = &attendants.asked {
+            if let Some((status, buffer)) = &attendants.asked {
                 status.record(entry);
                 let line = Line::of(&self.task, entry);
-                board.add(&format!("{}\n", line.text()));
+                buffer.add(&format!("{}\n", line.text()));
             }
-            let desk = &attendants.desk;
+            let queue = &attendants.queue;
             match entry {
                 Entry::Passed { observations, .. } => {
                     self.to_come = observations.len();
                     if !self.written_ahead {
-                        desk.note_recorded();
+                        queue.note_recorded();
                     }
                 }
                 Entry::Taken { .. } => {
@@ -122,7 +122,7 @@ impl<R: Recorder> Recorder for Witnessed<R> {
                 _ => return,
             }
             if self.to_come == 0 {
-                desk.acknowledge();
+                queue.acknowledge();
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::clock::Clock;
+use elbowroom_executive::clock::Clock;
 
 /// So far at most a world is held back at once.
 const AT_MOST: Duration = Duration::from_millis(100);

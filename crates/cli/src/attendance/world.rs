@@ -13,9 +13,9 @@ use elbowroom::num::Rational;
 use super::Attendance;
 use super::held::Held;
 use crate::bell::{Bell, Ring};
-use crate::clock::Clock;
-use crate::desk::Desk;
 use crate::interrupt::Interrupt;
+use elbowroom_executive::clock::Clock;
+use elbowroom_executive::request_queue::RequestQueue;
 
 /// How often it is looked whether a plan is there, or ready, in a second on the wall clock.
 const PER_SECOND: i64 = 50;
@@ -23,13 +23,13 @@ const PER_SECOND: i64 = 50;
 /// The time on the wall clock after which a wait looks for requests.
 const GLANCE: Duration = Duration::from_millis(50);
 
-/// Waits in pieces, so that whatever waits at the desk is reported with the time that it is then.
+/// Waits in pieces, so that whatever waits at the queue is reported with the time that it is then.
 ///
 /// While nothing is under way, or a plan is made beside the run, the world's time passes no faster
 /// than the wall clock's: there is nothing to wait for but people, and planners take time.
 pub(crate) struct Attended<'a, W> {
     inner: W,
-    desk: Option<Desk>,
+    queue: Option<RequestQueue>,
     /// Where people ask what time it is.
     status: Option<Status>,
     task: Arc<Task>,
@@ -61,7 +61,7 @@ impl<'a, W: World> Attended<'a, W> {
         let millis = i64::try_from(GLANCE.as_millis()).unwrap_or(i64::MAX);
         Self {
             inner,
-            desk: attendance.desk().cloned(),
+            queue: attendance.queue().cloned(),
             status: attendance.status().cloned(),
             task: Arc::clone(task),
             interrupt: interrupt.clone(),
@@ -109,12 +109,12 @@ impl<'a, W: World> Attended<'a, W> {
 
     /// Asks the world itself.
     fn ask<T>(&mut self, question: impl FnOnce(&mut W) -> T) -> T {
-        if let Some(desk) = &self.desk {
-            desk.note_question();
+        if let Some(queue) = &self.queue {
+            queue.note_question();
         }
         let answer = question(&mut self.inner);
-        if let Some(desk) = &self.desk {
-            desk.note_answer();
+        if let Some(queue) = &self.queue {
+            queue.note_answer();
         }
         answer
     }
@@ -147,7 +147,7 @@ impl<W: World> World for Attended<'_, W> {
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        if self.desk.is_none() && !self.bell.is_awaited() {
+        if self.queue.is_none() && !self.bell.is_awaited() {
             let passage = self.inner.wait(until)?;
             self.note(&passage);
             return Ok(passage);
@@ -183,8 +183,8 @@ impl<W: World> World for Attended<'_, W> {
             } else {
                 self.held = Held::start();
             }
-            if let Some(desk) = self.desk.as_ref().filter(|desk| !desk.is_empty()) {
-                let mut asked = desk.fetch(&self.now, &self.task);
+            if let Some(queue) = self.queue.as_ref().filter(|queue| !queue.is_empty()) {
+                let mut asked = queue.drain(&self.now, &self.task);
                 passage.observations.append(&mut asked);
             }
             if let Some(ring) = self.bell.heard() {

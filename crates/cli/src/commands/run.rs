@@ -1,12 +1,8 @@
 //! `elbowroom run`: execute a plan in a world.
 
 mod ahead;
-mod believed;
-mod journaled;
 pub(super) mod live;
-pub(super) mod process;
 mod readied;
-mod realtime;
 mod replay;
 pub(super) mod resume;
 mod shown;
@@ -34,21 +30,22 @@ use crate::args::RunArgs;
 use crate::attendance::{Attendance, Attended};
 use crate::bell::Bell;
 use crate::calendar::dated;
-use crate::clock::Clock;
-use crate::desk::Desk;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::journal::JournalFile;
 use crate::look::{BAD, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
-use crate::words::tame;
 use ahead::{Ahead, Aside};
-use believed::Believed;
-use journaled::{Careful, JournalWriter, Kept};
+use elbowroom_executive::belief_updates::BeliefUpdates;
+use elbowroom_executive::clock::Clock;
+use elbowroom_executive::journal::JournalFile;
+use elbowroom_executive::journaling::{JournalHealth, JournalWriter, JournaledWorld};
+use elbowroom_executive::messages::escape_control;
+use elbowroom_executive::process_world::{ProcessLimits, ProcessWorld, check_program};
+use elbowroom_executive::realtime::{Pace, PacedPlanner, Realtime};
+use elbowroom_executive::request_queue::RequestQueue;
 use readied::Readied;
-use realtime::{Pace, PacedPlanner, Realtime};
 use shown::Views;
 use spec::contradiction;
 use trace_file::TraceFile;
@@ -109,10 +106,11 @@ pub(super) fn journal(arguments: &RunArgs, resume: &str) -> Result<Option<Journa
     let Some(command) = &arguments.world_process else {
         return Ok(None);
     };
-    process::look_for(command)?;
+    check_program(command)?;
     let path = arguments.journal.as_deref();
     path.map(|path| JournalFile::create(path, resume))
         .transpose()
+        .map_err(Failure::from)
 }
 
 /// How plans are made in threads of their own.
@@ -127,7 +125,7 @@ pub(super) fn aside(arguments: &RunArgs, interrupt: &Interrupt) -> Aside {
 /// Those who may ask something of a run on its page, if anybody may.
 pub(super) fn attendance(arguments: &RunArgs) -> Attendance {
     match &arguments.control {
-        Some(_) => Attendance::at(Desk::default()),
+        Some(_) => Attendance::at(RequestQueue::default()),
         None => Attendance::default(),
     }
 }
@@ -272,17 +270,17 @@ impl Job<'_> {
             let mut writer = live::Live::new(&mut writer);
             match &arguments.world_process {
                 Some(command) => {
-                    let manners = process::Manners {
-                        patience: arguments.answer_within.clone(),
+                    let limits = ProcessLimits {
+                        answer_timeout: arguments.answer_within.clone(),
                         is_strict: arguments.strict_world,
                     };
-                    let interrupt = interrupt.clone();
-                    let world = process::ProcessWorld::start(command, task, manners, interrupt)?;
-                    let believed = Believed::default();
-                    let world = world.telling(believed.clone());
+                    let stop = interrupt.stop().clone();
+                    let world = ProcessWorld::start(command, task, limits, stop)?;
+                    let beliefs = BeliefUpdates::default();
+                    let world = world.with_beliefs(beliefs.clone());
                     let mut world = self.attended(world, &Rational::ONE);
                     (self.begun)();
-                    let outcome = self.run(&mut world, &mut writer, believed.listener());
+                    let outcome = self.run(&mut world, &mut writer, beliefs.listener());
                     world.into_inner().stop();
                     outcome.map_err(contradiction)?
                 }
@@ -346,31 +344,27 @@ impl Job<'_> {
         written.map_err(|error| Failure::new(format!("cannot write the journal: {error}"), ""))?;
         // Whoever has given the problem is told that it is on the disk. A run begins again without that.
         if !is_kept || (self.spec.is_lasting && !file.sync()) {
-            let why = file.trouble().unwrap_or_default();
+            let why = file.failure().unwrap_or_default();
             return Err(Failure::new(
                 format!("cannot write the journal {}: {why}", file.path().display()),
                 "nothing was started; make room on the disk, or choose another file",
             ));
         }
-        let manners = process::Manners {
-            patience: arguments.answer_within.clone(),
+        let limits = ProcessLimits {
+            answer_timeout: arguments.answer_within.clone(),
             is_strict: arguments.strict_world,
         };
-        let kept = Kept::default();
+        let health = JournalHealth::default();
         let interrupt = self.interrupt;
         let views = Views::open(arguments, self.spec, self.task, interrupt, self.attendance)?;
-        let world = process::ProcessWorld::start(command, self.task, manners, interrupt.clone())?;
-        let believed = Believed::default();
-        let world = Careful {
-            inner: world.telling(believed.clone()),
-            kept: kept.clone(),
-            refused: Vec::new(),
-        };
+        let world = ProcessWorld::start(command, self.task, limits, interrupt.stop().clone())?;
+        let beliefs = BeliefUpdates::default();
+        let world = JournaledWorld::new(world.with_beliefs(beliefs.clone()), health.clone());
         let mut world = self.attended(world, &Rational::ONE);
         (self.begun)();
         let outcome = {
-            let desk = self.attendance.desk();
-            let writer = JournalWriter::new(self.task, &mut file, &kept, desk);
+            let queue = self.attendance.queue();
+            let writer = JournalWriter::new(self.task, &mut file, &health, queue);
             let writer = self.attendance.witnessed(writer, self.task, true);
             let mut writer = views.shown(writer, self.task);
             let begun = Clock::start();
@@ -384,18 +378,18 @@ impl Job<'_> {
                 .beginning_with(self.first)
                 .planned_by(Ahead::new(planner, self.spec, &self.aside))
                 .prepared_by(readied)
-                .told_to(both(self.attendance.listener(), believed.listener()))
+                .told_to(both(self.attendance.listener(), beliefs.listener()))
                 .recorded_by(live::Live::new(&mut writer));
             let mut watch = Attentive {
                 inner: Stopwatch::start(interrupt),
-                kept,
+                health,
             };
             execute(request, &mut world, &mut watch)
         };
-        world.into_inner().inner.stop();
+        world.into_inner().into_inner().stop();
         views.close();
         let outcome = outcome.map_err(contradiction)?;
-        conclude((arguments, self.spec), outcome, file.trouble(), output)
+        conclude((arguments, self.spec), outcome, file.failure(), output)
     }
 
     /// A run in the world that the specification describes, on a wall clock if it asks for one.
@@ -417,7 +411,7 @@ impl Job<'_> {
         let world = Realtime {
             inner: world.as_mut(),
             pace: &pace,
-            interrupt: self.interrupt,
+            stop: self.interrupt.stop(),
         };
         let mut world = self.attended(world, factor);
         let request = RunRequest::new(spec, task)
@@ -437,7 +431,7 @@ impl Job<'_> {
 /// Ends a run also when its journal cannot be written.
 struct Attentive {
     inner: Stopwatch,
-    kept: Kept,
+    health: JournalHealth,
 }
 
 impl Watcher for Attentive {
@@ -446,7 +440,7 @@ impl Watcher for Attentive {
     }
 
     fn flow(&mut self) -> ControlFlow<Halt> {
-        if self.kept.is_lost() {
+        if self.health.has_failed() {
             return ControlFlow::Break(Halt::Cancelled);
         }
         self.inner.flow()
@@ -482,13 +476,13 @@ fn exit(outcome: &RunOutcome, trace: Option<String>) -> Answer {
         Verdict::Interrupted => Exit::Interrupted,
         Verdict::PlannerFailed { why } => {
             return Err(Failure::new(
-                format!("the planner failed: {}", tame(why)),
+                format!("the planner failed: {}", escape_control(why)),
                 "`elbowroom plan` with the same planner says more; this does not say that there is no plan",
             ));
         }
         Verdict::WorldFailed { why } => {
             return Err(Failure::new(
-                format!("the world failed: {}", tame(why)),
+                format!("the world failed: {}", escape_control(why)),
                 "docs/formats/world-protocol.md says what a world must do",
             ));
         }

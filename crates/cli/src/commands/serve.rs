@@ -24,15 +24,14 @@ use super::run::{Job, RESUME_SERVE, aside, checked, journal};
 use crate::args::ServeArgs;
 use crate::attendance::Attendance;
 use crate::calendar::dated;
-use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
-use crate::http::{self, Listener};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::journal::Segments;
 use crate::output::{self, Output};
-use crate::serve::Control;
-use crate::words::plain;
+use elbowroom_executive::clock::Clock;
+use elbowroom_executive::http::{self, AccessControl, Listener};
+use elbowroom_executive::journal::Segments;
+use elbowroom_executive::messages::plain;
 use first::Client;
 use front::{Front, Refused};
 
@@ -89,7 +88,8 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         None
     };
     let journal = journal(&arguments.run, RESUME_SERVE)?;
-    let journal = journal.map(|file| file.in_segments(Some(segments(arguments))));
+    let journal =
+        journal.map(|file| file.with_rotation(Some(segments(arguments)), &output::warnings()));
     let front = open(arguments, &interrupt, &domain_text)?;
     let (task, first, client) = if let Some((task, first)) = given {
         (task, first, None)
@@ -222,11 +222,12 @@ fn in_order(answer: Answer) -> Answer {
     })
 }
 
-fn control(arguments: &ServeArgs, interrupt: &Interrupt) -> Result<Option<Control>, Failure> {
+fn control(arguments: &ServeArgs, interrupt: &Interrupt) -> Result<Option<AccessControl>, Failure> {
     let token = arguments.token.as_ref();
     token
-        .map(|path| Control::read(path, interrupt.clone()))
+        .map(|path| AccessControl::read(path, interrupt.stop().clone()))
         .transpose()
+        .map_err(Failure::from)
 }
 
 /// What belongs to `elbowroom run` alone.
@@ -345,12 +346,16 @@ fn socket(path: &Path) -> Result<Listener, Failure> {
 /// From now on there is a run to ask about.
 fn begin(front: &Front, spec: &RunSpec, task: &Arc<Task>) -> Result<Attendance, Failure> {
     let status = Status::new(task, spec.timeout.clone());
-    let board = front.board();
-    let mut header = |line: &str| board.add(line);
+    let buffer = front.buffer();
+    let mut header = |line: &str| buffer.add(line);
     let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
     written.map_err(|error| Failure::new(format!("cannot show the run: {error}"), ""))?;
     front.begin(status.clone(), task);
-    Ok(Attendance::by(front.desk().clone(), status, board.clone()))
+    Ok(Attendance::by(
+        front.queue().clone(),
+        status,
+        buffer.clone(),
+    ))
 }
 
 fn segments(arguments: &ServeArgs) -> Segments {

@@ -12,9 +12,9 @@ use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom::num::work::Stop;
 
 use crate::bell::{Bell, Ring};
-use crate::clock::Clock;
 use crate::interrupt::Interrupt;
-use crate::memory::MemoryLimit;
+use elbowroom_executive::clock::Clock;
+use elbowroom_executive::memory_limit::MemoryLimit;
 
 /// A planner that works aside: it begins with a plan as soon as it is told that it will be needed, and,
 /// where the run goes on while plans are made, it rings when there is one.

@@ -7,10 +7,10 @@ use elbowroom::execution::run::Stand;
 use elbowroom::execution::{Command, Event, Recorder};
 use elbowroom::num::Rational;
 
-use crate::clock::Clock;
 use crate::number;
 use crate::progress::Progress;
-use crate::words::{counted, tame};
+use elbowroom_executive::clock::Clock;
+use elbowroom_executive::messages::{counted, escape_control};
 
 /// The limit on running actions that are named.
 const MOST_NAMED: usize = 3;
@@ -61,7 +61,7 @@ impl Recorder for Live<'_> {
         match entry {
             Entry::Command { now, command, .. } => {
                 if let Command::Start { ticket, action, .. } = command {
-                    self.running.insert(ticket.0, tame(&action.name));
+                    self.running.insert(ticket.0, escape_control(&action.name));
                 }
                 self.show(now, false);
             }

@@ -25,22 +25,22 @@ use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, ReplayWorld, Stored};
 
 use super::ahead::Ahead;
-use super::believed::Believed;
-use super::journaled::{Careful, JournalWriter, Kept};
-use super::process::{Manners, ProcessWorld};
 use super::readied::Readied;
 use super::shown::Views;
 use super::spec::contradiction;
 use crate::args::RunArgs;
 use crate::attendance::{Attendance, Attended};
-use crate::clock::Clock;
 use crate::exit::{Answer, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::journal::{Journal, JournalFile, Segments, WallTime};
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 use elapsed::Elapsed;
+use elbowroom_executive::belief_updates::BeliefUpdates;
+use elbowroom_executive::clock::Clock;
+use elbowroom_executive::journal::{Journal, JournalFile, Segments, WallTime};
+use elbowroom_executive::journaling::{JournalHealth, JournalWriter, JournaledWorld};
+use elbowroom_executive::process_world::{ProcessLimits, ProcessWorld};
 use past::{Past, PastPlanner, PastRecorder, Watch};
 use under_way::UnderWay;
 
@@ -65,14 +65,14 @@ fn cut(path: &Path) -> Result<Cut, Failure> {
     }
     let length = std::fs::metadata(path).map_or(0, |it| it.len());
     let text = input::source(path, "journal")?;
-    if !crate::journal::is_journal(text.text()) {
+    if !elbowroom_executive::journal::is_journal(text.text()) {
         return Err(Failure::new(
             format!("{name} is no journal of a run"),
             "`elbowroom run --journal` writes them; a trace can be played back with --replay",
         ));
     }
     let mut journal = Journal::read(text.text())
-        .map_err(|why| unreadable(&name, &why, crate::journal::DAMAGED))?;
+        .map_err(|why| unreadable(&name, &why, elbowroom_executive::journal::DAMAGE_ADVICE))?;
     if journal.text.is_empty() {
         let is_cut_off = !text.text().contains('\n');
         let (why, advice) = if is_cut_off {
@@ -80,7 +80,10 @@ fn cut(path: &Path) -> Result<Cut, Failure> {
                 "it ends before its first record does, so that nothing was ever told to the world";
             (why, "remove it, and begin the run again")
         } else {
-            ("its first record is damaged", crate::journal::DAMAGED)
+            (
+                "its first record is damaged",
+                elbowroom_executive::journal::DAMAGE_ADVICE,
+            )
         };
         return Err(unreadable(&name, why, advice));
     }
@@ -204,22 +207,23 @@ pub(in crate::commands) fn run(
     let now = snapshot.as_ref().map(|it| it.now().clone());
     let first = spec.has_plan.then(|| stored.first_plan(&task));
     let first = first.transpose().map_err(|error| wrong(&error))?.flatten();
-    let mut file = JournalFile::go_on(path, &journal, length)?.in_segments(host.segments());
+    let mut file = JournalFile::reopen(path, &journal, length)?
+        .with_rotation(host.segments(), &output::warnings());
     let interrupt = Interrupt::listen_with_world();
     let attendance = host.attend(&spec, &task, &interrupt)?;
     let aside = super::aside(arguments, &interrupt);
     if let Some(snapshot) = &snapshot {
         attendance.begin_at(snapshot);
     }
-    let kept = Kept::default();
-    let believed = Believed::default();
+    let health = JournalHealth::default();
+    let beliefs = BeliefUpdates::default();
     let past = Arc::new(Past::new(&stored));
     let views = Views::open(arguments, &spec, &task, &interrupt, &attendance)?;
     let outcome = {
         let recorder = PastRecorder {
             past: Arc::clone(&past),
             task: Arc::clone(&task),
-            writer: JournalWriter::new(&task, &mut file, &kept, attendance.desk()),
+            writer: JournalWriter::new(&task, &mut file, &health, attendance.queue()),
         };
         let begun = Clock::start();
         let clock = || begun.seconds();
@@ -236,10 +240,10 @@ pub(in crate::commands) fn run(
                 Box::new(Ahead::new(planner, &spec, &aside)),
             ))
             .prepared_by(Readied::new(&spec, &task, &aside.bell).map_err(contradiction)?)
-            .told_to(super::both(attendance.listener(), believed.listener()))
+            .told_to(super::both(attendance.listener(), beliefs.listener()))
             .recorded_by(views.shown(attendance.witnessed(recorder, &task, true), &task));
-        let world = Careful {
-            inner: PastWorld {
+        let world = JournaledWorld::new(
+            PastWorld {
                 replay: ReplayWorld::new(&stored, &task),
                 left: stored.lines.iter().filter(|line| is_answer(line)).count(),
                 past: Arc::clone(&past),
@@ -253,14 +257,13 @@ pub(in crate::commands) fn run(
                     interrupt: interrupt.clone(),
                 },
                 present: None,
-                believed,
+                beliefs,
                 last: now.unwrap_or_default(),
                 shift: Rational::ZERO,
                 news: None,
             },
-            kept: kept.clone(),
-            refused: Vec::new(),
-        };
+            health.clone(),
+        );
         let mut world = Attended::new(world, &attendance, &task, &interrupt, &Rational::ONE)
             .ringing(&aside.bell)
             .under_way(under_way::open(snapshot.as_ref()))
@@ -268,10 +271,10 @@ pub(in crate::commands) fn run(
         let mut watch = Watch {
             inner: Stopwatch::start(&interrupt),
             past: Arc::clone(&past),
-            kept: kept.clone(),
+            health: health.clone(),
         };
         let outcome = execute(request, &mut world, &mut watch);
-        if let Some(world) = world.into_inner().inner.present {
+        if let Some(world) = world.into_inner().into_inner().present {
             world.stop();
         }
         views.close();
@@ -280,7 +283,7 @@ pub(in crate::commands) fn run(
     if let Some(line) = past.difference() {
         return Err(leads_elsewhere(&name, line));
     }
-    super::conclude((arguments, &spec), outcome, file.trouble(), output)
+    super::conclude((arguments, &spec), outcome, file.failure(), output)
 }
 
 /// The verdict of a run whose world has died.
@@ -316,7 +319,7 @@ struct PastWorld<'a> {
     launch: Launch<'a>,
     present: Option<ProcessWorld>,
     /// What it is told of what the run believes.
-    believed: Believed,
+    beliefs: BeliefUpdates,
     /// What time it is, for the run.
     last: Rational,
     /// What is added to the times of a world that begins anew.
@@ -334,20 +337,20 @@ impl PastWorld<'_> {
         }
         if self.present.is_none() {
             let launch = &self.launch;
-            let manners = Manners {
-                patience: launch.patience.clone(),
+            let limits = ProcessLimits {
+                answer_timeout: launch.patience.clone(),
                 is_strict: launch.is_strict,
             };
             let resumed = self.under_way.told(&self.last);
             let world = ProcessWorld::resume(
                 &launch.command,
                 launch.task,
-                manners,
-                launch.interrupt.clone(),
+                limits,
+                launch.interrupt.stop().clone(),
                 (&resumed, self.under_way.given),
             );
             let world = world.map_err(|failure| WorldError::new(failure.message()))?;
-            self.present = Some(world.telling(self.believed.clone()));
+            self.present = Some(world.with_beliefs(self.beliefs.clone()));
             self.reconcile()?;
         }
         self.present

@@ -15,20 +15,21 @@ use crate::attendance::Attendance;
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use crate::output;
-use crate::serve::{self, Board, Control, NAME};
+use elbowroom_executive::http::{AccessControl, PageServer};
+use elbowroom_executive::trace_buffer::{TRACE_NAME, TraceBuffer};
 
 /// Keeps a record, and shows it if that is asked for.
 pub(super) struct Shown<R> {
     inner: R,
     task: Arc<Task>,
-    board: Option<Board>,
+    buffer: Option<TraceBuffer>,
 }
 
 impl<R: Recorder> Recorder for Shown<R> {
     fn record(&mut self, entry: &Entry<'_>) {
         self.inner.record(entry);
-        if let Some(board) = &self.board {
-            board.add(&format!("{}\n", Line::of(&self.task, entry).text()));
+        if let Some(buffer) = &self.buffer {
+            buffer.add(&format!("{}\n", Line::of(&self.task, entry).text()));
         }
     }
 
@@ -44,7 +45,7 @@ impl<R: Recorder> Recorder for Shown<R> {
 /// The other places at which a run is shown: browsers and viewers.
 pub(super) struct Views<'a> {
     arguments: &'a RunArgs,
-    board: Option<Board>,
+    buffer: Option<TraceBuffer>,
 }
 
 impl<'a> Views<'a> {
@@ -59,31 +60,38 @@ impl<'a> Views<'a> {
     ) -> Result<Self, Failure> {
         let files = [&arguments.perfetto, &arguments.mcap];
         if arguments.serve.is_none() && files.iter().all(|file| file.is_none()) {
-            let board = None;
-            return Ok(Self { arguments, board });
+            let buffer = None;
+            return Ok(Self { arguments, buffer });
         }
         for file in files.iter().copied().flatten() {
             output::write_bytes(file, b"")?;
         }
         // What is written for viewers in the end is the whole run.
         let is_for_viewers = files.iter().any(|file| file.is_some());
-        let board = if spec.is_lasting && !is_for_viewers {
-            Board::lasting()
+        let buffer = if spec.is_lasting && !is_for_viewers {
+            TraceBuffer::bounded()
         } else {
-            Board::default()
+            TraceBuffer::default()
         };
-        let mut header = |line: &str| board.add(line);
+        let mut header = |line: &str| buffer.add(line);
         let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
         written.map_err(|error| Failure::new(format!("cannot show the run: {error}"), ""))?;
         if let Some(address) = arguments.serve {
             let control = match &arguments.control {
-                Some(path) => Some(Control::read(path, interrupt.clone())?),
+                Some(path) => Some(AccessControl::read(path, interrupt.stop().clone())?),
                 None => None,
             };
-            serve::start(address, board.clone(), control, attendance.desk().cloned())?;
+            let with_token = if control.is_some() {
+                "; with #token=TOKEN at its end, the run can be paused, cancelled and stopped there"
+            } else {
+                ""
+            };
+            let queue = attendance.queue().cloned();
+            let own = PageServer::start(address, buffer.clone(), control, queue)?;
+            output::tell(&format!("the run is shown at http://{own}/{with_token}"));
         }
-        let board = Some(board);
-        Ok(Self { arguments, board })
+        let buffer = Some(buffer);
+        Ok(Self { arguments, buffer })
     }
 
     /// A record that is shown, too.
@@ -91,16 +99,16 @@ impl<'a> Views<'a> {
         Shown {
             inner,
             task: Arc::clone(task),
-            board: self.board.clone(),
+            buffer: self.buffer.clone(),
         }
     }
 
     /// Says that the run is over, and writes it for viewers. What goes wrong there is a warning: the
     /// run has been what it was.
     pub(super) fn close(self) {
-        let Some(board) = self.board else { return };
-        board.close();
-        let trace = board.trace();
+        let Some(buffer) = self.buffer else { return };
+        buffer.close();
+        let trace = buffer.trace();
         let write = |file: &Path, made: Result<Vec<u8>, PageError>| match made {
             Ok(bytes) => output::write_bytes(file, &bytes)
                 .err()
@@ -110,8 +118,8 @@ impl<'a> Views<'a> {
         let perfetto = self.arguments.perfetto.as_ref();
         let mcap = self.arguments.mcap.as_ref();
         let troubles = [
-            perfetto.and_then(|file| write(file, elbowroom_page::perfetto(NAME, &trace))),
-            mcap.and_then(|file| write(file, elbowroom_page::mcap(NAME, &trace))),
+            perfetto.and_then(|file| write(file, elbowroom_page::perfetto(TRACE_NAME, &trace))),
+            mcap.and_then(|file| write(file, elbowroom_page::mcap(TRACE_NAME, &trace))),
         ];
         for trouble in troubles.into_iter().flatten() {
             output::warn(&trouble);

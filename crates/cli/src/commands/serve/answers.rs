@@ -7,7 +7,7 @@ use elbowroom::num::Rational;
 
 use super::front::Front;
 
-/// A run with people at its desk asks its world many times a second: one that takes longer than this to answer
+/// A run with people at its queue asks its world many times a second: one that takes longer than this to answer
 /// stands still.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(1);
 
@@ -36,7 +36,7 @@ impl Front {
 
     /// For how many seconds the world has not answered, if it is silent.
     pub(super) fn unanswered(&self) -> Option<u64> {
-        let silence = self.desk().unanswered()?;
+        let silence = self.queue().unanswered()?;
         (silence > ANSWERS_WITHIN).then_some(silence.as_secs())
     }
 }

@@ -18,8 +18,8 @@ use elbowroom::pddl::{self, Source};
 use serde::de::DeserializeOwned;
 
 use super::front::{Front, Refused};
-use crate::desk::{Ask, Reception};
-use crate::words::counted;
+use elbowroom_executive::messages::counted;
+use elbowroom_executive::request_queue::{ExternalRequest, RequestStatus};
 
 /// How long a client waits for the run to take its request in; afterwards it is told that it will.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -36,8 +36,12 @@ impl Front {
             ("DELETE", path) => self.abandon(path.trim_start_matches("/v1/goals/")),
             ("POST", "/v1/facts") => self.fact(&read(body)?),
             ("POST", "/v1/numbers") => self.number(read(body)?),
-            ("POST", "/v1/pause") => self.hand_in(vec![Ask::Request(Request::Pause)], None),
-            ("POST", "/v1/resume") => self.hand_in(vec![Ask::Request(Request::Resume)], None),
+            ("POST", "/v1/pause") => {
+                self.submit(vec![ExternalRequest::Request(Request::Pause)], None)
+            }
+            ("POST", "/v1/resume") => {
+                self.submit(vec![ExternalRequest::Request(Request::Resume)], None)
+            }
             _ => {
                 self.stop();
                 Ok(Taken {
@@ -49,10 +53,10 @@ impl Front {
         }
     }
 
-    /// Hands requests in, in this order, and waits a little for the run to take them in.
-    fn hand_in(&self, asks: Vec<Ask>, name: Option<String>) -> Result<Taken, Refused> {
+    /// Submits requests in this order, and waits up to two seconds until the run accepts them.
+    fn submit(&self, asks: Vec<ExternalRequest>, name: Option<String>) -> Result<Taken, Refused> {
         let (status, _) = self.run()?;
-        if self.desk().is_lost() {
+        if self.queue().has_journal_failed() {
             return Err(lost());
         }
         if status.state().activity == Activity::Over {
@@ -66,12 +70,12 @@ impl Front {
             let help = "wait until it has taken some in; `elbowroom ctl state` says what it does";
             Refused::new(503, "too many requests wait for the executive", help)
         };
-        let number = self.desk().hand_in(asks).ok_or_else(full)?;
-        let until = match self.desk().await_taken(number, PATIENCE) {
-            Reception::Taken => None,
-            Reception::Waits => Some(self.obstacle()),
-            Reception::Lost => return Err(lost()),
-            Reception::Over => {
+        let number = self.queue().submit(asks).ok_or_else(full)?;
+        let until = match self.queue().wait_until_accepted(number, PATIENCE) {
+            RequestStatus::Accepted => None,
+            RequestStatus::Pending => Some(self.obstacle()),
+            RequestStatus::JournalFailed => return Err(lost()),
+            RequestStatus::RunEnded => {
                 let error = "the executive has ended before it took this in";
                 return Err(Refused::new(409, error, "start another one"));
             }
@@ -109,7 +113,7 @@ impl Front {
             name: name.clone(),
             goal,
         };
-        self.hand_in(vec![Ask::Request(request)], Some(name))
+        self.submit(vec![ExternalRequest::Request(request)], Some(name))
     }
 
     /// A name that no open goal has.
@@ -126,7 +130,7 @@ impl Front {
     fn abandon(&self, name: &str) -> Result<Taken, Refused> {
         let open = self.run()?.0.goals();
         // What is not taken in yet may be the goal.
-        if !open.iter().any(|known| known == name) && self.desk().is_clear() {
+        if !open.iter().any(|known| known == name) && self.queue().is_idle() {
             let help = match open.as_slice() {
                 [] => "no goals are open".to_owned(),
                 open => format!("these are open: {}", open.join(", ")),
@@ -135,7 +139,7 @@ impl Front {
         }
         let name = name.to_owned();
         let request = Request::Abandon { name: name.clone() };
-        self.hand_in(vec![Ask::Request(request)], Some(name))
+        self.submit(vec![ExternalRequest::Request(request)], Some(name))
     }
 
     fn fact(&self, given: &NewFact) -> Result<Taken, Refused> {
@@ -151,7 +155,7 @@ impl Front {
             return Err(Refused::new(422, error, "say those instead"));
         }
         let (fact, becomes) = (task.fact_name(fact), given.becomes);
-        self.hand_in(vec![Ask::Fact { fact, becomes }], None)
+        self.submit(vec![ExternalRequest::Fact { fact, becomes }], None)
     }
 
     fn number(&self, given: NewNumber) -> Result<Taken, Refused> {
@@ -169,7 +173,7 @@ impl Front {
         };
         let fluent = task.fluent_named(&given.fluent).ok_or_else(unknown)?;
         let (fluent, value) = (task.fluent_name(fluent), given.value.0);
-        self.hand_in(vec![Ask::Number { fluent, value }], None)
+        self.submit(vec![ExternalRequest::Number { fluent, value }], None)
     }
 
     /// The first problem begins the run. A later one is a new situation for the same objects.
@@ -189,7 +193,7 @@ impl Front {
         };
         let state = status.state();
         check_further(&problem, task, &state)?;
-        self.hand_in(turned(&Task::new(problem), task, &state), None)
+        self.submit(turned(&Task::new(problem), task, &state), None)
     }
 }
 
@@ -227,7 +231,7 @@ fn check_further(problem: &Problem, task: &Task, state: &State) -> Result<(), Re
 }
 
 /// What is to be said so that things are as that problem has them, and its goal is the goal.
-fn turned(new: &Task, task: &Task, state: &State) -> Vec<Ask> {
+fn turned(new: &Task, task: &Task, state: &State) -> Vec<ExternalRequest> {
     let mut asks = Vec::new();
     let named = |fact: &_| new.fact_name(*fact);
     let facts: BTreeSet<String> = new.initial().facts.iter().map(named).collect();
@@ -240,22 +244,22 @@ fn turned(new: &Task, task: &Task, state: &State) -> Vec<Ask> {
     let gone = state.facts.iter().filter(|fact| !facts.contains(*fact));
     for fact in gone.filter(|fact| !is_given(fact)) {
         let (fact, becomes) = (fact.clone(), false);
-        asks.push(Ask::Fact { fact, becomes });
+        asks.push(ExternalRequest::Fact { fact, becomes });
     }
     for fact in facts {
         let becomes = true;
-        asks.push(Ask::Fact { fact, becomes });
+        asks.push(ExternalRequest::Fact { fact, becomes });
     }
     for (fluent, value) in &new.initial().values {
         let (fluent, value) = (new.fluent_name(*fluent), value.clone());
-        asks.push(Ask::Number { fluent, value });
+        asks.push(ExternalRequest::Number { fluent, value });
     }
     for goal in &state.goals {
         let name = goal.name.clone();
-        asks.push(Ask::Request(Request::Abandon { name }));
+        asks.push(ExternalRequest::Request(Request::Abandon { name }));
     }
     let (name, goal) = (FIRST_GOAL.to_owned(), goal_text(new));
-    asks.push(Ask::Request(Request::Pursue { name, goal }));
+    asks.push(ExternalRequest::Request(Request::Pursue { name, goal }));
     asks
 }
 

@@ -12,9 +12,11 @@ use elbowroom::executive::{METHODS, Status, openapi};
 use elbowroom::model::Task;
 use serde::Serialize;
 
-use crate::desk::Desk;
-use crate::http::{Misunderstood, Request, Stream, respond, respond_with_events};
-use crate::serve::{Board, Control, is_local_name};
+use elbowroom_executive::http::{
+    AccessControl, Request, RequestError, Stream, is_local_name, respond, respond_with_events,
+};
+use elbowroom_executive::request_queue::RequestQueue;
+use elbowroom_executive::trace_buffer::TraceBuffer;
 
 use super::first::First;
 
@@ -43,11 +45,11 @@ impl Refused {
 
 /// Everything that clients can reach.
 pub(super) struct Front {
-    control: Option<Control>,
+    control: Option<AccessControl>,
     own: SocketAddr,
     pub(super) domain: NamedText,
-    desk: Desk,
-    board: Board,
+    queue: RequestQueue,
+    buffer: TraceBuffer,
     /// The run, once there is a problem; its task has a table of its own, so that what clients
     /// mention is not what the run does.
     run: OnceLock<(Status, Task)>,
@@ -60,13 +62,13 @@ pub(super) struct Front {
 }
 
 impl Front {
-    pub(super) fn new(control: Option<Control>, own: SocketAddr, domain: &NamedText) -> Self {
+    pub(super) fn new(control: Option<AccessControl>, own: SocketAddr, domain: &NamedText) -> Self {
         Self {
             control,
             own,
             domain: domain.clone(),
-            desk: Desk::default(),
-            board: Board::lasting(),
+            queue: RequestQueue::default(),
+            buffer: TraceBuffer::bounded(),
             run: OnceLock::new(),
             first: First::default(),
             changing: Mutex::new(0),
@@ -75,12 +77,12 @@ impl Front {
         }
     }
 
-    pub(super) fn desk(&self) -> &Desk {
-        &self.desk
+    pub(super) fn queue(&self) -> &RequestQueue {
+        &self.queue
     }
 
-    pub(super) fn board(&self) -> &Board {
-        &self.board
+    pub(super) fn buffer(&self) -> &TraceBuffer {
+        &self.buffer
     }
 
     /// From now on there is a run.
@@ -99,9 +101,9 @@ impl Front {
 
     /// The run is over: clients have a moment to hear of it, and what became of their requests.
     pub(super) fn close(&self) {
-        self.desk.close();
+        self.queue.close();
         self.first.close();
-        self.board.close();
+        self.buffer.close();
         let waits = |changing: &mut usize| *changing > 0;
         let waited = self
             .answered
@@ -117,15 +119,15 @@ impl Front {
     /// Serves a client. `is_local_only` is whether only this machine should reach it.
     pub(super) fn serve(
         &self,
-        request: Result<Request, Misunderstood>,
+        request: Result<Request, RequestError>,
         is_local_only: bool,
         stream: &mut Stream,
     ) -> io::Result<()> {
         let request = match request {
             Ok(request) => request,
-            Err(Misunderstood(status, why)) => {
+            Err(RequestError { status, reason }) => {
                 let help = "docs/serve.md says what an executive understands";
-                return refuse(stream, &Refused::new(status, why, help));
+                return refuse(stream, &Refused::new(status, reason, help));
             }
         };
         let is_own = |host: &str| is_local_name(host);
@@ -133,7 +135,7 @@ impl Front {
             let error = format!("this is not the page of that host; {} is", self.own);
             return refuse(stream, &Refused::new(403, error, "use the address itself"));
         }
-        let _counted = (request.verb != "GET").then(|| Changing::begin(self));
+        let _counted = (request.method != "GET").then(|| Changing::begin(self));
         match self.answer(&request, stream) {
             Ok(told) => told,
             Err(refused) => refuse(stream, &refused),
@@ -142,20 +144,20 @@ impl Front {
 
     fn answer(&self, request: &Request, stream: &mut Stream) -> Result<io::Result<()>, Refused> {
         let broken = |why: String| Refused::new(500, why, "this is a bug; please report it");
-        Ok(match (request.verb.as_str(), request.path.as_str()) {
+        Ok(match (request.method.as_str(), request.path.as_str()) {
             ("GET", "/") if self.run().is_err() => respond(stream, 409, HTML, WAITING),
-            ("GET", "/") => respond(stream, 200, HTML, &self.board.page().map_err(broken)?),
+            ("GET", "/") => respond(stream, 200, HTML, &self.buffer.page().map_err(broken)?),
             ("GET", "/document") => {
                 self.run()?;
-                respond(stream, 200, JSON, &self.board.document().map_err(broken)?)
+                respond(stream, 200, JSON, &self.buffer.document().map_err(broken)?)
             }
             ("GET", "/events") => {
                 let begun = respond_with_events(stream);
-                begun.and_then(|()| self.board.tell_changes(stream))
+                begun.and_then(|()| self.buffer.stream_changes(stream))
             }
             ("GET", "/v1/events") => {
                 let after = first_line(request)?;
-                if let (Some(after), Some(until)) = (after, self.board.left_out_until())
+                if let (Some(after), Some(until)) = (after, self.buffer.last_omitted_line())
                     && after < until
                 {
                     let error = format!("the lines up to {until} are no longer kept here");
@@ -166,7 +168,7 @@ impl Front {
                     return Err(Refused::new(410, error, help));
                 }
                 let begun = respond_with_events(stream);
-                begun.and_then(|()| self.board.tell_lines(after, stream))
+                begun.and_then(|()| self.buffer.stream_lines(after, stream))
             }
             ("POST", "/stop") => {
                 self.allow(request)?;
@@ -228,7 +230,7 @@ impl Front {
                 "this executive can only be looked at",
                 "start it with --token FILE",
             )),
-            (Some(control), Some(given)) if control.is_known_to(given) => Ok(()),
+            (Some(control), Some(given)) if control.accepts(given) => Ok(()),
             (Some(_), given) => Err(Refused::new(
                 401,
                 match given {

@@ -3,7 +3,7 @@
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, SnapshotLine, Stored};
 
-use crate::journal::{Journal, Reading, WallTime};
+use elbowroom_executive::journal::{Journal, Reading, WallTime};
 
 /// The readings of a world's clock in a journal, and of the wall clock beside it.
 pub(super) struct Elapsed {

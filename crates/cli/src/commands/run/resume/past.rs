@@ -12,8 +12,8 @@ use elbowroom::execution::{Entry, Planner, PlannerAnswer, Recorder};
 use elbowroom::model::{Situation, Task};
 use elbowroom::report::trace::{Line, ReplayPlanner, Stored};
 
-use super::super::journaled::{JournalWriter, Kept};
 use crate::stopwatch::Stopwatch;
+use elbowroom_executive::journaling::{JournalHealth, JournalWriter};
 
 /// What stands in the journal, and how much of it has been played.
 pub(super) struct Past {
@@ -193,7 +193,7 @@ impl Planner for PastPlanner<'_> {
 pub(super) struct Watch {
     pub(super) inner: Stopwatch,
     pub(super) past: Arc<Past>,
-    pub(super) kept: Kept,
+    pub(super) health: JournalHealth,
 }
 
 impl Watcher for Watch {
@@ -202,7 +202,7 @@ impl Watcher for Watch {
     }
 
     fn flow(&mut self) -> ControlFlow<Halt> {
-        let is_to_end = self.past.is_to_end.load(Ordering::SeqCst) || self.kept.is_lost();
+        let is_to_end = self.past.is_to_end.load(Ordering::SeqCst) || self.health.has_failed();
         match () {
             () if is_to_end => ControlFlow::Break(Halt::Cancelled),
             () if self.past.is_over() => self.inner.flow(),

@@ -1,4 +1,4 @@
-//! The message that says what is believed.
+//! Message that reports the belief state of the run to a world.
 
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
@@ -6,15 +6,14 @@ use elbowroom::num::Rational;
 use elbowroom::report::wire;
 use serde_json::{Value, json};
 
-/// What a program is told of what is believed: these facts and values, which are new to it. A value that is not known
-/// any more is `None`.
-pub(crate) fn believed<'a>(
+/// Returns the message `believed` with changed facts and values of the belief state at `now`, in seconds. A value of
+/// `None` is no longer known. Derived facts are omitted.
+pub fn belief_message<'a>(
     task: &Task,
     now: &Rational,
     facts: impl Iterator<Item = (FactId, bool)>,
     values: impl Iterator<Item = (FluentId, Option<&'a Rational>)>,
 ) -> Value {
-    // What follows from other facts is nobody's to be told: it is as they are.
     let facts = facts.filter(|(fact, _)| !task.is_derived(*fact));
     let facts = facts.map(|(fact, truth)| (task.fact_name(fact), truth.into()));
     let values = values.map(|(fluent, value)| {

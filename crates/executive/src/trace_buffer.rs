@@ -1,57 +1,57 @@
-//! What a run has recorded so far, for those who look at it.
+//! In-memory buffer of the trace of a run, read by HTTP clients.
 
 use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// How often a client that hears nothing new is told so, in order to notice that it has gone.
-const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
+/// Interval of keep-alive comments to clients without news, to detect clients that have disconnected.
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
-/// How long clients have to fetch the end of the run.
-const FAREWELL: Duration = Duration::from_secs(2);
+/// Time limit for clients to read the end of the run.
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Interval between two checks that a waiting client is still connected.
-const GLANCE: Duration = Duration::from_millis(250);
+const POLL_INTERVAL: Duration = Duration::from_millis(250);
 
-/// A client that receives new lines.
-pub(crate) trait Client: Write {
-    /// Returns `true` if it has closed its connection.
+/// Client that receives new lines.
+pub trait Subscriber: Write {
+    /// Returns `true` if the client has closed its connection.
     fn has_left(&mut self) -> bool;
 }
 
-/// The name of the trace on its page.
-pub(crate) const NAME: &str = "the run";
+/// Name of the trace on its page.
+pub const TRACE_NAME: &str = "the run";
 
-/// How much of the trace is kept of a run that goes on, in bytes.
+/// Limit on the trace that is kept of a persistent run, in bytes.
 const MOST_KEPT: usize = 4_000_000;
 
-/// The trace of a run so far; of a run that goes on for ever, only the last part of it.
+/// Trace of a run so far, or its last part if the buffer is bounded. Clones share the same buffer.
 #[derive(Clone, Default)]
-pub(crate) struct Board(Arc<Shared>);
+pub struct TraceBuffer(Arc<Shared>);
 
 #[derive(Default)]
 struct Shared {
     state: Mutex<State>,
     changed: Condvar,
-    /// The document of so many lines.
+    /// Cached document of the page, with the number of lines that it covers.
     document: Mutex<Option<(usize, Arc<str>)>>,
-    /// The limit on what is kept, in bytes.
+    /// Limit on the kept lines, in bytes.
     most: Option<usize>,
 }
 
 #[derive(Default)]
 struct State {
-    /// The first line, which says what is run.
+    /// First line: the specification of the run.
     header: Option<Arc<str>>,
-    /// The last lines.
+    /// Last lines.
     kept: VecDeque<Arc<str>>,
-    /// Their length.
+    /// Length of the kept lines in bytes.
     bytes: usize,
-    /// How many lines there were between the header and these.
+    /// Number of omitted lines between the header and the kept ones.
     left_out: usize,
     is_over: bool,
-    /// Clients that wait for news.
+    /// Number of clients that read the stream.
     listeners: usize,
 }
 
@@ -69,8 +69,8 @@ impl State {
         }
     }
 
-    /// Throws the first lines away, up to where a plan was asked for, if there is such a place in
-    /// what is left: a trace that begins there can be understood.
+    /// Drops the first lines until at most `most` bytes remain, and further to the next request for a plan if there
+    /// is one: a trace that begins there is self-contained.
     fn shorten(&mut self, most: usize) {
         let mut left = self.bytes;
         let mut cut = 0;
@@ -91,11 +91,11 @@ impl State {
         }
     }
 
-    /// The lines behind so many, and whether some of them are no longer there.
-    fn behind(&self, told: usize) -> (Vec<Arc<str>>, usize) {
-        let header = self.header.iter().filter(|_| told == 0).cloned();
-        let of_kept = told.saturating_sub(1 + self.left_out);
-        let missed = (1 + self.left_out).saturating_sub(told.max(1));
+    /// Returns the kept lines after line `sent`, and the number of omitted lines after it.
+    fn after(&self, sent: usize) -> (Vec<Arc<str>>, usize) {
+        let header = self.header.iter().filter(|_| sent == 0).cloned();
+        let of_kept = sent.saturating_sub(1 + self.left_out);
+        let missed = (1 + self.left_out).saturating_sub(sent.max(1));
         let news = header.chain(self.kept.iter().skip(of_kept).cloned());
         (news.collect(), missed)
     }
@@ -106,21 +106,21 @@ impl State {
     }
 }
 
-impl Board {
-    /// Of a run that goes on for ever.
-    pub(crate) fn lasting() -> Self {
-        Self::keeping(MOST_KEPT)
+impl TraceBuffer {
+    /// Creates a buffer for a persistent run: it keeps the last 4 MB of the trace.
+    pub fn bounded() -> Self {
+        Self::with_limit(MOST_KEPT)
     }
 
-    fn keeping(most: usize) -> Self {
+    fn with_limit(most: usize) -> Self {
         Self(Arc::new(Shared {
             most: Some(most),
             ..Shared::default()
         }))
     }
 
-    /// Adds a line of the trace, with its line feed.
-    pub(crate) fn add(&self, line: &str) {
+    /// Appends a line of the trace, which ends with its line feed.
+    pub fn add(&self, line: &str) {
         let mut state = self.lock();
         state.add(line);
         if let Some(most) = self.0.most
@@ -132,19 +132,20 @@ impl Board {
         self.0.changed.notify_all();
     }
 
-    /// The trace so far.
-    pub(crate) fn trace(&self) -> String {
+    /// Returns the kept trace.
+    pub fn trace(&self) -> String {
         self.lock().trace()
     }
 
-    /// Up to which line of the trace those behind the first one are no longer there.
-    pub(crate) fn left_out_until(&self) -> Option<usize> {
+    /// Returns the number of the last omitted line, or `None` if the trace is complete. The header is line 1 and is
+    /// always kept.
+    pub fn last_omitted_line(&self) -> Option<usize> {
         let left_out = self.lock().left_out;
         (left_out > 0).then_some(left_out + 1)
     }
 
-    /// Says that the run is over, and waits a little for clients that fetch how it ended.
-    pub(crate) fn close(&self) {
+    /// Marks the run as finished, and waits up to two seconds for clients to read its end.
+    pub fn close(&self) {
         let mut state = self.lock();
         state.is_over = true;
         self.0.changed.notify_all();
@@ -152,20 +153,23 @@ impl Board {
         state = self
             .0
             .changed
-            .wait_timeout_while(state, FAREWELL, waits)
+            .wait_timeout_while(state, DRAIN_TIMEOUT, waits)
             .unwrap_or_else(PoisonError::into_inner)
             .0;
         drop(state);
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        // A thread that failed while it held the lock has left whole lines.
+        // A thread that panicked while it held the lock has left complete lines.
         let state = self.0.state.lock();
         state.unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What the page shows now, as JSON; made once for all clients.
-    pub(crate) fn document(&self) -> Result<Arc<str>, String> {
+    /// Returns the document of the page as JSON. It is cached for all clients.
+    ///
+    /// # Errors
+    /// When the page cannot be made from the trace.
+    pub fn document(&self) -> Result<Arc<str>, String> {
         let cached = self.0.document.lock();
         let mut cached = cached.unwrap_or_else(PoisonError::into_inner);
         let (lines, left_out, trace) = {
@@ -177,7 +181,7 @@ impl Board {
             }
             (state.lines(), state.left_out, state.trace())
         };
-        let document = elbowroom_page::live_document(NAME, &trace, left_out)
+        let document = elbowroom_page::live_document(TRACE_NAME, &trace, left_out)
             .map_err(|error| error.to_string())?;
         let text = serde_json::to_string(&document).map_err(|error| error.to_string())?;
         let text: Arc<str> = text.into();
@@ -185,55 +189,64 @@ impl Board {
         Ok(text)
     }
 
-    /// The page as it is now.
-    pub(crate) fn page(&self) -> Result<String, String> {
+    /// Returns the page of the run so far as HTML.
+    ///
+    /// # Errors
+    /// When the page cannot be made from the trace.
+    pub fn page(&self) -> Result<String, String> {
         let (trace, left_out) = {
             let state = self.lock();
             (state.trace(), state.left_out)
         };
-        elbowroom_page::live_page(NAME, &trace, left_out).map_err(|error| error.to_string())
+        elbowroom_page::live_page(TRACE_NAME, &trace, left_out).map_err(|error| error.to_string())
     }
 
-    /// Tells a client of every change, until the run is over or the client has gone.
-    pub(crate) fn tell_changes(&self, client: &mut dyn Client) -> io::Result<()> {
-        self.listened(|| self.tell_all_changes(client))
-    }
-
-    /// Tells a client every line of the trace behind line `after`, or from now on, until the run is
-    /// over or the client has gone.
-    pub(crate) fn tell_lines(
-        &self,
-        after: Option<usize>,
-        client: &mut dyn Client,
-    ) -> io::Result<()> {
-        self.listened(|| self.tell_all_lines(after, client))
-    }
-
-    fn listened(&self, tell: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
-        self.lock().listeners += 1;
-        let told = tell();
-        self.lock().listeners -= 1;
-        self.0.changed.notify_all();
-        told
-    }
-
-    /// Waits until there are more than `told` lines, or none will come, or for a while.
+    /// Sends an event for each change, until the run ends or the client disconnects.
     ///
     /// # Errors
-    /// When the client has left.
+    /// When the client cannot be written to.
+    pub fn stream_changes(&self, client: &mut dyn Subscriber) -> io::Result<()> {
+        self.counted(|| self.stream_all_changes(client))
+    }
+
+    /// Sends each line of the trace after line `after`, or each new line, until the run ends or the client
+    /// disconnects.
+    ///
+    /// # Errors
+    /// When the client cannot be written to.
+    pub fn stream_lines(
+        &self,
+        after: Option<usize>,
+        client: &mut dyn Subscriber,
+    ) -> io::Result<()> {
+        self.counted(|| self.stream_all_lines(after, client))
+    }
+
+    fn counted(&self, stream: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+        self.lock().listeners += 1;
+        let streamed = stream();
+        self.lock().listeners -= 1;
+        self.0.changed.notify_all();
+        streamed
+    }
+
+    /// Waits until the trace has more than `sent` lines or is complete, for at most [`KEEP_ALIVE`].
+    ///
+    /// # Errors
+    /// When the client has disconnected.
     fn await_lines(
         &self,
-        told: usize,
-        client: &mut dyn Client,
+        sent: usize,
+        client: &mut dyn Subscriber,
     ) -> io::Result<MutexGuard<'_, State>> {
-        let waits = |state: &mut State| state.lines() <= told && !state.is_over;
+        let waits = |state: &mut State| state.lines() <= sent && !state.is_over;
         let mut waited = Duration::ZERO;
         loop {
             let changed = &self.0.changed;
-            let state = changed.wait_timeout_while(self.lock(), GLANCE, waits);
+            let state = changed.wait_timeout_while(self.lock(), POLL_INTERVAL, waits);
             let (state, timeout) = state.unwrap_or_else(PoisonError::into_inner);
-            waited += GLANCE;
-            if !timeout.timed_out() || waited >= SIGN_OF_LIFE {
+            waited += POLL_INTERVAL;
+            if !timeout.timed_out() || waited >= KEEP_ALIVE {
                 return Ok(state);
             }
             drop(state);
@@ -243,11 +256,11 @@ impl Board {
         }
     }
 
-    fn tell_all_changes(&self, client: &mut dyn Client) -> io::Result<()> {
-        let mut told = 0;
+    fn stream_all_changes(&self, client: &mut dyn Subscriber) -> io::Result<()> {
+        let mut sent = 0;
         loop {
             let (lines, is_over) = {
-                let state = self.await_lines(told, client)?;
+                let state = self.await_lines(sent, client)?;
                 (state.lines(), state.is_over)
             };
             if is_over {
@@ -255,34 +268,38 @@ impl Board {
                 write!(client, "event: over\ndata: {document}\n\n")?;
                 return client.flush();
             }
-            if lines == told {
+            if lines == sent {
                 client.write_all(b": nothing new\n\n")?;
             } else {
-                told = lines;
+                sent = lines;
                 write!(client, "event: change\ndata: {lines}\n\n")?;
             }
             client.flush()?;
         }
     }
 
-    fn tell_all_lines(&self, after: Option<usize>, client: &mut dyn Client) -> io::Result<()> {
-        let mut told = after.unwrap_or_else(|| self.lock().lines());
+    fn stream_all_lines(
+        &self,
+        after: Option<usize>,
+        client: &mut dyn Subscriber,
+    ) -> io::Result<()> {
+        let mut sent = after.unwrap_or_else(|| self.lock().lines());
         loop {
             let (news, missed, lines, is_over) = {
-                let state = self.await_lines(told, client)?;
-                told = told.min(state.lines());
-                let (news, missed) = state.behind(told);
+                let state = self.await_lines(sent, client)?;
+                sent = sent.min(state.lines());
+                let (news, missed) = state.after(sent);
                 (news, missed, state.lines(), state.is_over)
             };
             if missed > 0 {
-                // It has read too slowly, and is told how much it has not heard.
+                // The client reads too slowly: report the number of omitted lines.
                 write!(client, "event: missed\ndata: {missed}\n\n")?;
             }
             let first = lines - news.len();
             for (number, line) in (first + 1..).zip(&news) {
                 write!(client, "id: {number}\nevent: entry\ndata: {line}\n")?;
             }
-            told = lines;
+            sent = lines;
             if is_over {
                 client.write_all(b"event: over\ndata: {}\n\n")?;
                 return client.flush();
@@ -297,15 +314,15 @@ impl Board {
 
 #[cfg(test)]
 mod tests {
-    use super::{Board, Client};
+    use super::{Subscriber, TraceBuffer};
 
-    impl Client for Vec<u8> {
+    impl Subscriber for Vec<u8> {
         fn has_left(&mut self) -> bool {
             false
         }
     }
 
-    /// Lines of which every fifth is where a plan is asked for.
+    /// Every fifth line is a request for a plan.
     fn line(number: usize) -> String {
         let event = if number.is_multiple_of(5) {
             "planning"
@@ -315,48 +332,51 @@ mod tests {
         format!("{{\"event\":\"{event}\",\"now\":{number:04}}}\n")
     }
 
-    fn board(most: Option<usize>, lines: usize) -> Board {
-        let board = most.map_or_else(Board::default, Board::keeping);
-        board.add("header\n");
-        (2..=lines).for_each(|number| board.add(&line(number)));
-        board
+    fn filled(most: Option<usize>, lines: usize) -> TraceBuffer {
+        let buffer = most.map_or_else(TraceBuffer::default, TraceBuffer::with_limit);
+        buffer.add("header\n");
+        (2..=lines).for_each(|number| buffer.add(&line(number)));
+        buffer
     }
 
-    fn told(board: &Board, after: Option<usize>) -> String {
-        let mut told = Vec::new();
-        board.lock().is_over = true;
-        board.tell_lines(after, &mut told).expect("to memory");
-        String::from_utf8(told).expect("text")
+    fn streamed(buffer: &TraceBuffer, after: Option<usize>) -> String {
+        let mut bytes = Vec::new();
+        buffer.lock().is_over = true;
+        buffer.stream_lines(after, &mut bytes).expect("to memory");
+        String::from_utf8(bytes).expect("text")
     }
 
     #[test]
-    fn a_run_that_ends_is_kept_whole() {
-        let board = board(None, 1000);
-        assert_eq!(board.trace().lines().count(), 1000);
-        assert_eq!(board.left_out_until(), None);
-        assert_eq!(told(&board, Some(0)).matches("event: entry").count(), 1000);
-        assert!(told(&board, Some(998)).starts_with("id: 999\n"));
+    fn unbounded_buffer_keeps_whole_trace() {
+        let buffer = filled(None, 1000);
+        assert_eq!(buffer.trace().lines().count(), 1000);
+        assert_eq!(buffer.last_omitted_line(), None);
+        assert_eq!(
+            streamed(&buffer, Some(0)).matches("event: entry").count(),
+            1000
+        );
+        assert!(streamed(&buffer, Some(998)).starts_with("id: 999\n"));
     }
 
-    /// However long it goes on, what is kept is its header and a last part of limited length, which
-    /// begins with a plan; each line keeps its number.
+    /// A bounded buffer keeps the header and a last part of limited length that begins with a request for a plan.
+    /// Lines keep their numbers.
     #[test]
-    fn of_a_run_that_goes_on_the_last_part_is_kept() {
+    fn bounded_buffer_keeps_header_and_last_part() {
         let most = 3000;
         for lines in (2..600).step_by(7) {
-            let board = board(Some(most), lines);
-            let trace = board.trace();
+            let buffer = filled(Some(most), lines);
+            let trace = buffer.trace();
             let kept: Vec<&str> = trace.lines().collect();
             assert_eq!(kept[0], "header");
             assert!(trace.len() <= most + "header\n".len(), "{lines} lines");
-            let Some(until) = board.left_out_until() else {
+            let Some(until) = buffer.last_omitted_line() else {
                 assert_eq!(kept.len(), lines);
                 continue;
             };
             assert_eq!(kept.len() + until, lines + 1);
             assert_eq!(format!("{}\n", kept[1]), line(until + 1));
             assert!(kept[1].contains("planning"));
-            let behind = told(&board, Some(until));
+            let behind = streamed(&buffer, Some(until));
             let first = format!("id: {}\nevent: entry\ndata: {}\n", until + 1, kept[1]);
             assert!(behind.starts_with(&first), "{behind}");
             assert_eq!(behind.matches("event: entry").count(), lines - until);
@@ -365,20 +385,20 @@ mod tests {
     }
 
     #[test]
-    fn without_a_new_plan_the_last_part_is_kept_all_the_same() {
-        let board = Board::keeping(3000);
-        board.add("header\n");
+    fn trace_without_plan_is_shortened() {
+        let buffer = TraceBuffer::with_limit(3000);
+        buffer.add("header\n");
         let line = line(1);
-        (2..=1000).for_each(|_| board.add(&line));
-        let left = board.trace().len();
+        (2..=1000).for_each(|_| buffer.add(&line));
+        let left = buffer.trace().len();
         assert!((1400..=3007).contains(&left), "{left} bytes");
     }
 
     #[test]
-    fn who_reads_too_slowly_is_told_how_much_was_missed() {
-        let board = board(Some(3000), 600);
-        let until = board.left_out_until().expect("600 lines are more");
-        let behind = told(&board, Some(17));
+    fn slow_client_receives_number_of_omitted_lines() {
+        let buffer = filled(Some(3000), 600);
+        let until = buffer.last_omitted_line().expect("600 lines are more");
+        let behind = streamed(&buffer, Some(17));
         let first = format!("event: missed\ndata: {}\n\nid: {}\n", until - 17, until + 1);
         assert!(behind.starts_with(&first), "{behind}");
     }

@@ -1,4 +1,4 @@
-//! A run with a journal: nothing is started that is not on the disk.
+//! Write-ahead journaling of a run: no action starts before its command is on the disk.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,53 +12,56 @@ use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, SnapshotLine, snapshot_text};
 
-use crate::desk::Desk;
 use crate::journal::JournalFile;
+use crate::request_queue::RequestQueue;
 
-/// Whether everything is on the disk that should be.
+/// Health of a journal, shared by its users.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Kept(Arc<AtomicBool>);
+pub struct JournalHealth(Arc<AtomicBool>);
 
-impl Kept {
-    /// Whether a record was lost.
-    pub(super) fn is_lost(&self) -> bool {
+impl JournalHealth {
+    /// Returns `true` if a record could not be written.
+    pub fn has_failed(&self) -> bool {
         self.0.load(Ordering::SeqCst)
     }
 }
 
-/// Writes each entry into a journal. Before the world is told to start or to cancel something, that
-/// is on the disk, together with all else that the same decision starts or cancels, and so is what people ask before they are told that it was taken in; all else is handed to the operating system at once.
-pub(super) struct JournalWriter<'a> {
+/// Recorder that writes each entry to a journal.
+///
+/// Commands of a decision are synced to the disk before the world receives them, and requests before their clients
+/// are notified. Other entries are written without a sync.
+pub struct JournalWriter<'a> {
     task: Arc<Task>,
     file: &'a mut JournalFile,
-    kept: Kept,
-    /// Who waits for requests to be on the disk.
-    desk: Option<Desk>,
-    /// Whether commands were written since the disk was last waited for.
+    health: JournalHealth,
+    /// Queue of requests that wait for a sync.
+    queue: Option<RequestQueue>,
+    /// `true` if commands were written since the last sync.
     has_commands: bool,
 }
 
 impl<'a> JournalWriter<'a> {
-    pub(super) fn new(
+    /// Creates a recorder that reports failures to `health` and to the queue.
+    pub fn new(
         task: &Arc<Task>,
         file: &'a mut JournalFile,
-        kept: &Kept,
-        desk: Option<&Desk>,
+        health: &JournalHealth,
+        queue: Option<&RequestQueue>,
     ) -> Self {
         Self {
             task: Arc::clone(task),
             file,
-            kept: kept.clone(),
-            desk: desk.cloned(),
+            health: health.clone(),
+            queue: queue.cloned(),
             has_commands: false,
         }
     }
 
-    /// A record was lost.
-    fn lose(&self) {
-        self.kept.0.store(true, Ordering::SeqCst);
-        if let Some(desk) = &self.desk {
-            desk.lose();
+    /// Reports a failure.
+    fn fail(&self) {
+        self.health.0.store(true, Ordering::SeqCst);
+        if let Some(queue) = &self.queue {
+            queue.fail_journal();
         }
     }
 }
@@ -68,42 +71,62 @@ impl Recorder for JournalWriter<'_> {
         let line = Line::of(&self.task, entry);
         let is_written = self.file.write(&format!("{}\n", line.text()));
         let is_answer = matches!(entry, Entry::Passed { .. });
-        let has_requests = is_answer && self.desk.as_ref().is_some_and(Desk::has_fetched);
+        let has_requests = is_answer
+            && self
+                .queue
+                .as_ref()
+                .is_some_and(RequestQueue::has_unrecorded);
         self.has_commands |= matches!(entry, Entry::Command { .. });
-        let is_kept = is_written && (!has_requests || self.file.sync());
-        if !is_kept {
-            self.lose();
-        } else if let Some(desk) = self.desk.as_ref().filter(|_| has_requests) {
-            desk.note_recorded();
+        let is_safe = is_written && (!has_requests || self.file.sync());
+        if !is_safe {
+            self.fail();
+        } else if let Some(queue) = self.queue.as_ref().filter(|_| has_requests) {
+            queue.note_recorded();
         }
     }
 
     fn commit(&mut self) {
         if std::mem::take(&mut self.has_commands) && !self.file.sync() {
-            self.lose();
+            self.fail();
         }
     }
 
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
-        self.file.is_long()
+        self.file.needs_rotation()
             && SnapshotLine::of(&self.task, &stand())
-                .is_some_and(|snapshot| self.file.begin_anew(&snapshot_text(&snapshot)))
+                .is_some_and(|snapshot| self.file.rotate(&snapshot_text(&snapshot)))
     }
 }
 
-/// A world that starts nothing any more when the journal has lost a record. What runs is still told
-/// to stop: the run is over, in order.
-pub(super) struct Careful<W> {
-    pub(super) inner: W,
-    pub(super) kept: Kept,
-    /// What was not started.
-    pub(super) refused: Vec<Observation>,
+/// World that starts no action after a failure of the journal. Cancellations are passed on, so that the run is shut
+/// down in order.
+pub struct JournaledWorld<W> {
+    inner: W,
+    health: JournalHealth,
+    /// Failures of actions that were not started.
+    refused: Vec<Observation>,
 }
 
-impl<W: World> World for Careful<W> {
+impl<W> JournaledWorld<W> {
+    /// Wraps a world.
+    pub fn new(inner: W, health: JournalHealth) -> Self {
+        Self {
+            inner,
+            health,
+            refused: Vec::new(),
+        }
+    }
+
+    /// Returns the wrapped world.
+    pub fn into_inner(self) -> W {
+        self.inner
+    }
+}
+
+impl<W: World> World for JournaledWorld<W> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
         match command {
-            Command::Start { ticket, .. } if self.kept.is_lost() => {
+            Command::Start { ticket, .. } if self.health.has_failed() => {
                 let why = "it was not started: the journal cannot be written".to_owned();
                 self.refused.push(Observation {
                     time: now.clone(),

@@ -1,10 +1,8 @@
-//! A world on a wall clock.
+//! Simulated world on a wall clock.
 //!
-//! Its time 0 is the moment at which the first plan is ready and the executor has prepared for it; with
-//! a calendar that begins now, the moment at which the calendar is read.
-//! What is decided takes no time in the world, but making further plans does: as long as it takes on
-//! the wall clock, times the factor. What happens meanwhile is reported afterwards, with the times
-//! at which it happened.
+//! Time 0 is the moment at which the executor is prepared for the first plan, or at which a calendar that begins
+//! now is read. Decisions take no time in the world. Planning takes its wall-clock time multiplied by the
+//! factor. Events during planning are reported afterwards, with their times.
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
@@ -16,23 +14,22 @@ use elbowroom::execution::{
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
+use elbowroom::num::work::Stop;
 
 use crate::clock::Clock;
-use crate::interrupt::Interrupt;
 
-/// A simulated clock that runs `factor` times as fast as the wall clock.
-pub(super) struct Pace {
-    /// Since the world was first told or asked something.
+/// Simulated clock that runs `factor` times as fast as the wall clock.
+pub struct Pace {
+    /// Runs since the first command or question to the world.
     clock: OnceLock<Clock>,
     factor: Rational,
-    /// The time for which the world's clock was stopped, on the wall clock.
+    /// Wall-clock time for which the world's clock was stopped.
     stopped: Mutex<Duration>,
 }
 
 impl Pace {
-    /// The world's time passes with the clock `since`, if there is one; otherwise it is 0 until
-    /// [`Pace::begin`].
-    pub(super) fn new(factor: &Rational, since: Option<Clock>) -> Self {
+    /// Creates a clock that started with `since`, or starts with the first command or question to the world.
+    pub fn new(factor: &Rational, since: Option<Clock>) -> Self {
         Self {
             clock: since.map_or_else(OnceLock::new, OnceLock::from),
             factor: factor.clone(),
@@ -40,7 +37,7 @@ impl Pace {
         }
     }
 
-    /// The world's time passes from now on, unless it did so before.
+    /// Starts the clock unless it runs already.
     fn begin(&self) {
         self.clock.get_or_init(Clock::start);
     }
@@ -49,7 +46,7 @@ impl Pace {
         self.clock.get().is_some()
     }
 
-    /// How long the world's clock has been going, on the wall clock.
+    /// Returns the wall-clock time for which the world's clock has run.
     fn passed(&self) -> Duration {
         let since = self.clock.get().map_or(Duration::ZERO, |it| it.elapsed());
         since.saturating_sub(self.stopped())
@@ -59,21 +56,20 @@ impl Pace {
         *self.stopped.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The time until the world's clock reads `time`.
+    /// Returns the wall-clock time until the world's clock reads `time`.
     fn left(&self, time: &Rational) -> Duration {
         on_the_wall(time, &self.factor).saturating_sub(self.passed())
     }
 
-    /// The reading of the world's clock after this time on the wall clock, rounded to a thousandth
-    /// of a second.
+    /// Returns the reading of the world's clock after this wall-clock time, rounded down to a millisecond.
     fn after(&self, while_on_the_wall: Duration) -> Rational {
         let millis = (self.passed() + while_on_the_wall).as_millis();
         let seconds = Rational::new(i64::try_from(millis).unwrap_or(i64::MAX), 1000);
         seconds * &self.factor
     }
 
-    /// `spent` is all that planning took on the wall clock; in the world it takes `allowed`. For
-    /// what is longer, the world's clock was stopped. Before it goes there is nothing to stop.
+    /// Stops the world's clock for the part of the wall-clock time `spent` on planning that exceeds `allowed`, the
+    /// planning time in the world. No effect before the clock runs.
     fn stop(&self, spent: Duration, allowed: &Rational) {
         if !self.has_begun() {
             return;
@@ -83,27 +79,28 @@ impl Pace {
     }
 }
 
-/// How long the world's `time` is on the wall clock.
+/// Converts a time of the world to wall-clock time.
 fn on_the_wall(time: &Rational, factor: &Rational) -> Duration {
     let seconds = time.to_f64() / factor.to_f64();
     if seconds > 0.0 {
-        // More seconds than can be counted: nobody lives to see that.
         Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
     } else {
         Duration::ZERO
     }
 }
 
-/// Lets the time of another world pass at a pace.
-pub(super) struct Realtime<'a> {
-    pub(super) inner: &'a mut dyn World,
-    pub(super) pace: &'a Pace,
-    /// Ends a wait where it has come to.
-    pub(super) interrupt: &'a Interrupt,
+/// World decorator that lets time pass at a pace.
+pub struct Realtime<'a> {
+    /// The simulated world.
+    pub inner: &'a mut dyn World,
+    /// Its clock.
+    pub pace: &'a Pace,
+    /// Request that ends a pending wait.
+    pub stop: &'a Stop,
 }
 
-/// The interval at which a sleep checks for an interrupt.
-const NAP: Duration = Duration::from_millis(50);
+/// Interval between two checks for a stop request.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 impl World for Realtime<'_> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
@@ -114,11 +111,11 @@ impl World for Realtime<'_> {
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
         self.pace.begin();
         loop {
-            let soon = self.pace.after(NAP);
+            let soon = self.pace.after(POLL_INTERVAL);
             let passage = self.inner.wait(until.min(&soon))?;
             std::thread::sleep(self.pace.left(&passage.now));
             let is_over = !passage.observations.is_empty() || passage.now >= *until;
-            if is_over || self.interrupt.is_requested() {
+            if is_over || self.stop.is_requested() {
                 return Ok(passage);
             }
         }
@@ -133,12 +130,14 @@ impl World for Realtime<'_> {
     }
 }
 
-/// A planner in such a world.
-pub(super) struct PacedPlanner<'a> {
-    pub(super) inner: Box<dyn Planner + 'a>,
-    pub(super) pace: &'a Pace,
-    /// The planning time, as it passes in the world.
-    pub(super) planning_time: &'a PlanningTime,
+/// Planner decorator that measures or fixes the planning time in the world.
+pub struct PacedPlanner<'a> {
+    /// The planner.
+    pub inner: Box<dyn Planner + 'a>,
+    /// Clock of the world.
+    pub pace: &'a Pace,
+    /// Planning time in the world.
+    pub planning_time: &'a PlanningTime,
 }
 
 impl Planner for PacedPlanner<'_> {
@@ -146,7 +145,7 @@ impl Planner for PacedPlanner<'_> {
         self.inner.expect(task, situation);
     }
 
-    // The clock goes on while a plan is made aside.
+    // The clock runs while a plan is made in the background.
     fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
         self.inner.begin(task, situation)
     }
@@ -180,7 +179,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn no_time_is_too_long_or_too_short_to_be_counted() {
+    fn extreme_times_are_converted() {
         let tiny = Rational::new(1, 1_000_000_000_000) * Rational::new(1, 1_000_000_000_000);
         assert_eq!(on_the_wall(&Rational::ONE, &tiny), Duration::MAX);
         assert_eq!(on_the_wall(&Rational::from(-1), &tiny), Duration::ZERO);
@@ -192,12 +191,12 @@ mod tests {
     }
 
     #[test]
-    fn the_clock_stands_still_while_planning_takes_longer_than_it_may() {
+    fn clock_stops_while_planning_exceeds_its_time() {
         let pace = Pace::new(&Rational::from(10), None);
         pace.stop(Duration::from_secs(5), &Rational::ONE);
-        assert_eq!(pace.stopped(), Duration::ZERO, "it does not go yet");
+        assert_eq!(pace.stopped(), Duration::ZERO, "it does not run yet");
         pace.begin();
-        // Two seconds of planning, of which the world sees three of its own, 0.3 on the wall.
+        // Two seconds of planning: three in the world, 0.3 on the wall clock.
         pace.stop(Duration::from_secs(2), &Rational::from(3));
         assert_eq!(pace.stopped(), Duration::from_millis(1700));
         pace.stop(Duration::from_millis(100), &Rational::from(3));

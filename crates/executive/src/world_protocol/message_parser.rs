@@ -1,4 +1,4 @@
-//! What a program says, line by line, understood.
+//! Parser of the messages that a world sends, line by line.
 
 use std::sync::Arc;
 
@@ -8,14 +8,13 @@ use elbowroom::num::Rational;
 use elbowroom::report::wire;
 use serde_json::{Value, json};
 
-use super::clocks::Clocks;
+use super::clock_sync::Clocks;
 
-/// The versions of the protocol that are spoken here. A program that does not greet speaks the
-/// first.
+/// Supported versions of the protocol. A program without a greeting uses version 1.
 const VERSIONS: [u64; 2] = [1, 2];
 
-/// The first message to a program.
-pub(crate) fn hello(task: &Task) -> Value {
+/// Returns the first message to a program: the names of the actions of the problem.
+pub fn hello(task: &Task) -> Value {
     let schemas = task.problem().schemas.iter();
     let actions: Vec<&str> = schemas.map(|schema| schema.name.as_str()).collect();
     json!({
@@ -24,31 +23,31 @@ pub(crate) fn hello(task: &Task) -> Value {
     })
 }
 
-/// How a program introduces itself, from version 2 on.
+/// Greeting of a program, from version 2 on.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Greeting {
-    /// The version that it speaks.
-    pub(crate) version: u64,
-    /// Its name; may be empty.
-    pub(crate) name: String,
-    /// What it says it can do, unknown words included.
-    pub(crate) can: Vec<String>,
+pub struct Greeting {
+    /// Version of the protocol.
+    pub version: u64,
+    /// Name of the program; may be empty.
+    pub name: String,
+    /// Capabilities that the program states, including unknown ones.
+    pub can: Vec<String>,
 }
 
-/// What a program may be able to do, or not.
+/// Optional capability of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Ability {
-    /// To say what is so when it is asked to look.
+pub enum Capability {
+    /// Report facts and values on the question `look`.
     Look,
-    /// To stop an action.
+    /// Cancel an action.
     Cancel,
-    /// To go on after it was started again, and to say what became of what was under way.
+    /// Resume after a restart, and report the outcome of actions that were running.
     Resume,
-    /// To make something of what is believed.
+    /// Process belief messages.
     Beliefs,
 }
 
-impl Ability {
+impl Capability {
     fn name(self) -> &'static str {
         match self {
             Self::Look => "look",
@@ -59,34 +58,37 @@ impl Ability {
     }
 }
 
-/// One line, understood.
+/// Parsed message of a program.
 #[derive(Debug)]
-pub(crate) enum Said {
+pub enum Message {
+    /// The greeting; [`MessageParser::greeting`] returns it.
     Greeting,
-    /// One of its clocks was read, of which nothing follows yet.
+    /// A reading of a clock. Later time stamps are converted with it.
     Clock,
-    /// It knows nothing of a start that it was asked about.
+    /// The program has no record of an action that it was asked about.
     Unknown,
+    /// The end of an answer: the time of the world in seconds.
     Time(Rational),
+    /// An observation.
     Observation(Observation),
 }
 
-/// Understands a program's lines, in their order.
-pub(crate) struct Listener {
+/// Parser of a program's messages, in their order.
+pub struct MessageParser {
     task: Arc<Task>,
     clocks: Clocks,
     greeting: Option<Greeting>,
-    /// Whether anything was understood.
+    /// `true` after the first valid message.
     has_spoken: bool,
-    /// The tickets below this one were given.
+    /// Tickets below this one were issued.
     given: u64,
-    /// The number of the last question.
+    /// Number of the last question.
     question: u64,
 }
 
-impl Listener {
-    /// Nothing was said.
-    pub(crate) fn new(task: &Arc<Task>) -> Self {
+impl MessageParser {
+    /// Creates a parser for the messages of a new program.
+    pub fn new(task: &Arc<Task>) -> Self {
         Self {
             task: Arc::clone(task),
             clocks: Clocks::default(),
@@ -97,61 +99,60 @@ impl Listener {
         }
     }
 
-    /// The program is told to start something with this ticket.
-    pub(crate) fn note_start(&mut self, ticket: u64) {
+    /// Records that the ticket was issued to the program.
+    pub fn note_start(&mut self, ticket: u64) {
         self.given = self.given.max(ticket.saturating_add(1));
     }
 
-    /// The number of a new question.
-    pub(crate) fn next_question(&mut self) -> u64 {
+    /// Returns the number of a new question.
+    pub fn next_question(&mut self) -> u64 {
         self.question += 1;
         self.question
     }
 
-    /// How the program has introduced itself.
-    pub(crate) fn greeting(&self) -> Option<&Greeting> {
+    /// Returns the greeting, or `None` if there was none yet.
+    pub fn greeting(&self) -> Option<&Greeting> {
         self.greeting.as_ref()
     }
 
-    /// Whether the program can do that, as far as it says: one of the first version can do
-    /// everything.
-    pub(crate) fn can(&self, ability: Ability) -> bool {
+    /// Returns `true` if the program states the capability. Programs of version 1 have all of them.
+    pub fn can(&self, capability: Capability) -> bool {
         self.greeting
             .as_ref()
-            .is_none_or(|greeting| greeting.can.iter().any(|word| word == ability.name()))
+            .is_none_or(|greeting| greeting.can.iter().any(|word| word == capability.name()))
     }
 
-    /// Whether the program wants to hear what is believed; not known before it has said anything.
-    pub(crate) fn wants_beliefs(&self) -> Option<bool> {
+    /// Returns `true` if the program processes belief messages, or `None` before its first message.
+    pub fn wants_beliefs(&self) -> Option<bool> {
         self.has_spoken
-            .then(|| self.greeting.is_some() && self.can(Ability::Beliefs))
+            .then(|| self.greeting.is_some() && self.can(Capability::Beliefs))
     }
 
-    /// Reads a line.
+    /// Parses a line.
     ///
     /// # Errors
-    /// In words, when it is no message, or one that means nothing here.
-    pub(crate) fn read(&mut self, line: &str) -> Result<Said, String> {
-        let said = self.understood(line)?;
+    /// When the line is no message, or an unknown or misplaced one; the error is a message for the user.
+    pub fn parse(&mut self, line: &str) -> Result<Message, String> {
+        let message = self.parse_line(line)?;
         self.has_spoken = true;
-        Ok(said)
+        Ok(message)
     }
 
-    fn understood(&mut self, line: &str) -> Result<Said, String> {
+    fn parse_line(&mut self, line: &str) -> Result<Message, String> {
         let mut message: Value =
             serde_json::from_str(line).map_err(|error| format!("not JSON: {error}"))?;
         let what = message.get("type").and_then(Value::as_str);
         match what {
-            Some("hello") => return self.greeted(&message).map(|()| Said::Greeting),
-            Some("time") => return self.time(&message).map(Said::Time),
+            Some("hello") => return self.greeted(&message).map(|()| Message::Greeting),
+            Some("time") => return self.time(&message).map(Message::Time),
             Some(word @ ("clock" | "feedback")) if self.greeting.is_none() => {
                 return Err(format!(
                     "`{word}` belongs to version 2 of the protocol; greet first, with \
                      {{\"type\":\"hello\",\"version\":2,\"can\":[…]}}"
                 ));
             }
-            Some("unknown") if self.greeting.is_some() => return Ok(Said::Unknown),
-            Some("clock") => return self.clock(&message).map(|()| Said::Clock),
+            Some("unknown") if self.greeting.is_some() => return Ok(Message::Unknown),
+            Some("clock") => return self.clock(&message).map(|()| Message::Clock),
             _ => {}
         }
         if self.greeting.is_some() && message.get("clock").is_some() {
@@ -170,7 +171,7 @@ impl Listener {
             {
                 Err(format!("ticket {} was never given", ticket.0))
             }
-            _ => Ok(Said::Observation(observation)),
+            _ => Ok(Message::Observation(observation)),
         }
     }
 
@@ -197,7 +198,7 @@ impl Listener {
             name: name.unwrap_or_default().to_owned(),
             can,
         };
-        // Who says that it speaks the first version has said nothing else about itself.
+        // Version 1 has no capabilities.
         if version > VERSIONS[0] {
             self.greeting = Some(greeting);
         }
@@ -229,8 +230,8 @@ impl Listener {
     }
 }
 
-/// Whether a line is a message that ends an answer to this question, right or wrong.
-pub(crate) fn is_time(line: &str) -> bool {
+/// Returns `true` for a malformed message `time`, which still ends an answer.
+pub fn is_time(line: &str) -> bool {
     let message = serde_json::from_str::<Value>(line).unwrap_or_default();
     message.get("type").and_then(Value::as_str) == Some("time")
         && wire::field_number(&message, "now").is_err()

@@ -1,38 +1,38 @@
-//! The clocks that a world's reports are stamped with.
+//! Synchronization of the clocks that stamp a world's reports.
 
 use std::collections::BTreeMap;
 
 use elbowroom::num::Rational;
 
-/// How far apart two readings must be, in seconds, for a rate to be taken from them.
-const FAR_APART: i64 = 10;
+/// Minimum time between two readings for an estimate of the rate, in seconds.
+const MIN_INTERVAL: i64 = 10;
 
-/// The limits of a rate that can be believed: a clock that is further off is none.
+/// Smallest and largest credible rate.
 const RATES: [(i64, i64); 2] = [(1, 2), (2, 1)];
 
-/// Times are rounded to so many parts of a second: no clock of a robot is more exact.
-const PARTS: i64 = 1_000_000;
+/// Resolution of times, in parts of a second.
+const RESOLUTION: i64 = 1_000_000;
 
-/// What is known of each clock: which time of the world it shows.
+/// Relation between each clock and the time of the world.
 #[derive(Debug, Default)]
 pub(super) struct Clocks(BTreeMap<String, Clock>);
 
 #[derive(Debug)]
 struct Clock {
-    /// What it showed when it was read first, and the time of the world then.
+    /// First reading: what the clock showed, and the time of the world.
     first: (Rational, Rational),
-    /// The same for the last time.
+    /// Last reading.
     last: (Rational, Rational),
-    /// How many of its seconds pass in one of the world's, where that was said.
+    /// Rate that the world has stated: seconds of the clock per second of the world.
     stated: Option<Rational>,
 }
 
 impl Clocks {
-    /// A clock was read: it showed `reads` at `time`. `rate`, if given, is how many of its seconds
-    /// pass in one of the world's.
+    /// Records that the clock `name` showed `reads` at `time`. `rate`, if given, is in seconds of the clock per second
+    /// of the world.
     ///
     /// # Errors
-    /// In words, when no clock can run like that.
+    /// When the rate is not credible; the error is a message.
     pub(super) fn read(
         &mut self,
         name: &str,
@@ -55,10 +55,10 @@ impl Clocks {
             return Ok(());
         };
         let elapsed = &now.1 - &clock.first.1;
-        if rate.is_none() && elapsed >= Rational::from(FAR_APART) {
+        if rate.is_none() && elapsed >= Rational::from(MIN_INTERVAL) {
             let measured = (&now.0 - &clock.first.0) / &elapsed;
             if !is_credible(&measured) {
-                // It was set: what it showed before says nothing any more.
+                // The clock was set: earlier readings are obsolete.
                 clock.first.clone_from(&now);
             }
         }
@@ -67,10 +67,10 @@ impl Clocks {
         Ok(())
     }
 
-    /// The time of the world at which the clock showed `stamp`.
+    /// Returns the time of the world at which the clock showed `stamp`.
     ///
     /// # Errors
-    /// In words, when the clock was never read.
+    /// When the clock was never read; the error is a message.
     pub(super) fn time(&self, name: &str, stamp: &Rational) -> Result<Rational, String> {
         let clock = self.0.get(name).ok_or_else(|| {
             format!(
@@ -90,7 +90,7 @@ impl Clock {
             return stated.clone();
         }
         let elapsed = &self.last.1 - &self.first.1;
-        if elapsed < Rational::from(FAR_APART) {
+        if elapsed < Rational::from(MIN_INTERVAL) {
             return Rational::ONE;
         }
         (&self.last.0 - &self.first.0) / &elapsed
@@ -110,7 +110,7 @@ fn implausible(name: &str, rate: &Rational) -> String {
 }
 
 fn rounded(time: &Rational) -> Rational {
-    let parts = Rational::from(PARTS);
+    let parts = Rational::from(RESOLUTION);
     (time * &parts + Rational::new(1, 2)).floor() / parts
 }
 
@@ -129,17 +129,16 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_was_read_once_is_off_by_a_constant() {
+    fn single_reading_yields_constant_offset() {
         let mut clocks = Clocks::default();
         read(&mut clocks, "1700000012.5", "12.5");
         let time = clocks.time("arm", &number("1700000010.25"));
         assert_eq!(time, Ok(number("10.25")));
     }
 
-    /// 100 s on this clock are 101 s of the world's, so 1 s before the last reading is 1.01 s
-    /// before.
+    /// 100 s of this clock are 101 s of the world.
     #[test]
-    fn drift_is_taken_from_readings_far_apart() {
+    fn drift_is_estimated_from_distant_readings() {
         let mut clocks = Clocks::default();
         read(&mut clocks, "0", "0");
         read(&mut clocks, "100", "101");
@@ -147,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_close_together_say_nothing_of_drift() {
+    fn close_readings_yield_no_drift() {
         let mut clocks = Clocks::default();
         read(&mut clocks, "0", "0");
         read(&mut clocks, "1.5", "1");
@@ -156,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_was_set_begins_anew() {
+    fn clock_that_was_set_is_read_afresh() {
         let mut clocks = Clocks::default();
         read(&mut clocks, "0", "0");
         read(&mut clocks, "5000", "20");
@@ -164,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_clock_can_do_is_refused() {
+    fn incredible_rate_is_rejected() {
         let mut clocks = Clocks::default();
         let stopped = clocks.read("arm", number("0"), number("0"), Some(number("0")));
         assert!(stopped.is_err());

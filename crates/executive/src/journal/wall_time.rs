@@ -7,22 +7,22 @@ use elbowroom::num::Rational;
 
 use crate::clock;
 
-/// The member of a record with its wall-clock time, which comes last.
+/// Member of a record with its wall-clock time: the last member.
 const MEMBER: &str = ",\"recorded\":";
 
 /// Wall-clock time, in milliseconds since 1970.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct WallTime(i64);
+pub struct WallTime(i64);
 
 impl WallTime {
-    /// Returns the present time.
-    pub(crate) fn now() -> Self {
+    /// Returns the current time.
+    pub fn now() -> Self {
         let since = clock::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self(i64::try_from(since.as_millis()).unwrap_or(i64::MAX))
     }
 
     /// Returns the seconds from `earlier` to this time, negative if this one is earlier.
-    pub(crate) fn seconds_since(self, earlier: Self) -> Rational {
+    pub fn seconds_since(self, earlier: Self) -> Rational {
         Rational::new(self.0.saturating_sub(earlier.0), 1000)
     }
 
@@ -52,17 +52,17 @@ pub(super) fn split(line: &str) -> (Cow<'_, str>, Option<WallTime>) {
 
 /// The world's time and the wall-clock time at one record.
 #[derive(Clone, Debug)]
-pub(crate) struct Reading {
+pub struct Reading {
     /// The world's time.
-    pub(crate) world: Rational,
+    pub world: Rational,
     /// The wall-clock time.
-    pub(crate) wall: WallTime,
+    pub wall: WallTime,
 }
 
 impl Reading {
     /// Returns `true` if the world's time has passed faster than the wall clock since `earlier`: the world is a
     /// simulation. A record may be written late by a second, and clocks may differ by a tenth.
-    pub(crate) fn is_ahead_since(&self, earlier: &Self) -> bool {
+    pub fn is_ahead_since(&self, earlier: &Self) -> bool {
         let real = self.wall.seconds_since(earlier.wall);
         &self.world - &earlier.world > real * Rational::new(11, 10) + Rational::ONE
     }

@@ -1,13 +1,13 @@
-//! The conversation with a program that is a world: `docs/formats/world-protocol.md`.
+//! Protocol of worlds that are processes: `docs/formats/world-protocol.md`.
 
-mod believed;
-mod clocks;
-mod listener;
-mod pipes;
+mod belief_message;
+mod clock_sync;
+mod message_parser;
+mod pipe_io;
 
-pub(crate) use believed::believed;
-pub(crate) use listener::{Ability, Greeting, Listener, Said, hello, is_time};
-pub(crate) use pipes::{Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Mouth, Told};
+pub use belief_message::belief_message;
+pub use message_parser::{Capability, Greeting, Message, MessageParser, hello, is_time};
+pub use pipe_io::{LONGEST_ANSWER, LONGEST_LINE, LineReader, LineWriter, ReadResult, WriteResult};
 
 use std::io;
 use std::path::Path;
@@ -15,13 +15,14 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use crate::clock::Clock;
-use crate::words::plain;
+use crate::messages::plain;
 
-/// Starts a program, with the words of `command` as its arguments and both of its pipes.
+/// Starts a program and connects to its standard input and output. The words of `command` are the program and its
+/// arguments.
 ///
 /// # Errors
-/// In words, when it cannot be started.
-pub(crate) fn launch(command: &str) -> Result<(Child, Mouth, Ears), String> {
+/// When the program cannot be started; the error is a message.
+pub fn launch(command: &str) -> Result<(Child, LineWriter, LineReader), String> {
     let mut words = command.split_whitespace();
     let name = words.next().ok_or("the command is empty")?;
     let mut program = Command::new(name);
@@ -29,26 +30,26 @@ pub(crate) fn launch(command: &str) -> Result<(Child, Mouth, Ears), String> {
         .args(words)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped());
-    // Ctrl-C is for this program, which then ends that one in order.
+    // Ctrl-C is sent to this program only, which then stops the child in order.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut program, 0);
     let mut child = program.spawn().map_err(|error| no_program(name, &error))?;
     match (child.stdin.take(), child.stdout.take()) {
-        (Some(stdin), Some(stdout)) => Ok((child, Mouth::new(stdin), Ears::new(stdout))),
+        (Some(stdin), Some(stdout)) => Ok((child, LineWriter::new(stdin), LineReader::new(stdout))),
         _ => Err("its standard input and output are not there".to_owned()),
     }
 }
 
-/// Whether there is such a program, as far as that can be said without starting it.
+/// Checks that there is such a program, without starting it.
 ///
 /// # Errors
-/// In words, when there is none.
-pub(crate) fn find(command: &str) -> Result<(), String> {
+/// When there is none; the error is a message.
+pub fn find_program(command: &str) -> Result<(), String> {
     let name = command
         .split_whitespace()
         .next()
         .ok_or("the command is empty")?;
-    // Elsewhere, names of programs have endings that are not said.
+    // On other systems, file names of programs have suffixes that the command omits.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;
@@ -77,7 +78,7 @@ pub(crate) fn find(command: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Why this is no program that can be started: of a folder, the system only says that it is forbidden.
+/// Returns the message for a program that cannot be started. The system reports a folder as a missing permission.
 fn no_program(name: &str, error: &io::Error) -> String {
     let path = Path::new(name);
     if path.is_dir() && path.components().count() > 1 {
@@ -91,13 +92,13 @@ fn no_program(name: &str, error: &io::Error) -> String {
     }
 }
 
-/// How a program has ended, if it does so within `patience`.
-pub(crate) fn ended(child: &mut Child, patience: Duration) -> Option<ExitStatus> {
+/// Waits for a program to exit. Returns its status, or `None` if it still runs after `timeout`.
+pub fn wait_for_exit(child: &mut Child, timeout: Duration) -> Option<ExitStatus> {
     let clock = Clock::start();
     loop {
         match child.try_wait() {
             Ok(Some(status)) => return Some(status),
-            Ok(None) if clock.elapsed() < patience => {
+            Ok(None) if clock.elapsed() < timeout => {
                 std::thread::sleep(Duration::from_millis(20));
             }
             _ => return None,

@@ -1,26 +1,26 @@
-//! How much memory this process takes.
+//! Limit on the resident memory of this process.
 
 use std::fs;
 use std::time::Duration;
 
 use crate::clock::Clock;
 
-/// How often the system is asked: it takes some ten microseconds.
-const QUESTION: Duration = Duration::from_millis(5);
+/// Interval between two queries of the system. A query takes about ten microseconds.
+const QUERY_INTERVAL: Duration = Duration::from_millis(5);
 
-/// A limit on the memory that the process takes, beyond what it took when the limit was set.
+/// Limit on the memory of the process, relative to its memory when the limit was created.
 ///
-/// It is kept where the system tells (Linux's `/proc`), and never reached elsewhere.
-pub(crate) struct MemoryLimit {
-    /// In bytes, of the whole process.
+/// Effective on Linux (`/proc`); never exceeded elsewhere.
+pub struct MemoryLimit {
+    /// Limit on the resident memory of the process, in bytes.
     most: u64,
     asked: Clock,
     is_exceeded: bool,
 }
 
 impl MemoryLimit {
-    /// A limit of so many bytes more.
-    pub(crate) fn of(more: u64) -> Self {
+    /// Creates a limit of `more` bytes above the present memory.
+    pub fn of(more: u64) -> Self {
         Self {
             most: resident().unwrap_or(0).saturating_add(more),
             asked: Clock::start(),
@@ -28,9 +28,9 @@ impl MemoryLimit {
         }
     }
 
-    /// Whether it is exceeded, or was when somebody asked.
-    pub(crate) fn is_exceeded(&mut self) -> bool {
-        if !self.is_exceeded && self.asked.elapsed() >= QUESTION {
+    /// Returns `true` if the limit is exceeded, or was at an earlier call.
+    pub fn is_exceeded(&mut self) -> bool {
+        if !self.is_exceeded && self.asked.elapsed() >= QUERY_INTERVAL {
             self.asked = Clock::start();
             self.is_exceeded = resident().is_some_and(|resident| resident > self.most);
         }
@@ -38,7 +38,7 @@ impl MemoryLimit {
     }
 }
 
-/// How much of this process is in memory, in bytes.
+/// Returns the resident memory of this process in bytes, or `None` if the system does not report it.
 fn resident() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status
@@ -52,17 +52,17 @@ fn resident() -> Option<u64> {
 mod tests {
     use std::thread;
 
-    use super::{MemoryLimit, QUESTION, resident};
+    use super::{MemoryLimit, QUERY_INTERVAL, resident};
 
     #[test]
-    fn a_limit_is_exceeded_by_what_is_taken_and_not_before() {
+    fn allocation_exceeds_limit_permanently() {
         if resident().is_none() {
             return;
         }
         let mut enough = MemoryLimit::of(4 << 30);
         let mut little = MemoryLimit::of(32 << 20);
         let taken = vec![1_u8; 128 << 20];
-        thread::sleep(2 * QUESTION);
+        thread::sleep(2 * QUERY_INTERVAL);
         assert!(little.is_exceeded());
         assert!(!enough.is_exceeded());
         assert_eq!(
@@ -70,7 +70,7 @@ mod tests {
             128 << 20
         );
         drop(taken);
-        thread::sleep(2 * QUESTION);
-        assert!(little.is_exceeded(), "what was told once is not taken back");
+        thread::sleep(2 * QUERY_INTERVAL);
+        assert!(little.is_exceeded(), "an exceeded limit stays exceeded");
     }
 }

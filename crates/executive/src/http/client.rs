@@ -1,4 +1,4 @@
-//! Asking an executive.
+//! HTTP client for an executive.
 
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
@@ -9,24 +9,27 @@ use std::time::Duration;
 
 use super::Stream;
 
-/// How long to wait for an answer.
-const PATIENCE: Duration = Duration::from_secs(30);
+/// Timeout for the response.
+const RESPONSE_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// The limit on an answer, in bytes.
-const LONGEST_ANSWER: u64 = 256 << 20;
+/// Limit on a response, in bytes.
+const LONGEST_RESPONSE: u64 = 256 << 20;
 
-/// Where an executive is.
+/// Address of an executive.
 #[derive(Clone, Debug)]
-pub(crate) enum Target {
+pub enum Target {
     /// `HOST:PORT`.
     Tcp(String),
-    /// A socket, by its file.
+    /// Path of a Unix socket.
     Socket(PathBuf),
 }
 
 impl Target {
-    /// Reads `PORT`, `HOST:PORT`, or the path of a socket, which has a slash in it.
-    pub(crate) fn read(text: &str) -> Result<Self, String> {
+    /// Reads `PORT`, `HOST:PORT`, or the path of a socket, which contains a slash.
+    ///
+    /// # Errors
+    /// When the text is none of these; the error states the expected forms.
+    pub fn read(text: &str) -> Result<Self, String> {
         let text = text.trim_start_matches("http://").trim_end_matches('/');
         if text.contains('/') {
             return Ok(Self::Socket(PathBuf::from(text)));
@@ -66,22 +69,26 @@ impl std::fmt::Display for Target {
     }
 }
 
-/// An answer.
-pub(crate) struct Answer {
-    pub(crate) status: u16,
+/// Response of an executive.
+pub struct Response {
+    /// Status code.
+    pub status: u16,
     body: BufReader<Stream>,
 }
 
-impl Answer {
-    /// All of it.
-    pub(crate) fn text(self) -> io::Result<String> {
+impl Response {
+    /// Reads the whole body.
+    ///
+    /// # Errors
+    /// When the connection fails, or the body is not UTF-8.
+    pub fn text(self) -> io::Result<String> {
         let mut text = String::new();
-        self.body.take(LONGEST_ANSWER).read_to_string(&mut text)?;
+        self.body.take(LONGEST_RESPONSE).read_to_string(&mut text)?;
         Ok(text)
     }
 
-    /// Its lines as they come, however long that takes.
-    pub(crate) fn lines(self) -> impl Iterator<Item = io::Result<String>> {
+    /// Returns the lines of the body as they arrive, without a timeout.
+    pub fn lines(self) -> impl Iterator<Item = io::Result<String>> {
         let _ = self
             .body
             .get_ref()
@@ -90,22 +97,25 @@ impl Answer {
     }
 }
 
-/// Asks something; `body` is JSON.
-pub(crate) fn ask(
+/// Sends a request: method, path, access token and JSON body. Returns when the head of the response has arrived.
+///
+/// # Errors
+/// When there is no connection, the response takes more than 30 s, or it is not HTTP.
+pub fn send(
     target: &Target,
-    (verb, path): (&str, &str),
+    (method, path): (&str, &str),
     token: Option<&str>,
     body: Option<&str>,
-) -> io::Result<Answer> {
+) -> io::Result<Response> {
     let mut stream = target.connect()?;
-    stream.set_read_timeout(PATIENCE)?;
-    stream.set_write_timeout(PATIENCE)?;
+    stream.set_read_timeout(RESPONSE_TIMEOUT)?;
+    stream.set_write_timeout(RESPONSE_TIMEOUT)?;
     let body = body.unwrap_or_default();
     let token = token.map_or(String::new(), |token| {
         format!("Authorization: Bearer {token}\r\n")
     });
     let request = format!(
-        "{verb} {path} HTTP/1.1\r\nHost: localhost\r\n{token}Content-Type: application/json\r\n\
+        "{method} {path} HTTP/1.1\r\nHost: localhost\r\n{token}Content-Type: application/json\r\n\
          Content-Length: {}\r\nConnection: close\r\n\r\n{body}",
         body.len()
     );
@@ -119,7 +129,7 @@ pub(crate) fn ask(
     loop {
         line.clear();
         if body.read_line(&mut line)? == 0 || line.trim().is_empty() {
-            return Ok(Answer { status, body });
+            return Ok(Response { status, body });
         }
     }
 }

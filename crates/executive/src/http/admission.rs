@@ -1,62 +1,62 @@
-//! Limits on the clients of a listener, which clients without the token cannot use up for those that have it.
+//! Limits on the clients of a listener. Clients without the token cannot exhaust the limits of clients with it.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::{Misunderstood, Request, Stream};
+use super::{Request, RequestError, Stream};
 
-/// The limit on clients whose requests are being read. Beyond it, the connection that has been open longest is closed. A
+/// Limit on clients whose requests are being read. Beyond it, the oldest of these connections is closed. A
 /// request usually arrives at once, so idle connections are closed first.
 const MOST_READING: usize = 64;
 
-/// The limit on clients with the token that are served at once, and on those without.
+/// Limit on concurrent clients with the token, and on those without.
 const MOST_SERVED: usize = 64;
 
-/// The limit on streams of events without the token.
+/// Limit on concurrent event streams without the token.
 const MOST_STREAMS: usize = 32;
 
-/// The limit on clients without the token from one address that is not of this machine.
+/// Limit on concurrent clients without the token from one address of another machine.
 const MOST_OF_PEER: usize = 16;
 
-/// The clients of a listener.
+/// Clients of a listener.
 #[derive(Clone, Default)]
 pub(super) struct Admission(Arc<Mutex<Clients>>);
 
 #[derive(Default)]
 struct Clients {
-    /// The number of connections so far.
+    /// Number of connections so far.
     connections: u64,
-    /// Connections whose requests are being read, the oldest first.
+    /// Connections whose requests are being read, oldest first.
     reading: VecDeque<(u64, Stream)>,
-    /// The number of clients with the token that are being served.
+    /// Number of clients with the token.
     known: usize,
-    /// The number of the others.
+    /// Number of clients without the token.
     others: usize,
-    /// The number of streams of events among these.
+    /// Number of event streams among the latter.
     streams: usize,
-    /// The number of clients without the token from each address.
+    /// Number of clients without the token by address.
     of_peer: BTreeMap<IpAddr, usize>,
 }
 
-/// A client whose request is being read, until this is dropped.
+/// Guard of a client whose request is being read.
 pub(super) struct Reading {
     admission: Admission,
     connection: u64,
 }
 
-/// A client that is being served, until this is dropped.
+/// Guard of a client that is being served.
 pub(super) struct Served {
     admission: Admission,
     class: Class,
 }
 
-/// A class of clients.
+/// Class of a client.
 #[derive(Clone, Copy)]
 enum Class {
-    /// Those with the token.
+    /// Client with the token.
     Known,
-    /// Those without, with their address unless it is of this machine.
+    /// Client without the token, with its address unless it is on this machine.
     Other {
         peer: Option<IpAddr>,
         is_stream: bool,
@@ -65,11 +65,11 @@ enum Class {
 
 impl Admission {
     fn clients(&self) -> MutexGuard<'_, Clients> {
-        // No change of the counters can panic half-way.
+        // No change of the counters can panic.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Begins to read the request of a client.
+    /// Registers a client whose request is read.
     pub(super) fn read(&self, stream: &Stream) -> Reading {
         let mut clients = self.clients();
         clients.connections += 1;
@@ -89,16 +89,16 @@ impl Admission {
         }
     }
 
-    /// Begins to serve a client; `is_known` if it has the token.
+    /// Registers a client that is served; `is_known` if it has the token.
     ///
     /// # Errors
-    /// When too many clients of its kind are being served.
+    /// When the limit of its class is reached.
     pub(super) fn serve(
         &self,
         request: &Request,
         peer: Option<IpAddr>,
         is_known: bool,
-    ) -> Result<Served, Misunderstood> {
+    ) -> Result<Served, RequestError> {
         let class = if is_known {
             Class::Known
         } else {
@@ -109,7 +109,7 @@ impl Admission {
         let mut clients = self.clients();
         match class {
             Class::Known if clients.known >= MOST_SERVED => {
-                return Err(Misunderstood(
+                return Err(RequestError::new(
                     503,
                     "too many clients with the token; come back later",
                 ));
@@ -121,7 +121,7 @@ impl Admission {
                     || of_peer.unwrap_or(0) >= MOST_OF_PEER
                     || is_stream && clients.streams >= MOST_STREAMS;
                 if is_too_many {
-                    return Err(Misunderstood(
+                    return Err(RequestError::new(
                         503,
                         "too many clients without the token; come back later",
                     ));

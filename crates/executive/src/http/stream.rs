@@ -1,4 +1,4 @@
-//! Connections, whatever they go through.
+//! Listeners and connections over TCP or a Unix socket.
 
 use std::io::{self, Read, Write};
 use std::net::{IpAddr, Shutdown, TcpListener, TcpStream};
@@ -6,18 +6,20 @@ use std::net::{IpAddr, Shutdown, TcpListener, TcpStream};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::time::Duration;
 
-use crate::board::Client;
 use crate::clock::Clock;
+use crate::trace_buffer::Subscriber;
 
-/// Where clients are awaited.
-pub(crate) enum Listener {
+/// Listening socket.
+pub enum Listener {
+    /// TCP.
     Tcp(TcpListener),
+    /// Unix socket.
     #[cfg(unix)]
     Unix(UnixListener),
 }
 
 impl Listener {
-    /// The next client.
+    /// Waits for the next client.
     pub(super) fn accept(&self) -> io::Result<Stream> {
         match self {
             Self::Tcp(listener) => listener.accept().map(|(stream, _)| Stream::Tcp(stream)),
@@ -27,14 +29,16 @@ impl Listener {
     }
 }
 
-/// A connection.
-pub(crate) enum Stream {
+/// Connection to a client or to a server.
+pub enum Stream {
+    /// TCP.
     Tcp(TcpStream),
+    /// Unix socket.
     #[cfg(unix)]
     Unix(UnixStream),
 }
 
-/// Does the same with either.
+/// Evaluates an expression with the inner stream.
 macro_rules! either {
     ($stream:expr, $it:ident => $what:expr) => {
         match $stream {
@@ -77,14 +81,14 @@ impl Stream {
         let _ = either!(self, it => it.shutdown(Shutdown::Both));
     }
 
-    /// Ends the connection. What the client still says is read for a moment, so that it gets the
-    /// answer before it hears that nobody listens.
+    /// Closes the connection. Remaining bytes of the client are read for 200 ms: a reset could discard the response
+    /// before the client reads it.
     pub(super) fn close(mut self) {
-        const MOMENT: Duration = Duration::from_millis(200);
+        const LINGER: Duration = Duration::from_millis(200);
         let _ = either!(&self, it => it.shutdown(Shutdown::Write));
-        let _ = self.set_read_timeout(MOMENT);
+        let _ = self.set_read_timeout(LINGER);
         let (clock, mut bytes) = (Clock::start(), [0; 8192]);
-        while clock.elapsed() < MOMENT {
+        while clock.elapsed() < LINGER {
             match self.read(&mut bytes) {
                 Ok(0) | Err(_) => break,
                 Ok(_) => {}
@@ -93,7 +97,7 @@ impl Stream {
     }
 }
 
-impl Client for Stream {
+impl Subscriber for Stream {
     /// Reads without waiting, and drops the bytes that the client has sent.
     fn has_left(&mut self) -> bool {
         let _ = either!(self, it => it.set_nonblocking(true));

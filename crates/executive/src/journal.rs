@@ -1,9 +1,9 @@
-//! Journals: traces that survive whatever ends the program, `docs/formats/journal.md`.
+//! Journals: traces that survive a crash of the program, `docs/formats/journal.md`.
 //!
-//! A record is a line of a trace with eight hexadecimal digits and a space before it: the CRC-32 of
-//! the digits of the record before it (zeros before the first) and of the line. So a record that is
-//! damaged, missing or out of place is noticed. The last member of each line is `recorded`, the wall-clock time
-//! at which it was written, which is not part of the trace.
+//! A record is a line of a trace, preceded by eight hexadecimal digits and a space. The digits are the CRC-32 of
+//! the digits of the previous record (zeros for the first) and of the line, so that a damaged, missing or
+//! misplaced record is detected. The last member of each line is `recorded`, the wall-clock time of writing. It is
+//! not part of the trace.
 
 mod segments;
 mod wall_time;
@@ -14,55 +14,56 @@ use std::path::{Path, PathBuf};
 #[cfg(unix)]
 use std::time::Duration;
 
-use crate::exit::Failure;
-use crate::words::plain;
+use crate::error::{Error, WarningSink};
+use crate::messages::plain;
 
-pub(crate) use segments::Segments;
-pub(crate) use wall_time::{Reading, WallTime};
+pub use segments::Segments;
+pub use wall_time::{Reading, WallTime};
 
-/// The digits before a line, and the space behind them.
+/// Length of the checksum and the space before a line, in bytes.
 const HEAD: usize = 9;
 
-/// The checksum before the first record.
-const BEGINNING: &str = "00000000";
+/// Checksum that precedes the first record.
+const INITIAL_CHECKSUM: &str = "00000000";
 
-/// What to do about a journal that is damaged in the middle.
-pub(crate) const DAMAGED: &str = "what comes behind the damage may not be all that happened: put a copy of the file in \
+/// Advice for a journal that is damaged in the middle.
+pub const DAMAGE_ADVICE: &str = "what comes behind the damage may not be all that happened: put a copy of the file in \
                                   its place, or see to the robot and begin a new run with another journal";
 
-/// A journal that is being written.
-pub(crate) struct JournalFile {
+/// Journal file of a run, open for writing.
+pub struct JournalFile {
     file: File,
     path: PathBuf,
-    /// The checksum of the last record.
+    /// Checksum of the last record.
     last: String,
     error: Option<io::Error>,
-    /// The first line, which says what is run.
+    /// First line: the specification of the run.
     header: String,
-    /// How long the file is, in bytes.
+    /// Length of the file in bytes.
     length: u64,
-    /// When it is begun anew.
+    /// Rotation settings; `None` for a journal that is not rotated.
     segments: Option<Segments>,
-    /// It is not begun anew before it is as long.
+    /// Length from which the next rotation is attempted, in bytes.
     least: u64,
+    warnings: WarningSink,
 }
 
-/// A journal that was read.
-pub(crate) struct Journal {
-    /// Its lines as those of a trace.
-    pub(crate) text: String,
-    /// For each of its lines, the time at which it was recorded; `None` in journals of earlier versions.
-    pub(crate) recorded: Vec<Option<WallTime>>,
-    /// Whether something at its end is no whole record.
-    pub(crate) is_torn: bool,
-    /// The length of what is whole, in bytes.
+/// Contents of a journal.
+pub struct Journal {
+    /// Lines of the trace.
+    pub text: String,
+    /// Time of recording of each line; `None` in journals of earlier versions.
+    pub recorded: Vec<Option<WallTime>>,
+    /// `true` if the file ends with an incomplete record.
+    pub is_torn: bool,
+    /// Length of the complete records in bytes.
     length: u64,
     last: String,
-    /// The same, and the length of the text, without its last record.
+    /// Length, checksum and length of the text without the last record.
     before: (u64, String, usize),
 }
 
-/// Returns options for files that only their owner can read. A journal holds all facts about the robots.
+/// Returns options for files that only their owner can read: a journal contains all facts about the robots.
 fn for_owner() -> OpenOptions {
     let mut options = OpenOptions::new();
     #[cfg(unix)]
@@ -71,25 +72,27 @@ fn for_owner() -> OpenOptions {
 }
 
 impl JournalFile {
-    /// An empty journal. One that has something in it is not overwritten; `resume` is the command that
-    /// goes on with it.
-    pub(crate) fn create(path: &Path, resume: &str) -> Result<Self, Failure> {
+    /// Creates an empty journal. `resume` is the command that resumes a run, for the advice.
+    ///
+    /// # Errors
+    /// When the file cannot be written, contains a journal already, or is written by another program.
+    pub fn create(path: &Path, resume: &str) -> Result<Self, Error> {
         let name = path.display();
         let open = || {
             let mut options = for_owner();
             options.write(true).create(true).truncate(false).open(path)
         };
         let file = open().map_err(|error| cannot_write(path, &error))?;
-        claim(path, &file)?;
+        lock(path, &file)?;
         if file.metadata().is_ok_and(|it| it.is_file() && it.len() > 0) {
-            return Err(Failure::new(
+            return Err(Error::new(
                 format!("there is a journal {name} already"),
                 format!(
                     "`{resume}` goes on with its run; if that is over, choose another file, or remove this one"
                 ),
             ));
         }
-        // A file that nobody finds after a power failure is none. Not every system can do this.
+        // The directory entry has to survive a power failure. Not every system can sync folders.
         let folder = path
             .parent()
             .filter(|folder| !folder.as_os_str().is_empty());
@@ -99,24 +102,28 @@ impl JournalFile {
         Ok(Self {
             file,
             path: path.to_owned(),
-            last: BEGINNING.to_owned(),
+            last: INITIAL_CHECKSUM.to_owned(),
             error: None,
             header: String::new(),
             length: 0,
             segments: None,
             least: 0,
+            warnings: WarningSink::default(),
         })
     }
 
-    /// Goes on behind what is whole of a journal; `before` is how many bytes the file had before
-    /// that was read.
-    pub(crate) fn go_on(path: &Path, journal: &Journal, before: u64) -> Result<Self, Failure> {
+    /// Opens a journal to append behind its complete records. `before` is the length of the file, in bytes, when
+    /// `journal` was read.
+    ///
+    /// # Errors
+    /// When the file cannot be written, or is written by another program.
+    pub fn reopen(path: &Path, journal: &Journal, before: u64) -> Result<Self, Error> {
         let open = || OpenOptions::new().write(true).open(path);
         let mut file = open().map_err(|error| cannot_write(path, &error))?;
-        claim(path, &file)?;
-        // It was read before it was claimed.
+        lock(path, &file)?;
+        // The journal was read before the lock was acquired.
         if file.metadata().is_ok_and(|it| it.len() != before) {
-            return Err(under_way(path));
+            return Err(locked(path));
         }
         let mut cut = || {
             file.set_len(journal.length)?;
@@ -133,12 +140,13 @@ impl JournalFile {
             length: journal.length,
             segments: None,
             least: 0,
+            warnings: WarningSink::default(),
         })
     }
 
-    /// Writes a line of a trace, which ends with its line feed, unless writing has failed before.
-    /// Returns whether it is written.
-    pub(crate) fn write(&mut self, line: &str) -> bool {
+    /// Appends a line of a trace, which ends with its line feed, unless an earlier write has failed. Returns
+    /// `true` if the line is written.
+    pub fn write(&mut self, line: &str) -> bool {
         if self.error.is_none() {
             if self.header.is_empty() {
                 line.trim_end_matches('\n').clone_into(&mut self.header);
@@ -152,11 +160,11 @@ impl JournalFile {
         self.error.is_none()
     }
 
-    /// Has what was written put on the disk before this returns. Returns whether it is.
-    pub(crate) fn sync(&mut self) -> bool {
+    /// Flushes all records to the disk. Returns `true` if they are on the disk.
+    pub fn sync(&mut self) -> bool {
         if self.error.is_none() {
             self.error = match self.file.sync_data() {
-                // A pipe or a device has no disk behind it.
+                // Pipes and devices cannot be synced.
                 Err(error) if error.kind() == ErrorKind::InvalidInput => None,
                 result => result.err(),
             };
@@ -164,39 +172,38 @@ impl JournalFile {
         self.error.is_none()
     }
 
-    /// Where it is.
-    pub(crate) fn path(&self) -> &Path {
+    /// Returns the path of the file.
+    pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Why not all records were written, if so.
-    pub(crate) fn trouble(&self) -> Option<String> {
+    /// Returns the reason of the first failed write, or `None` if all records are written.
+    pub fn failure(&self) -> Option<String> {
         self.error.as_ref().map(plain)
     }
 }
 
-/// How often it is looked whether another program still claims a journal, and after which time: for a second.
+/// Limit on attempts to lock a journal, and the interval between them: one second in all.
 #[cfg(unix)]
-const MOST_GLANCES: usize = 50;
+const LOCK_ATTEMPTS: usize = 50;
 #[cfg(unix)]
-const GLANCE: Duration = Duration::from_millis(20);
+const LOCK_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Keeps every other program from writing this journal, until this one ends, however it does. Where
-/// files cannot be locked, nothing is kept.
-fn claim(path: &Path, file: &File) -> Result<(), Failure> {
+/// Locks the journal until this program ends. Other programs cannot write it then. No effect on systems without
+/// file locks.
+fn lock(path: &Path, file: &File) -> Result<(), Error> {
     #[cfg(unix)]
     {
         use rustix::fs::{FlockOperation, flock};
         use rustix::io::Errno;
-        // A program that was killed while it started another one leaves its claim to that, until the other is what
-        // it is to be.
-        let mut glances = 0;
+        // A program that is killed between fork and exec leaves its lock to the child until exec.
+        let mut attempts = 0;
         while flock(file, FlockOperation::NonBlockingLockExclusive) == Err(Errno::WOULDBLOCK) {
-            if glances == MOST_GLANCES {
-                return Err(under_way(path));
+            if attempts == LOCK_ATTEMPTS {
+                return Err(locked(path));
             }
-            glances += 1;
-            std::thread::sleep(GLANCE);
+            attempts += 1;
+            std::thread::sleep(LOCK_INTERVAL);
         }
     }
     #[cfg(not(unix))]
@@ -204,15 +211,15 @@ fn claim(path: &Path, file: &File) -> Result<(), Failure> {
     Ok(())
 }
 
-fn under_way(path: &Path) -> Failure {
-    Failure::new(
+fn locked(path: &Path) -> Error {
+    Error::new(
         format!("the run of {} is under way", path.display()),
         "another program writes this journal; wait for its end, or end it",
     )
 }
 
-fn cannot_write(path: &Path, error: &io::Error) -> Failure {
-    Failure::new(
+fn cannot_write(path: &Path, error: &io::Error) -> Error {
+    Error::new(
         format!(
             "cannot write the journal {}: {}",
             path.display(),
@@ -222,8 +229,8 @@ fn cannot_write(path: &Path, error: &io::Error) -> Failure {
     )
 }
 
-/// Whether a file is a journal, and no trace without checksums.
-pub(crate) fn is_journal(text: &str) -> bool {
+/// Returns `true` for the text of a journal, `false` for a trace without checksums.
+pub fn is_journal(text: &str) -> bool {
     let head = text.as_bytes().get(..HEAD + 1);
     head.is_some_and(|head| {
         head[..HEAD - 1].iter().all(u8::is_ascii_hexdigit) && &head[HEAD - 1..] == b" {"
@@ -231,19 +238,18 @@ pub(crate) fn is_journal(text: &str) -> bool {
 }
 
 impl Journal {
-    /// Reads a journal. What is not whole at its end is left out.
+    /// Reads a journal. An incomplete record at the end is omitted.
     ///
     /// # Errors
-    /// In words, when there are whole records behind one that is not: then it was damaged, not cut
-    /// off.
-    pub(crate) fn read(text: &str) -> Result<Self, String> {
+    /// When complete records follow a damaged one: the journal was damaged, not cut off.
+    pub fn read(text: &str) -> Result<Self, String> {
         let mut journal = Self {
             text: String::with_capacity(text.len()),
             recorded: Vec::new(),
             is_torn: false,
             length: 0,
-            last: BEGINNING.to_owned(),
-            before: (0, BEGINNING.to_owned(), 0),
+            last: INITIAL_CHECKSUM.to_owned(),
+            before: (0, INITIAL_CHECKSUM.to_owned(), 0),
         };
         let mut before = None::<&str>;
         for (index, record) in text.split_inclusive('\n').enumerate() {
@@ -276,8 +282,9 @@ impl Journal {
 }
 
 impl Journal {
-    /// The same without its last record, which is then written over.
-    pub(crate) fn without_last(mut self) -> Self {
+    /// Returns the journal without its last record. [`JournalFile::reopen`] overwrites that record.
+    #[must_use]
+    pub fn without_last(mut self) -> Self {
         let (length, last, text) = self.before.clone();
         self.text.truncate(text);
         self.recorded.pop();
@@ -289,7 +296,7 @@ impl Journal {
     }
 }
 
-/// A line as a record, and its checksum.
+/// Returns the checksum and the record of a line.
 fn record(before: &str, line: &str) -> (String, String) {
     let sum = checksum(before, line.trim_end_matches('\n'));
     let record = format!("{sum} {line}");
@@ -300,7 +307,7 @@ fn checksum(before: &str, line: &str) -> String {
     format!("{:08x}", crc32(before.bytes().chain(line.bytes())))
 }
 
-/// CRC-32 as in ISO 3309 and zip files.
+/// Returns the CRC-32 of ISO 3309 and zip files.
 fn crc32(bytes: impl Iterator<Item = u8>) -> u32 {
     let step = |sum: u32, byte: u8| {
         (0..8).fold(sum ^ u32::from(byte), |sum, _| {
@@ -313,16 +320,16 @@ fn crc32(bytes: impl Iterator<Item = u8>) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::{BEGINNING, Journal, checksum, crc32, is_journal};
+    use super::{INITIAL_CHECKSUM, Journal, checksum, crc32, is_journal};
 
-    /// The check value that the catalogues of such sums give.
+    /// The check value in catalogues of checksums.
     #[test]
-    fn the_checksum_is_that_of_zip_files() {
+    fn checksum_is_that_of_zip_files() {
         assert_eq!(crc32("123456789".bytes()), 0xcbf4_3926);
     }
 
     fn journal(lines: &[&str]) -> String {
-        let mut last = BEGINNING.to_owned();
+        let mut last = INITIAL_CHECKSUM.to_owned();
         let records = lines.iter().map(|line| {
             last = checksum(&last, line);
             format!("{last} {line}\n")
@@ -333,7 +340,7 @@ mod tests {
     const LINES: [&str; 3] = ["{\"event\":\"header\"}", "{\"a\":1}", "{\"b\":\"é\"}"];
 
     #[test]
-    fn what_was_written_is_read() {
+    fn written_journal_is_read() {
         let text = journal(&LINES);
         assert!(is_journal(&text));
         assert!(!is_journal(LINES[0]));
@@ -345,9 +352,9 @@ mod tests {
         assert_eq!((read.is_torn, read.length), (false, text.len() as u64));
     }
 
-    /// Wherever a journal is cut off, its whole records are read, and nothing else.
+    /// A journal that is cut off at any byte yields its complete records.
     #[test]
-    fn a_torn_tail_is_left_out() {
+    fn torn_tail_is_omitted() {
         let text = journal(&LINES);
         let ends: Vec<usize> = text.match_indices('\n').map(|(at, _)| at + 1).collect();
         for cut in (0..text.len()).filter(|cut| text.is_char_boundary(*cut)) {
@@ -361,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_in_the_middle_is_no_torn_tail() {
+    fn damage_in_the_middle_is_an_error() {
         let lines = [
             "{\"event\":\"header\"}",
             "{\"a\":1}",
@@ -373,7 +380,7 @@ mod tests {
         let records: Vec<&str> = text.split_inclusive('\n').collect();
         let without_the_second = [records[0], records[2], records[3]].concat();
         assert!(Journal::read(&without_the_second).is_err());
-        // Of a last record alone nobody can say what happened to it.
+        // A damaged last record cannot be distinguished from a torn one.
         let last = text.replace("\"c\":3", "\"c\":7");
         assert!(Journal::read(&last).expect("torn").is_torn);
     }

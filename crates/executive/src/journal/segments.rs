@@ -1,57 +1,61 @@
-//! Journals in segments: a journal that has become long is begun anew, where its run rests.
+//! Rotation of journals: a long journal is replaced by a new segment while its run is idle.
 //!
-//! The new segment is written beside the old one and is on the disk before it takes its name, in one step:
-//! whenever the program is killed, the file of that name is a whole journal, the old one or the new one.
+//! The new segment is written to a temporary file, synced, and renamed. Whenever the program is killed, the
+//! file of the journal's name is a complete journal: the old segment or the new one.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::{BEGINNING, JournalFile, WallTime, claim, for_owner, record};
-use crate::output;
-use crate::words::plain;
+use super::{INITIAL_CHECKSUM, JournalFile, WallTime, for_owner, lock, record};
+use crate::error::WarningSink;
+use crate::messages::plain;
 
-/// When a journal is begun anew, and what becomes of what it had.
+/// Rotation settings of a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Segments {
-    /// From this length on, in bytes.
-    pub(crate) size: u64,
-    /// How many earlier segments are kept: `FILE.1` is the last one.
-    pub(crate) kept: usize,
+pub struct Segments {
+    /// Length from which the journal is rotated, in bytes.
+    pub size: u64,
+    /// Number of earlier segments that are kept: `FILE.1` is the latest one.
+    pub kept: usize,
 }
 
 impl JournalFile {
-    /// The same journal, which is begun anew when it has become long.
-    pub(crate) fn in_segments(self, segments: Option<Segments>) -> Self {
+    /// Sets the rotation, and the receiver of warnings about segments that cannot be begun.
+    #[must_use]
+    pub fn with_rotation(self, segments: Option<Segments>, warnings: &WarningSink) -> Self {
         if let Some(segments) = segments {
-            // What a killed program has left half done.
+            // Remains of a killed program.
             let _ = fs::remove_file(beside(&self.path, "new"));
-            close_up(&self.path, segments.kept);
+            complete_rotation(&self.path, segments.kept);
         }
-        Self { segments, ..self }
+        Self {
+            segments,
+            warnings: warnings.clone(),
+            ..self
+        }
     }
 
-    /// Whether it has become so long that it is to be begun anew.
-    pub(crate) fn is_long(&self) -> bool {
+    /// Returns `true` if the journal is long enough for a rotation.
+    pub fn needs_rotation(&self) -> bool {
         let size = self.segments.map(|segments| segments.size);
         self.error.is_none() && size.is_some_and(|size| self.length >= size.max(self.least))
     }
 
-    /// Begins a new segment, which has only the header and this line. If that cannot be, the journal
-    /// is as it was, which is told, and it is tried again when it is twice as long. Returns whether it
-    /// has been begun.
-    pub(crate) fn begin_anew(&mut self, snapshot: &str) -> bool {
+    /// Begins a new segment, which consists of the header and the line `snapshot`. On failure, the journal is
+    /// unchanged, a warning is issued, and the next rotation is due at twice the length. Returns `true` on success.
+    pub fn rotate(&mut self, snapshot: &str) -> bool {
         let Some(segments) = self.segments else {
             return false;
         };
         let new = beside(&self.path, "new");
         let replaced = self.replace(&new, snapshot, segments.kept);
-        // If all of a segment is its snapshot, it is not begun anew at every opportunity.
+        // A segment that consists of its snapshot is not rotated at every opportunity.
         self.least = 2 * self.length;
         if let Err(error) = &replaced {
             let _ = fs::remove_file(new);
-            output::warn(&format!(
+            self.warnings.warn(&format!(
                 "the journal {} goes on growing, as no new segment can be begun: {}",
                 self.path.display(),
                 plain(error)
@@ -63,18 +67,18 @@ impl JournalFile {
     fn replace(&mut self, new: &Path, snapshot: &str, kept: usize) -> io::Result<()> {
         let now = WallTime::now();
         let stamped = |line: &str| now.stamped(&format!("{line}\n")).into_owned();
-        let (first, header) = record(BEGINNING, &stamped(&self.header));
+        let (first, header) = record(INITIAL_CHECKSUM, &stamped(&self.header));
         let (last, snapshot) = record(&first, &stamped(snapshot));
         let text = header + &snapshot;
         let mut options = for_owner();
         let mut file = options.write(true).create(true).truncate(true).open(new)?;
-        claim(new, &file).map_err(|failure| io::Error::other(failure.message().to_owned()))?;
+        lock(new, &file).map_err(io::Error::other)?;
         file.write_all(text.as_bytes())?;
         file.sync_all()?;
-        keep(&self.path, kept)?;
+        keep_segment(&self.path, kept)?;
         fs::rename(new, &self.path)?;
         if let Ok(folder) = File::open(folder_of(&self.path)) {
-            // Until then, either segment may be found after a power failure.
+            // Before this, either segment may be found after a power failure.
             let _ = folder.sync_all();
         }
         (self.file, self.last, self.length) = (file, last, text.len() as u64);
@@ -82,10 +86,9 @@ impl JournalFile {
     }
 }
 
-/// Takes back what a program that was killed in [`keep`] has done of it: a segment that has its further
-/// name already is not over, and where a number is missing, the earlier segments are not yet, or not
-/// any more, where they are looked for.
-fn close_up(path: &Path, kept: usize) {
+/// Reverts an interrupted [`keep_segment`]: removes the second name of the current segment, and closes gaps in the
+/// numbers of the earlier ones.
+fn complete_rotation(path: &Path, kept: usize) {
     let first = beside(path, "1");
     if kept > 0 && is_one_file(path, &first) {
         let _ = fs::remove_file(first);
@@ -96,7 +99,7 @@ fn close_up(path: &Path, kept: usize) {
         if !segment.exists() {
             continue;
         }
-        // A name that is not free is never taken.
+        // No existing file is overwritten.
         if number > next && fs::rename(segment, beside(path, &next.to_string())).is_err() {
             return;
         }
@@ -104,7 +107,7 @@ fn close_up(path: &Path, kept: usize) {
     }
 }
 
-/// Whether these are two names for one file.
+/// Returns `true` if both paths name the same file.
 #[cfg(unix)]
 fn is_one_file(one: &Path, other: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -112,15 +115,15 @@ fn is_one_file(one: &Path, other: &Path) -> bool {
     matches!((number(one), number(other)), (Ok(one), Ok(other)) if one == other)
 }
 
-/// Elsewhere, that cannot be asked; the segment is then kept twice.
+/// Not known on other systems; the segment is kept twice then.
 #[cfg(not(unix))]
 fn is_one_file(_: &Path, _: &Path) -> bool {
     false
 }
 
-/// Gives a segment that is over a further name, and each earlier one the next number, up to the first
-/// number that is free; if none is, the oldest one is forgotten.
-fn keep(path: &Path, kept: usize) -> io::Result<()> {
+/// Links the finished segment as `FILE.1`. Increments the numbers of earlier segments up to the first gap; without a
+/// gap, the oldest segment is removed.
+fn keep_segment(path: &Path, kept: usize) -> io::Result<()> {
     let numbered = |number: usize| beside(path, &number.to_string());
     let free = (1..kept).find(|number| !numbered(*number).exists());
     for number in (1..free.unwrap_or(kept)).rev() {
@@ -136,11 +139,11 @@ fn keep(path: &Path, kept: usize) -> io::Result<()> {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
         _ => {}
     }
-    // Not every disk knows two names for a file.
+    // Not every file system has hard links.
     fs::hard_link(path, numbered(1)).or_else(|_| fs::copy(path, numbered(1)).map(drop))
 }
 
-/// `FILE.name`.
+/// Returns `FILE.name`.
 fn beside(path: &Path, name: &str) -> PathBuf {
     let mut file = OsString::from(path);
     file.push(".");
@@ -160,6 +163,7 @@ mod tests {
 
     use super::super::{Journal, JournalFile};
     use super::Segments;
+    use crate::error::WarningSink;
 
     fn folder(name: &str) -> PathBuf {
         let name = format!("elbowroom-segments-{}-{name}", std::process::id());
@@ -174,9 +178,9 @@ mod tests {
         Journal::read(&text).expect("whole").text
     }
 
-    /// Each segment is a journal with the same header, and as many as were asked for are kept.
+    /// Each segment is a journal with the same header. The given number of them is kept.
     #[test]
-    fn segments_follow_each_other() {
+    fn rotation_keeps_given_number_of_segments() {
         for kept in 0..4 {
             let folder = folder(&format!("follow-{kept}"));
             let path = folder.join("run.journal");
@@ -184,14 +188,14 @@ mod tests {
             let Ok(journal) = JournalFile::create(&path, "elbowroom serve --resume") else {
                 panic!("it can be made");
             };
-            let mut journal = journal.in_segments(segments);
+            let mut journal = journal.with_rotation(segments, &WarningSink::default());
             journal.write("{\"event\":\"header\"}\n");
             for number in 1..6 {
-                assert!(!journal.is_long(), "{number}");
-                while !journal.is_long() {
+                assert!(!journal.needs_rotation(), "{number}");
+                while !journal.needs_rotation() {
                     journal.write(&format!("{{\"of\":{number}}}\n"));
                 }
-                journal.begin_anew(&format!("{{\"snapshot\":{number}}}"));
+                journal.rotate(&format!("{{\"snapshot\":{number}}}"));
             }
             journal.write("{\"last\":true}\n");
             assert_eq!(
@@ -210,17 +214,17 @@ mod tests {
         }
     }
 
-    /// Wherever a program is killed while the earlier segments get their next numbers, the next one finds
-    /// them all, without a number that is missing or a segment that is there twice.
+    /// A program that is killed at any step of the renumbering leaves all segments: none is missing or duplicated
+    /// after the next start.
     #[test]
-    fn segments_whose_numbers_were_being_changed_are_all_found() {
+    fn interrupted_renumbering_is_reverted() {
         const KEPT: usize = 5;
         let segments = Some(Segments {
             size: 1,
             kept: KEPT,
         });
-        // After so many of the steps: three segments get the next number, and the last one its first.
-        // Elsewhere it is not known that two names are those of one file.
+        // Number of completed steps: three segments are renumbered, then the current one is linked. Only on Unix
+        // can two names of one file be recognized.
         for step in 0..=(if cfg!(unix) { 4 } else { 3 }) {
             let folder = folder(&format!("renumbered-{step}"));
             let path = folder.join("run.journal");
@@ -228,10 +232,10 @@ mod tests {
             let Ok(journal) = JournalFile::create(&path, "elbowroom serve --resume") else {
                 panic!("it can be made");
             };
-            let mut journal = journal.in_segments(segments);
+            let mut journal = journal.with_rotation(segments, &WarningSink::default());
             journal.write("{\"event\":\"header\"}\n");
             for number in 1..4 {
-                journal.begin_anew(&format!("{{\"snapshot\":{number}}}"));
+                journal.rotate(&format!("{{\"snapshot\":{number}}}"));
             }
             drop(journal);
             let whole = |count: usize| {
@@ -254,33 +258,33 @@ mod tests {
             }
             let text = fs::read_to_string(&path).expect("it is there");
             let (read, length) = (Journal::read(&text).expect("whole"), text.len() as u64);
-            let Ok(journal) = JournalFile::go_on(&path, &read, length) else {
-                panic!("it can be gone on with");
+            let Ok(journal) = JournalFile::reopen(&path, &read, length) else {
+                panic!("it can be reopened");
             };
-            let mut journal = journal.in_segments(segments);
+            let mut journal = journal.with_rotation(segments, &WarningSink::default());
             whole(3);
-            assert!(journal.begin_anew("{\"snapshot\":4}"), "step {step}");
+            assert!(journal.rotate("{\"snapshot\":4}"), "step {step}");
             whole(4);
             fs::remove_dir_all(&folder).expect("the folder is there");
         }
     }
 
-    /// Where no new segment can be begun, the journal goes on as it was.
+    /// If no new segment can be begun, the journal is continued.
     #[test]
-    fn a_segment_that_cannot_be_begun_changes_nothing() {
+    fn failed_rotation_changes_nothing() {
         let folder = folder("cannot");
         let path = folder.join("run.journal");
         let segments = Some(Segments { size: 1, kept: 1 });
         let Ok(journal) = JournalFile::create(&path, "elbowroom serve --resume") else {
             panic!("it can be made");
         };
-        let mut journal = journal.in_segments(segments);
-        // The name of the new segment is taken by a folder.
+        let mut journal = journal.with_rotation(segments, &WarningSink::default());
+        // A folder has the name of the new segment.
         fs::create_dir(folder.join("run.journal.new")).expect("made");
         journal.write("{\"event\":\"header\"}\n");
-        assert!(journal.is_long());
-        journal.begin_anew("{\"snapshot\":1}");
-        assert!(!journal.is_long(), "not before it is twice as long");
+        assert!(journal.needs_rotation());
+        journal.rotate("{\"snapshot\":1}");
+        assert!(!journal.needs_rotation(), "not before it is twice as long");
         assert!(journal.write("{\"next\":1}\n"));
         assert_eq!(read(&path), "{\"event\":\"header\"}\n{\"next\":1}\n");
         fs::remove_dir_all(&folder).expect("the folder is there");

@@ -1,4 +1,4 @@
-//! What a program that is a world is told of what is believed: `docs/formats/world-protocol.md`.
+//! Changes of the belief state for a world that is a process: `docs/formats/world-protocol.md`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,63 +9,64 @@ use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use serde_json::Value;
 
-use crate::conversation::believed;
+use crate::world_protocol::belief_message;
 
-/// What is believed, as far as the world has not been told of it: the run notes, and the world fetches.
+/// Changes of the belief state that the world has not received yet. Clones share the same changes: the run records
+/// them, and the world takes them.
 #[derive(Clone, Default)]
-pub(super) struct Believed(Arc<Mutex<Known>>);
+pub struct BeliefUpdates(Arc<Mutex<Pending>>);
 
 #[derive(Default)]
-struct Known {
-    /// Nobody wants to hear of it.
+struct Pending {
+    /// The world does not process belief messages.
     is_unwanted: bool,
     now: Rational,
     facts: Vec<bool>,
     values: Vec<Option<Rational>>,
-    /// The beginning, until it is told.
-    beginning: Option<Beginning>,
+    /// Initial belief state, until it is sent.
+    initial: Option<InitialBelief>,
     changed_facts: BTreeSet<FactId>,
     changed_values: BTreeSet<FluentId>,
 }
 
-struct Beginning {
+struct InitialBelief {
     now: Rational,
     facts: Vec<FactId>,
     values: BTreeMap<FluentId, Rational>,
 }
 
-impl Believed {
-    /// Notes what is believed, from the beginning on.
-    pub(super) fn listener(&self) -> impl FnMut(&Progression) + Send + use<> {
-        let known = self.clone();
+impl BeliefUpdates {
+    /// Returns a callback that records the belief state, to be called from the start of the run on.
+    pub fn listener(&self) -> impl FnMut(&Progression) + Send + use<> {
+        let updates = self.clone();
         let mut has_begun = false;
         move |belief| {
-            let mut known = known.known();
-            if !known.is_unwanted {
-                known.note(belief, std::mem::replace(&mut has_begun, true));
+            let mut pending = updates.lock();
+            if !pending.is_unwanted {
+                pending.note(belief, std::mem::replace(&mut has_begun, true));
             }
         }
     }
 
-    /// The messages that are due: the beginning, and then what has changed. Where they are not
-    /// wanted, nothing is noted any more.
-    pub(super) fn fetch(&self, is_wanted: bool, task: &Task) -> Vec<Value> {
-        let mut known = self.known();
+    /// Returns the pending messages: the initial belief state, then changes. If they are not wanted, no further
+    /// changes are recorded.
+    pub fn take_messages(&self, is_wanted: bool, task: &Task) -> Vec<Value> {
+        let mut pending = self.lock();
         if !is_wanted {
-            *known = Known {
+            *pending = Pending {
                 is_unwanted: true,
-                ..Known::default()
+                ..Pending::default()
             };
         }
-        known.fetch(task)
+        pending.take_messages(task)
     }
 
-    fn known(&self) -> MutexGuard<'_, Known> {
+    fn lock(&self) -> MutexGuard<'_, Pending> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Known {
+impl Pending {
     fn note(&mut self, belief: &Progression, has_begun: bool) {
         let task = belief.task();
         self.now.clone_from(belief.time());
@@ -77,7 +78,7 @@ impl Known {
             }
             if self.facts[place] != truth {
                 self.facts[place] = truth;
-                // What changes twice before it is told is as it was told.
+                // A second change restores the value that was sent.
                 if !self.changed_facts.remove(&fact) {
                     self.changed_facts.insert(fact);
                 }
@@ -96,7 +97,7 @@ impl Known {
         }
         if !has_begun {
             let values = std::mem::take(&mut self.changed_values).into_iter();
-            self.beginning = Some(Beginning {
+            self.initial = Some(InitialBelief {
                 now: self.now.clone(),
                 facts: std::mem::take(&mut self.changed_facts)
                     .into_iter()
@@ -108,15 +109,12 @@ impl Known {
         }
     }
 
-    fn fetch(&mut self, task: &Task) -> Vec<Value> {
+    fn take_messages(&mut self, task: &Task) -> Vec<Value> {
         let mut messages = Vec::new();
-        if let Some(beginning) = self.beginning.take() {
-            let facts = beginning.facts.into_iter().map(|it| (it, true));
-            let values = beginning
-                .values
-                .iter()
-                .map(|(it, value)| (*it, Some(value)));
-            messages.push(believed(task, &beginning.now, facts, values));
+        if let Some(initial) = self.initial.take() {
+            let facts = initial.facts.into_iter().map(|it| (it, true));
+            let values = initial.values.iter().map(|(it, value)| (*it, Some(value)));
+            messages.push(belief_message(task, &initial.now, facts, values));
         }
         let facts = std::mem::take(&mut self.changed_facts);
         let values = std::mem::take(&mut self.changed_values);
@@ -124,7 +122,7 @@ impl Known {
             let facts = facts.into_iter().map(|it| (it, self.facts[it.index()]));
             let values = values.into_iter();
             let values = values.map(|it| (it, self.values[it.index()].as_ref()));
-            messages.push(believed(task, &self.now, facts, values));
+            messages.push(belief_message(task, &self.now, facts, values));
         }
         messages
     }
