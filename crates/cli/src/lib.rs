@@ -5,8 +5,6 @@
 //! compute is computed in the library.
 
 mod args;
-mod attendance;
-mod bell;
 mod bug;
 mod calendar;
 mod commands;

@@ -1,25 +1,33 @@
 //! Persistent execution of temporal plans: everything that an executive needs beside the state machine
 //! of `elbowroom::execution`.
 //!
-//! - [`journal`]: append-only record of a run that survives a crash (`docs/formats/journal.md`).
-//! - [`request_queue`]: bounded queue of operators' requests, drained by the run.
-//! - [`trace_buffer`]: in-memory buffer of the trace, for clients that read it during the run.
-//! - [`world_protocol`]: messages and pipes of a world that is a process
-//!   (`docs/formats/world-protocol.md`).
-//! - [`http`]: HTTP/1.1 server with admission limits, access tokens, the page of a run, and a client.
+//! - [`journal`], [`journaling`]: append-only record of a run that survives a crash (`docs/formats/journal.md`), and
+//!   the recorder and world decorator that write it ahead of each command.
+//! - [`request_queue`], [`operator`]: bounded queue of operators' requests, and the world decorator that adds them to
+//!   the observations of the run.
+//! - [`background_planner`], [`background_preparer`], [`completion_signal`]: planning during the run.
+//! - [`process_world`], [`world_protocol`], [`belief_updates`]: a world that is a process
+//!   (`docs/formats/world-protocol.md`). [`realtime`]: a simulated world on the wall clock.
+//! - [`http`], [`api`], [`trace_buffer`]: HTTP server and client, the interface of an executive (`docs/serve.md`), and
+//!   the buffer of the trace for clients.
 //! - [`clock`], [`memory_limit`], [`messages`]: wall clock, memory limit, texts of messages.
 //!
 //! This crate makes threads, reads clocks and writes files. It prints nothing: warnings go to a
 //! [`WarningSink`].
 
+pub mod api;
+pub mod background_planner;
+pub mod background_preparer;
 pub mod belief_updates;
 pub mod clock;
+pub mod completion_signal;
 mod error;
 pub mod http;
 pub mod journal;
 pub mod journaling;
 pub mod memory_limit;
 pub mod messages;
+pub mod operator;
 pub mod process_world;
 pub mod realtime;
 pub mod request_queue;

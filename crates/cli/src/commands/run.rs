@@ -1,8 +1,6 @@
 //! `elbowroom run`: execute a plan in a world.
 
-mod ahead;
 pub(super) mod live;
-mod readied;
 mod replay;
 pub(super) mod resume;
 mod shown;
@@ -27,8 +25,6 @@ use elbowroom::sim::WorldModel;
 use elbowroom::text::Source;
 
 use crate::args::RunArgs;
-use crate::attendance::{Attendance, Attended};
-use crate::bell::Bell;
 use crate::calendar::dated;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
@@ -36,16 +32,18 @@ use crate::interrupt::Interrupt;
 use crate::look::{BAD, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
-use ahead::{Ahead, Aside};
+use elbowroom_executive::background_planner::{BackgroundPlanner, BackgroundSettings};
+use elbowroom_executive::background_preparer::BackgroundPreparer;
 use elbowroom_executive::belief_updates::BeliefUpdates;
 use elbowroom_executive::clock::Clock;
+use elbowroom_executive::completion_signal::CompletionSignal;
 use elbowroom_executive::journal::JournalFile;
 use elbowroom_executive::journaling::{JournalHealth, JournalWriter, JournaledWorld};
 use elbowroom_executive::messages::escape_control;
+use elbowroom_executive::operator::{InteractiveWorld, OperatorInterface};
 use elbowroom_executive::process_world::{ProcessLimits, ProcessWorld, check_program};
 use elbowroom_executive::realtime::{Pace, PacedPlanner, Realtime};
 use elbowroom_executive::request_queue::RequestQueue;
-use readied::Readied;
 use shown::Views;
 use spec::contradiction;
 use trace_file::TraceFile;
@@ -78,18 +76,18 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let (mut spec, world) = spec::of(arguments, domain, problem)?;
     spec.is_attended = arguments.control.is_some();
     let (task, first) = checked(arguments, &spec, world.as_ref(), output)?;
-    let attendance = attendance(arguments);
+    let operator = operator(arguments);
     let interrupt = Interrupt::listen_with_world();
     let job = Job {
         journal: journal(arguments, RESUME)?,
         begun: &|| (),
         since,
-        aside: aside(arguments, &interrupt),
+        background: background(arguments, &interrupt),
         spec: &spec,
         task: &task,
         first,
         interrupt: &interrupt,
-        attendance: &attendance,
+        operator: &operator,
     };
     job.execute(arguments, output)
 }
@@ -113,20 +111,20 @@ pub(super) fn journal(arguments: &RunArgs, resume: &str) -> Result<Option<Journa
         .map_err(Failure::from)
 }
 
-/// How plans are made in threads of their own.
-pub(super) fn aside(arguments: &RunArgs, interrupt: &Interrupt) -> Aside {
-    Aside {
-        interrupt: interrupt.clone(),
-        bell: Bell::default(),
+/// Returns the settings of background planning.
+pub(super) fn background(arguments: &RunArgs, interrupt: &Interrupt) -> BackgroundSettings {
+    BackgroundSettings {
+        stop: interrupt.stop().clone(),
+        signal: CompletionSignal::default(),
         most_memory: arguments.planner_memory.map(|megabytes| megabytes << 20),
     }
 }
 
 /// Those who may ask something of a run on its page, if anybody may.
-pub(super) fn attendance(arguments: &RunArgs) -> Attendance {
+pub(super) fn operator(arguments: &RunArgs) -> OperatorInterface {
     match &arguments.control {
-        Some(_) => Attendance::at(RequestQueue::default()),
-        None => Attendance::default(),
+        Some(_) => OperatorInterface::with_queue(RequestQueue::default()),
+        None => OperatorInterface::default(),
     }
 }
 
@@ -240,8 +238,8 @@ pub(super) struct Job<'a> {
     pub(super) task: &'a Arc<Task>,
     pub(super) first: Option<TimeTriggeredPlan>,
     pub(super) interrupt: &'a Interrupt,
-    pub(super) attendance: &'a Attendance,
-    pub(super) aside: Aside,
+    pub(super) operator: &'a OperatorInterface,
+    pub(super) background: BackgroundSettings,
     /// Its journal, which is empty, if it is to have one.
     pub(super) journal: Option<JournalFile>,
     /// Told when the run begins, and its first record is on the disk if there is a journal.
@@ -258,14 +256,14 @@ impl Job<'_> {
         }
         let (spec, task, interrupt) = (self.spec, self.task, self.interrupt);
         let mut file = TraceFile::open(arguments.trace.as_deref())?;
-        let views = Views::open(arguments, spec, task, interrupt, self.attendance)?;
+        let views = Views::open(arguments, spec, task, interrupt, self.operator)?;
         let outcome = {
             let mut sink = |line: &str| file.write(line);
             let mut writer = trace::TraceWriter::new(Arc::clone(task), &mut sink);
             let written = writer.header(spec);
             written
                 .map_err(|error| Failure::new(format!("cannot write the trace: {error}"), ""))?;
-            let writer = self.attendance.witnessed(&mut writer, task, false);
+            let writer = self.operator.publishing(&mut writer, task, false);
             let mut writer = views.shown(writer, task);
             let mut writer = live::Live::new(&mut writer);
             match &arguments.world_process {
@@ -301,9 +299,9 @@ impl Job<'_> {
     }
 
     /// A world that takes requests, if the run is attended.
-    fn attended<'w, W: World>(&self, world: W, factor: &Rational) -> Attended<'w, W> {
-        Attended::new(world, self.attendance, self.task, self.interrupt, factor)
-            .ringing(&self.aside.bell)
+    fn attended<'w, W: World>(&self, world: W, factor: &Rational) -> InteractiveWorld<'w, W> {
+        let (stop, signal) = (self.interrupt.stop(), &self.background.signal);
+        InteractiveWorld::new(world, self.operator, self.task, stop, signal, factor)
     }
 
     fn run(
@@ -322,9 +320,13 @@ impl Job<'_> {
             .planner_for(self.task, model.as_ref(), &clock, &goes_on)?;
         let request = RunRequest::new(self.spec, self.task)
             .beginning_with(self.first)
-            .planned_by(Ahead::new(planner, self.spec, &self.aside))
-            .prepared_by(Readied::new(self.spec, self.task, &self.aside.bell)?)
-            .told_to(both(self.attendance.listener(), &mut believes))
+            .planned_by(BackgroundPlanner::new(planner, self.spec, &self.background))
+            .prepared_by(BackgroundPreparer::new(
+                self.spec,
+                self.task,
+                &self.background.signal,
+            )?)
+            .told_to(both(self.operator.listener(), &mut believes))
             .recorded_by(recorder);
         execute(request, world, &mut Stopwatch::start(self.interrupt))
     }
@@ -356,29 +358,29 @@ impl Job<'_> {
         };
         let health = JournalHealth::default();
         let interrupt = self.interrupt;
-        let views = Views::open(arguments, self.spec, self.task, interrupt, self.attendance)?;
+        let views = Views::open(arguments, self.spec, self.task, interrupt, self.operator)?;
         let world = ProcessWorld::start(command, self.task, limits, interrupt.stop().clone())?;
         let beliefs = BeliefUpdates::default();
         let world = JournaledWorld::new(world.with_beliefs(beliefs.clone()), health.clone());
         let mut world = self.attended(world, &Rational::ONE);
         (self.begun)();
         let outcome = {
-            let queue = self.attendance.queue();
+            let queue = self.operator.queue();
             let writer = JournalWriter::new(self.task, &mut file, &health, queue);
-            let writer = self.attendance.witnessed(writer, self.task, true);
+            let writer = self.operator.publishing(writer, self.task, true);
             let mut writer = views.shown(writer, self.task);
             let begun = Clock::start();
             let clock = || begun.seconds();
             let goes_on = || !interrupt.is_requested();
             let planner = self.spec.planner_for(self.task, None, &clock, &goes_on);
             let planner = planner.map_err(contradiction)?;
-            let readied = Readied::new(self.spec, self.task, &self.aside.bell);
+            let readied = BackgroundPreparer::new(self.spec, self.task, &self.background.signal);
             let readied = readied.map_err(contradiction)?;
             let request = RunRequest::new(self.spec, self.task)
                 .beginning_with(self.first)
-                .planned_by(Ahead::new(planner, self.spec, &self.aside))
+                .planned_by(BackgroundPlanner::new(planner, self.spec, &self.background))
                 .prepared_by(readied)
-                .told_to(both(self.attendance.listener(), beliefs.listener()))
+                .told_to(both(self.operator.listener(), beliefs.listener()))
                 .recorded_by(live::Live::new(&mut writer));
             let mut watch = Attentive {
                 inner: Stopwatch::start(interrupt),
@@ -407,7 +409,8 @@ impl Job<'_> {
         let clock = || begun.seconds();
         let goes_on = || !self.interrupt.is_requested();
         let planner = spec.planner_for(task, Some(&model), &clock, &goes_on)?;
-        let planner: Box<dyn Planner> = Box::new(Ahead::new(planner, spec, &self.aside));
+        let planner: Box<dyn Planner> =
+            Box::new(BackgroundPlanner::new(planner, spec, &self.background));
         let world = Realtime {
             inner: world.as_mut(),
             pace: &pace,
@@ -416,8 +419,12 @@ impl Job<'_> {
         let mut world = self.attended(world, factor);
         let request = RunRequest::new(spec, task)
             .beginning_with(self.first)
-            .told_to(self.attendance.listener())
-            .prepared_by(Readied::new(spec, task, &self.aside.bell)?)
+            .told_to(self.operator.listener())
+            .prepared_by(BackgroundPreparer::new(
+                spec,
+                task,
+                &self.background.signal,
+            )?)
             .planned_by(PacedPlanner {
                 inner: planner,
                 pace: &pace,

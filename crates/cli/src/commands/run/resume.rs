@@ -24,22 +24,22 @@ use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, ReplayWorld, Stored};
 
-use super::ahead::Ahead;
-use super::readied::Readied;
 use super::shown::Views;
 use super::spec::contradiction;
 use crate::args::RunArgs;
-use crate::attendance::{Attendance, Attended};
 use crate::exit::{Answer, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 use elapsed::Elapsed;
+use elbowroom_executive::background_planner::BackgroundPlanner;
+use elbowroom_executive::background_preparer::BackgroundPreparer;
 use elbowroom_executive::belief_updates::BeliefUpdates;
 use elbowroom_executive::clock::Clock;
 use elbowroom_executive::journal::{Journal, JournalFile, Segments, WallTime};
 use elbowroom_executive::journaling::{JournalHealth, JournalWriter, JournaledWorld};
+use elbowroom_executive::operator::{InteractiveWorld, OperatorInterface};
 use elbowroom_executive::process_world::{ProcessLimits, ProcessWorld};
 use past::{Past, PastPlanner, PastRecorder, Watch};
 use under_way::UnderWay;
@@ -147,7 +147,7 @@ pub(in crate::commands) trait Host {
         spec: &RunSpec,
         task: &Arc<Task>,
         interrupt: &Interrupt,
-    ) -> Result<Attendance, Failure>;
+    ) -> Result<OperatorInterface, Failure>;
 
     /// When the journal is begun anew, if it is to be.
     fn segments(&self) -> Option<Segments> {
@@ -159,7 +159,12 @@ pub(in crate::commands) trait Host {
 pub(in crate::commands) struct Alone<'a>(pub(in crate::commands) &'a RunArgs);
 
 impl Host for Alone<'_> {
-    fn attend(&self, spec: &RunSpec, _: &Arc<Task>, _: &Interrupt) -> Result<Attendance, Failure> {
+    fn attend(
+        &self,
+        spec: &RunSpec,
+        _: &Arc<Task>,
+        _: &Interrupt,
+    ) -> Result<OperatorInterface, Failure> {
         if spec.is_lasting {
             return Err(Failure::new(
                 "this is the journal of an executive that takes requests",
@@ -173,9 +178,9 @@ impl Host for Alone<'_> {
             ));
         }
         Ok(if spec.is_attended {
-            super::attendance(self.0)
+            super::operator(self.0)
         } else {
-            Attendance::default()
+            OperatorInterface::default()
         })
     }
 }
@@ -210,20 +215,20 @@ pub(in crate::commands) fn run(
     let mut file = JournalFile::reopen(path, &journal, length)?
         .with_rotation(host.segments(), &output::warnings());
     let interrupt = Interrupt::listen_with_world();
-    let attendance = host.attend(&spec, &task, &interrupt)?;
-    let aside = super::aside(arguments, &interrupt);
+    let operator = host.attend(&spec, &task, &interrupt)?;
+    let background = super::background(arguments, &interrupt);
     if let Some(snapshot) = &snapshot {
-        attendance.begin_at(snapshot);
+        operator.begin_at(snapshot);
     }
     let health = JournalHealth::default();
     let beliefs = BeliefUpdates::default();
     let past = Arc::new(Past::new(&stored));
-    let views = Views::open(arguments, &spec, &task, &interrupt, &attendance)?;
+    let views = Views::open(arguments, &spec, &task, &interrupt, &operator)?;
     let outcome = {
         let recorder = PastRecorder {
             past: Arc::clone(&past),
             task: Arc::clone(&task),
-            writer: JournalWriter::new(&task, &mut file, &health, attendance.queue()),
+            writer: JournalWriter::new(&task, &mut file, &health, operator.queue()),
         };
         let begun = Clock::start();
         let clock = || begun.seconds();
@@ -237,11 +242,13 @@ pub(in crate::commands) fn run(
             .reopened(stored.reopened() + usize::from(stored.is_complete()))
             .planned_by(PastPlanner::new(
                 &stored,
-                Box::new(Ahead::new(planner, &spec, &aside)),
+                Box::new(BackgroundPlanner::new(planner, &spec, &background)),
             ))
-            .prepared_by(Readied::new(&spec, &task, &aside.bell).map_err(contradiction)?)
-            .told_to(super::both(attendance.listener(), beliefs.listener()))
-            .recorded_by(views.shown(attendance.witnessed(recorder, &task, true), &task));
+            .prepared_by(
+                BackgroundPreparer::new(&spec, &task, &background.signal).map_err(contradiction)?,
+            )
+            .told_to(super::both(operator.listener(), beliefs.listener()))
+            .recorded_by(views.shown(operator.publishing(recorder, &task, true), &task));
         let world = JournaledWorld::new(
             PastWorld {
                 replay: ReplayWorld::new(&stored, &task),
@@ -264,10 +271,16 @@ pub(in crate::commands) fn run(
             },
             health.clone(),
         );
-        let mut world = Attended::new(world, &attendance, &task, &interrupt, &Rational::ONE)
-            .ringing(&aside.bell)
-            .under_way(under_way::open(snapshot.as_ref()))
-            .once(|| past.is_over());
+        let mut world = InteractiveWorld::new(
+            world,
+            &operator,
+            &task,
+            interrupt.stop(),
+            &background.signal,
+            &Rational::ONE,
+        )
+        .with_running(under_way::open(snapshot.as_ref()))
+        .live_when(|| past.is_over());
         let mut watch = Watch {
             inner: Stopwatch::start(&interrupt),
             past: Arc::clone(&past),

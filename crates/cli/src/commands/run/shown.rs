@@ -11,11 +11,11 @@ use elbowroom::report::trace::{Line, TraceWriter};
 use elbowroom_page::PageError;
 
 use crate::args::RunArgs;
-use crate::attendance::Attendance;
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use crate::output;
 use elbowroom_executive::http::{AccessControl, PageServer};
+use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::trace_buffer::{TRACE_NAME, TraceBuffer};
 
 /// Keeps a record, and shows it if that is asked for.
@@ -56,7 +56,7 @@ impl<'a> Views<'a> {
         spec: &RunSpec,
         task: &Arc<Task>,
         interrupt: &Interrupt,
-        attendance: &Attendance,
+        operator: &OperatorInterface,
     ) -> Result<Self, Failure> {
         let files = [&arguments.perfetto, &arguments.mcap];
         if arguments.serve.is_none() && files.iter().all(|file| file.is_none()) {
@@ -86,7 +86,7 @@ impl<'a> Views<'a> {
             } else {
                 ""
             };
-            let queue = attendance.queue().cloned();
+            let queue = operator.queue().cloned();
             let own = PageServer::start(address, buffer.clone(), control, queue)?;
             output::tell(&format!("the run is shown at http://{own}/{with_token}"));
         }

@@ -1,5 +1,4 @@
-//! Plans that are made in a thread of their own, while the run goes on: when they are needed, or ahead
-//! of that.
+//! Planning in the background: a thread makes a plan during the run, on demand or in advance.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,37 +10,37 @@ use elbowroom::model::problem::Condition;
 use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom::num::work::Stop;
 
-use crate::bell::{Bell, Ring};
-use crate::interrupt::Interrupt;
-use elbowroom_executive::clock::Clock;
-use elbowroom_executive::memory_limit::MemoryLimit;
+use crate::clock::Clock;
+use crate::completion_signal::{Completion, CompletionSignal};
+use crate::memory_limit::MemoryLimit;
 
-/// A planner that works aside: it begins with a plan as soon as it is told that it will be needed, and,
-/// where the run goes on while plans are made, it rings when there is one.
+/// Planner decorator that plans in a thread. It starts as soon as a plan is expected, and signals completion if the run
+/// continues during planning.
 ///
-/// What is made aside is made by the planner of the specification with a table of its own, so that
-/// the answer is the same as if it was waited for.
-pub(super) struct Ahead<'a> {
+/// The thread uses the planner of the specification with its own table of facts, so that the answer is the same as
+/// that of a planner that is awaited.
+pub struct BackgroundPlanner<'a> {
     inner: Box<dyn Planner + 'a>,
     spec: Arc<RunSpec>,
-    aside: Aside,
-    /// What was begun ahead.
+    settings: BackgroundSettings,
+    /// Plan that was begun in advance.
     job: Option<Work>,
-    /// What the run waits for.
+    /// Plan that the run awaits.
     search: Option<Work>,
 }
 
-/// How plans are made aside.
-#[derive(Clone)]
-pub(in crate::commands) struct Aside {
-    pub(in crate::commands) interrupt: Interrupt,
-    /// Rings when a plan is there.
-    pub(in crate::commands) bell: Bell,
-    /// How many bytes planning may take, beyond what the process took before.
-    pub(in crate::commands) most_memory: Option<u64>,
+/// Settings of background planning.
+#[derive(Clone, Default)]
+pub struct BackgroundSettings {
+    /// Stop request of the run. It also ends planning.
+    pub stop: Stop,
+    /// Signals completion.
+    pub signal: CompletionSignal,
+    /// Limit on the memory of planning, in bytes above the memory of the process at its start.
+    pub most_memory: Option<u64>,
 }
 
-/// A plan in the making.
+/// Planning in progress.
 struct Work {
     situation: Situation,
     goal: Condition,
@@ -55,7 +54,7 @@ impl Work {
         self.situation == *situation && self.goal == task.problem().goal
     }
 
-    /// The answer, with the facts of this task, once it is there.
+    /// Waits for the answer. Returns it with the fact numbers of `task`, or `None` if planning was interrupted.
     fn answer(self, task: &Task, situation: &Situation) -> Option<PlannerAnswer> {
         let mut made = self.answer.join().ok()??;
         if let PlanAnswer::Plan(plan) = &made.answer {
@@ -65,9 +64,14 @@ impl Work {
     }
 }
 
-impl<'a> Ahead<'a> {
-    pub(super) fn new(inner: Box<dyn Planner + 'a>, spec: &RunSpec, aside: &Aside) -> Self {
-        // What is made ahead is no first plan.
+impl<'a> BackgroundPlanner<'a> {
+    /// Creates a planner for runs of `spec`. `inner` is used where no plan was begun in the background.
+    pub fn new(
+        inner: Box<dyn Planner + 'a>,
+        spec: &RunSpec,
+        settings: &BackgroundSettings,
+    ) -> Self {
+        // A plan in advance is never the first plan.
         let spec = RunSpec {
             first_plan: FirstPlan::Shortest,
             ..spec.clone()
@@ -75,28 +79,28 @@ impl<'a> Ahead<'a> {
         Self {
             inner,
             spec: Arc::new(spec),
-            aside: aside.clone(),
+            settings: settings.clone(),
             job: None,
             search: None,
         }
     }
 
-    /// Has a thread make a plan.
-    fn set_out(&self, task: &Task, situation: &Situation) -> Option<Work> {
+    /// Starts a thread that makes a plan.
+    fn spawn(&self, task: &Task, situation: &Situation) -> Option<Work> {
         let is_needless = Arc::new(AtomicBool::new(false));
-        let (clapper, is_done) = self.aside.bell.clapper();
-        let (spec, interrupt, stop) = (
+        let (guard, is_done) = self.settings.signal.guard();
+        let (spec, run_stop, stop) = (
             Arc::clone(&self.spec),
-            self.aside.interrupt.clone(),
+            self.settings.stop.clone(),
             Arc::clone(&is_needless),
         );
-        let most_memory = self.aside.most_memory;
+        let most_memory = self.settings.most_memory;
         let (own, from) = (task.with_own_table(), situation.clone());
         let interrupted = Stop::of_this_thread();
         let made = thread::Builder::new()
             .name("planner".to_owned())
             .spawn(move || {
-                let _rings = clapper;
+                let _notifies = guard;
                 interrupted.iter().for_each(Stop::obey);
                 let begun = Clock::start();
                 let clock = || begun.seconds();
@@ -107,7 +111,7 @@ impl<'a> Ahead<'a> {
                         limit.is_exceeded()
                     })
                 };
-                let is_needed = || !stop.load(Ordering::SeqCst) && !interrupt.is_requested();
+                let is_needed = || !stop.load(Ordering::SeqCst) && !run_stop.is_requested();
                 let goes_on = || is_needed() && !is_too_much();
                 let mut planner = spec.planner_for(&own, None, &clock, &goes_on).ok()?;
                 let mut made = planner.plan(&own, &from);
@@ -128,8 +132,8 @@ impl<'a> Ahead<'a> {
         })
     }
 
-    /// What was begun ahead, if it is for this.
-    fn foreseen(&mut self, task: &Task, situation: &Situation) -> Option<Work> {
+    /// Returns the plan that was begun in advance, if it is for this situation; cancels it otherwise.
+    fn take_expected(&mut self, task: &Task, situation: &Situation) -> Option<Work> {
         let work = self.job.take()?;
         if work.is_for(task, situation) {
             return Some(work);
@@ -139,7 +143,7 @@ impl<'a> Ahead<'a> {
     }
 }
 
-impl Drop for Ahead<'_> {
+impl Drop for BackgroundPlanner<'_> {
     fn drop(&mut self) {
         for work in self.job.iter().chain(&self.search) {
             work.is_needless.store(true, Ordering::SeqCst);
@@ -147,11 +151,11 @@ impl Drop for Ahead<'_> {
     }
 }
 
-impl Planner for Ahead<'_> {
+impl Planner for BackgroundPlanner<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let clock = Clock::start();
-        let foreseen = self.foreseen(task, situation);
-        if let Some(made) = foreseen.and_then(|work| work.answer(task, situation)) {
+        let expected = self.take_expected(task, situation);
+        if let Some(made) = expected.and_then(|work| work.answer(task, situation)) {
             return PlannerAnswer {
                 seconds: Some(clock.seconds()),
                 ..made
@@ -164,26 +168,26 @@ impl Planner for Ahead<'_> {
         if let Some(work) = self.job.take() {
             work.is_needless.store(true, Ordering::SeqCst);
         }
-        // Who looks for likelier plans in a known world keeps what it has found out.
+        // A planner that compares probabilities keeps its results between plans.
         if !self.spec.executor.asks_odds() {
-            self.job = self.set_out(task, situation);
+            self.job = self.spawn(task, situation);
         }
     }
 
     fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
         self.give_up();
-        let foreseen = self.foreseen(task, situation);
-        self.search = foreseen.or_else(|| self.set_out(task, situation));
+        let expected = self.take_expected(task, situation);
+        self.search = expected.or_else(|| self.spawn(task, situation));
         if let Some(work) = &self.search {
-            self.aside
-                .bell
-                .follow(Arc::clone(&work.is_done), Ring::PlanMade);
+            self.settings
+                .signal
+                .arm(Arc::clone(&work.is_done), Completion::PlanMade);
         }
         self.search.is_some()
     }
 
     fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
-        self.aside.bell.silence();
+        self.settings.signal.disarm();
         let Some(work) = self.search.take() else {
             return self.inner.plan(task, situation);
         };
@@ -194,14 +198,14 @@ impl Planner for Ahead<'_> {
     }
 
     fn give_up(&mut self) {
-        self.aside.bell.silence();
+        self.settings.signal.disarm();
         if let Some(work) = self.search.take() {
             work.is_needless.store(true, Ordering::SeqCst);
         }
     }
 }
 
-/// The same plan with the facts of this task.
+/// Returns the plan with the fact numbers of `task`.
 fn renumbered(
     plan: &TimeTriggeredPlan,
     task: &Task,
@@ -230,4 +234,4 @@ fn renumbered(
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+pub(crate) mod tests;

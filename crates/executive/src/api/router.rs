@@ -1,67 +1,83 @@
-//! Where clients are received: what they want, and whether they may.
+//! Router of the HTTP interface of an executive: paths, access, responses.
 
 use std::io;
 use std::net::SocketAddr;
 use std::sync::atomic::AtomicU64;
-use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use elbowroom::execute::NamedText;
+use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::executive::documents::Refusal;
 use elbowroom::executive::{METHODS, Status, openapi};
 use elbowroom::model::Task;
+use elbowroom::report::trace::TraceWriter;
 use serde::Serialize;
 
-use elbowroom_executive::http::{
+use crate::error::Error;
+use crate::http::{
     AccessControl, Request, RequestError, Stream, is_local_name, respond, respond_with_events,
 };
-use elbowroom_executive::request_queue::RequestQueue;
-use elbowroom_executive::trace_buffer::TraceBuffer;
+use crate::operator::OperatorInterface;
+use crate::request_queue::RequestQueue;
+use crate::trace_buffer::TraceBuffer;
 
-use super::first::First;
+use super::initial_problem::InitialProblem;
 
 const JSON: &str = "application/json";
 const TEXT: &str = "text/plain; charset=utf-8";
 const HTML: &str = "text/html; charset=utf-8";
 
-/// The page while there is no problem, or it is not taken up yet: it asks again by itself.
+/// Page until the run begins. It reloads itself.
 const WAITING: &str = "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
     <meta http-equiv=\"refresh\" content=\"1\">\n<title>Elbowroom</title>\n\
     <h1>Waiting for a problem</h1>\n\
     <p>The executive has no problem yet. Give it one with <code>elbowroom ctl problem FILE</code>; \
     this page shows the run as soon as there is one.</p>\n</html>\n";
 
-/// How long the end of the program waits for clients that are told what became of their requests.
-const FAREWELL: Duration = Duration::from_secs(1);
+/// Time limit for clients to receive pending responses at the end of the program.
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Why a request is refused: a status, what is wrong, and what to do.
-pub(super) struct Refused(pub(super) u16, pub(super) String, pub(super) String);
+/// Rejection of a request.
+#[derive(Clone, Debug)]
+pub struct ApiError {
+    /// Status code of the response.
+    pub status: u16,
+    /// Error message, in lower case.
+    pub error: String,
+    /// Advice for the user.
+    pub help: String,
+}
 
-impl Refused {
-    pub(super) fn new(status: u16, error: impl Into<String>, help: impl Into<String>) -> Self {
-        Self(status, error.into(), help.into())
+impl ApiError {
+    /// Creates an error.
+    pub fn new(status: u16, error: impl Into<String>, help: impl Into<String>) -> Self {
+        Self {
+            status,
+            error: error.into(),
+            help: help.into(),
+        }
     }
 }
 
-/// Everything that clients can reach.
-pub(super) struct Front {
+/// HTTP interface of an executive.
+pub struct ApiRouter {
     control: Option<AccessControl>,
     own: SocketAddr,
-    pub(super) domain: NamedText,
+    domain: NamedText,
     queue: RequestQueue,
     buffer: TraceBuffer,
-    /// The run, once there is a problem; its task has a table of its own, so that what clients
-    /// mention is not what the run does.
+    /// Status and task of the run, once there is a problem. The task has its own table of facts, so that requests do not
+    /// change the numbers of the run.
     run: OnceLock<(Status, Task)>,
-    pub(super) first: First,
-    /// How many requests that change something are being answered.
+    initial: InitialProblem,
+    /// Number of mutations in progress.
     changing: Mutex<usize>,
     answered: Condvar,
-    /// How many goals were named here.
+    /// Number of goals that were named by the router.
     pub(super) named: AtomicU64,
 }
 
-impl Front {
+impl ApiRouter {
     pub(super) fn new(control: Option<AccessControl>, own: SocketAddr, domain: &NamedText) -> Self {
         Self {
             control,
@@ -70,53 +86,86 @@ impl Front {
             queue: RequestQueue::default(),
             buffer: TraceBuffer::bounded(),
             run: OnceLock::new(),
-            first: First::default(),
+            initial: InitialProblem::default(),
             changing: Mutex::new(0),
             answered: Condvar::new(),
             named: AtomicU64::new(0),
         }
     }
 
-    pub(super) fn queue(&self) -> &RequestQueue {
+    /// Returns the request queue.
+    pub fn queue(&self) -> &RequestQueue {
         &self.queue
     }
 
-    pub(super) fn buffer(&self) -> &TraceBuffer {
+    /// Returns the trace buffer.
+    pub fn buffer(&self) -> &TraceBuffer {
         &self.buffer
     }
 
-    /// From now on there is a run.
-    pub(super) fn begin(&self, status: Status, task: &Task) {
-        let _ = self.run.set((status, task.with_own_table()));
+    /// Returns the slot for the initial problem.
+    pub fn initial_problem(&self) -> &InitialProblem {
+        &self.initial
     }
 
-    /// The run and its task, if there is one already.
-    pub(super) fn run(&self) -> Result<&(Status, Task), Refused> {
+    /// Returns the TCP address of the server.
+    pub fn address(&self) -> SocketAddr {
+        self.own
+    }
+
+    /// Returns the text of the domain.
+    pub(super) fn domain(&self) -> &NamedText {
+        &self.domain
+    }
+
+    /// Connects the interface to a run, and writes the header of its trace.
+    ///
+    /// # Errors
+    /// When the specification cannot be written.
+    pub fn begin(&self, spec: &RunSpec, task: &Arc<Task>) -> Result<OperatorInterface, Error> {
+        let status = Status::new(task, spec.timeout.clone());
+        let mut header = |line: &str| self.buffer.add(line);
+        let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
+        written.map_err(|error| Error::new(format!("cannot show the run: {error}"), ""))?;
+        let _ = self.run.set((status.clone(), task.with_own_table()));
+        Ok(OperatorInterface::new(
+            self.queue.clone(),
+            status,
+            self.buffer.clone(),
+        ))
+    }
+
+    /// Returns the status and the task of the run.
+    ///
+    /// # Errors
+    /// When there is no problem yet.
+    pub(super) fn run(&self) -> Result<&(Status, Task), ApiError> {
         let waiting = "the executive has no problem yet";
         let help = "give it one: `elbowroom ctl problem FILE`, or PUT /v1/problem";
         self.run
             .get()
-            .ok_or_else(|| Refused::new(409, waiting, help))
+            .ok_or_else(|| ApiError::new(409, waiting, help))
     }
 
-    /// The run is over: clients have a moment to hear of it, and what became of their requests.
-    pub(super) fn close(&self) {
+    /// Ends the interface with its run. Waits up to three seconds for clients to read the end of the trace and pending
+    /// responses.
+    pub fn close(&self) {
         self.queue.close();
-        self.first.close();
+        self.initial.close();
         self.buffer.close();
         let waits = |changing: &mut usize| *changing > 0;
         let waited = self
             .answered
-            .wait_timeout_while(self.changing(), FAREWELL, waits);
+            .wait_timeout_while(self.changing(), DRAIN_TIMEOUT, waits);
         drop(waited.unwrap_or_else(PoisonError::into_inner));
     }
 
     fn changing(&self) -> MutexGuard<'_, usize> {
-        // It is counted in one statement.
+        // The counter changes in one statement.
         self.changing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Serves a client. `is_local_only` is whether only this machine should reach it.
+    /// Serves a client. With `is_local_only`, requests must name this machine as their host.
     pub(super) fn serve(
         &self,
         request: Result<Request, RequestError>,
@@ -127,23 +176,23 @@ impl Front {
             Ok(request) => request,
             Err(RequestError { status, reason }) => {
                 let help = "docs/serve.md says what an executive understands";
-                return refuse(stream, &Refused::new(status, reason, help));
+                return refuse(stream, &ApiError::new(status, reason, help));
             }
         };
         let is_own = |host: &str| is_local_name(host);
         if is_local_only && !request.header("host").is_some_and(is_own) {
             let error = format!("this is not the page of that host; {} is", self.own);
-            return refuse(stream, &Refused::new(403, error, "use the address itself"));
+            return refuse(stream, &ApiError::new(403, error, "use the address itself"));
         }
         let _counted = (request.method != "GET").then(|| Changing::begin(self));
-        match self.answer(&request, stream) {
-            Ok(told) => told,
+        match self.respond(&request, stream) {
+            Ok(sent) => sent,
             Err(refused) => refuse(stream, &refused),
         }
     }
 
-    fn answer(&self, request: &Request, stream: &mut Stream) -> Result<io::Result<()>, Refused> {
-        let broken = |why: String| Refused::new(500, why, "this is a bug; please report it");
+    fn respond(&self, request: &Request, stream: &mut Stream) -> Result<io::Result<()>, ApiError> {
+        let broken = |why: String| ApiError::new(500, why, "this is a bug; please report it");
         Ok(match (request.method.as_str(), request.path.as_str()) {
             ("GET", "/") if self.run().is_err() => respond(stream, 409, HTML, WAITING),
             ("GET", "/") => respond(stream, 200, HTML, &self.buffer.page().map_err(broken)?),
@@ -165,7 +214,7 @@ impl Front {
                         "/v1/events?after={until} has the others; the files of --journal and --trace \
                          have all of them"
                     );
-                    return Err(Refused::new(410, error, help));
+                    return Err(ApiError::new(410, error, help));
                 }
                 let begun = respond_with_events(stream);
                 begun.and_then(|()| self.buffer.stream_lines(after, stream))
@@ -175,7 +224,7 @@ impl Front {
                 self.stop();
                 respond(stream, 202, TEXT, "The executive is being stopped.\n")
             }
-            // What the page's other buttons ask.
+            // Requests of the buttons on the page.
             ("POST", path @ ("/pause" | "/resume")) => {
                 self.allow(request)?;
                 self.change("POST", &format!("/v1{path}"), b"")?;
@@ -205,12 +254,12 @@ impl Front {
             }
             ("GET", "/v1/next") => respond(stream, 200, JSON, &text(&self.run()?.0.next())),
             ("GET", path) => return Err(no_such(path, "GET")),
-            (verb, path) => {
-                if !is_known(verb, path) {
-                    return Err(no_such(path, verb));
+            (method, path) => {
+                if !is_known(method, path) {
+                    return Err(no_such(path, method));
                 }
                 self.allow(request)?;
-                let taken = self.change(verb, path, &request.body)?;
+                let taken = self.change(method, path, &request.body)?;
                 let status = if taken.taken { 200 } else { 202 };
                 respond(stream, status, JSON, &text(&taken))
             }
@@ -222,16 +271,16 @@ impl Front {
         self.control.is_some() && self.allow(request).is_ok()
     }
 
-    /// Whether the client may change something.
-    fn allow(&self, request: &Request) -> Result<(), Refused> {
+    /// Checks that the request has the token.
+    fn allow(&self, request: &Request) -> Result<(), ApiError> {
         match (&self.control, request.header("authorization")) {
-            (None, _) => Err(Refused::new(
+            (None, _) => Err(ApiError::new(
                 403,
                 "this executive can only be looked at",
                 "start it with --token FILE",
             )),
             (Some(control), Some(given)) if control.accepts(given) => Ok(()),
-            (Some(_), given) => Err(Refused::new(
+            (Some(_), given) => Err(ApiError::new(
                 401,
                 match given {
                     Some(_) => "this is not the token",
@@ -242,6 +291,7 @@ impl Front {
         }
     }
 
+    /// Requests an orderly shutdown of the run.
     pub(super) fn stop(&self) {
         if let Some(control) = &self.control {
             control.stop();
@@ -249,11 +299,11 @@ impl Front {
     }
 }
 
-/// A request that changes something, until it is answered.
-struct Changing<'a>(&'a Front);
+/// Guard of a mutation in progress.
+struct Changing<'a>(&'a ApiRouter);
 
 impl<'a> Changing<'a> {
-    fn begin(front: &'a Front) -> Self {
+    fn begin(front: &'a ApiRouter) -> Self {
         *front.changing() += 1;
         Self(front)
     }
@@ -266,23 +316,23 @@ impl Drop for Changing<'_> {
     }
 }
 
-/// Behind which line of the trace a client wants to hear: the one it names, or has heard last.
-fn first_line(request: &Request) -> Result<Option<usize>, Refused> {
+/// Returns the line of the trace after which a client wants events: the one that it names or received last.
+fn first_line(request: &Request) -> Result<Option<usize>, ApiError> {
     let mut members = request.query.split('&');
     let asked = members.find_map(|member| member.strip_prefix("after="));
     let number = asked.or_else(|| request.header("last-event-id"));
     let number = number.map(str::parse::<usize>).transpose();
     number.map_err(|_| {
         let help = "for example /v1/events?after=0 for all lines";
-        Refused::new(422, "`after` is no number of a line", help)
+        ApiError::new(422, "`after` is no number of a line", help)
     })
 }
 
-/// Whether there is such a request.
-fn is_known(verb: &str, path: &str) -> bool {
+/// Returns `true` if the interface has this method and path.
+fn is_known(method_name: &str, path: &str) -> bool {
     METHODS
         .iter()
-        .any(|method| verb == method.verb && is_path(path, method.path))
+        .any(|method| method_name == method.verb && is_path(path, method.path))
 }
 
 fn is_path(path: &str, pattern: &str) -> bool {
@@ -292,24 +342,31 @@ fn is_path(path: &str, pattern: &str) -> bool {
     }
 }
 
-fn no_such(path: &str, verb: &str) -> Refused {
+/// Returns the error for a path without this method.
+fn no_such(path: &str, method_name: &str) -> ApiError {
     let mut own = METHODS.iter().filter(|method| is_path(path, method.path));
     let help = "GET /v1/openapi.json lists what can be asked";
     match own.next() {
         Some(method) => {
-            let error = format!("{path} is not for {verb}, but for {}", method.verb);
-            Refused::new(405, error, help)
+            let error = format!("{path} is not for {method_name}, but for {}", method.verb);
+            ApiError::new(405, error, help)
         }
-        None => Refused::new(404, "there is nothing at this path", help),
+        None => ApiError::new(404, "there is nothing at this path", help),
     }
 }
 
-fn refuse(stream: &mut Stream, Refused(status, error, help): &Refused) -> io::Result<()> {
-    let (error, help) = (error.clone(), help.clone());
-    respond(stream, *status, JSON, &text(&Refusal { error, help }))
+/// Sends an error as a JSON document.
+fn refuse(stream: &mut Stream, refused: &ApiError) -> io::Result<()> {
+    let (error, help) = (refused.error.clone(), refused.help.clone());
+    respond(
+        stream,
+        refused.status,
+        JSON,
+        &text(&Refusal { error, help }),
+    )
 }
 
-/// A document as text, with a line feed.
+/// Returns a document as a line of JSON.
 fn text(document: &impl Serialize) -> String {
     let mut text = serde_json::to_string(document).unwrap_or_else(|_| "null".to_owned());
     text.push('\n');

@@ -1,4 +1,4 @@
-//! Plans that are made ready in a thread of their own, while the run goes on.
+//! Preparation of plans in the background.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -11,43 +11,45 @@ use elbowroom::execution::{Mission, Need, PrepareError, Prepared, Preparer, Want
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::work::Stop;
 
-use crate::bell::{Bell, Ring};
+use crate::completion_signal::{Completion, CompletionSignal};
 
-/// A preparer that works aside, and rings when a plan is ready.
+/// Preparer that works in a thread and signals completion.
 ///
-/// What is made ready aside is made ready with a table of its own, so that the answer is the same as if it
-/// was waited for. If something is mentioned there for the first time, its number means nothing to the
-/// run: then the plan is made ready once more when it is collected.
-pub(super) struct Readied {
+/// The thread has its own table of facts, so that the answer is the same as that of a preparer that is awaited. If the
+/// preparation adds facts to that table, their numbers are unknown to the run; the plan is then prepared again when it
+/// is collected.
+pub struct BackgroundPreparer {
     analyst: Analyst,
     executor: ExecutorSpec,
-    bell: Bell,
+    signal: CompletionSignal,
     work: Option<Work>,
 }
 
-/// A plan that is being made ready.
+/// Preparation in progress.
 struct Work {
     is_needless: Arc<AtomicBool>,
     answer: JoinHandle<Option<Result<Mission, PrepareError>>>,
 }
 
-impl Readied {
+impl BackgroundPreparer {
+    /// Creates a preparer for runs of `spec`, with the completion signal of the run.
+    ///
     /// # Errors
     /// When the world file cannot be read.
-    pub(super) fn new(spec: &RunSpec, task: &Task, bell: &Bell) -> Result<Self, SpecError> {
+    pub fn new(spec: &RunSpec, task: &Task, signal: &CompletionSignal) -> Result<Self, SpecError> {
         Ok(Self {
             analyst: spec.analyst(task.problem())?,
             executor: spec.executor.clone(),
-            bell: bell.clone(),
+            signal: signal.clone(),
             work: None,
         })
     }
 
-    /// Has a thread make a plan ready, and what its executor will ask of its network.
-    fn set_out(&self, wanted: &Wanted<'_>) -> Option<Work> {
+    /// Starts a thread that prepares a plan and its dispatchable networks.
+    fn spawn(&self, wanted: &Wanted<'_>) -> Option<Work> {
         let is_needless = Arc::new(AtomicBool::new(false));
         let stop = Arc::clone(&is_needless);
-        let (clapper, is_done) = self.bell.clapper();
+        let (guard, is_done) = self.signal.guard();
         let own = wanted.task.with_own_table();
         let (plan, situation) = (wanted.plan.clone(), wanted.situation.clone());
         let (running, now, need) = (wanted.running.to_vec(), wanted.now.clone(), wanted.need);
@@ -55,7 +57,7 @@ impl Readied {
         let interrupted = Stop::of_this_thread();
         let made = thread::Builder::new().name("preparer".to_owned());
         let made = made.spawn(move || {
-            let _rings = clapper;
+            let _notifies = guard;
             interrupted.iter().for_each(Stop::obey);
             let mut analyst = analyst.until(move || {
                 if stop.load(Ordering::SeqCst) {
@@ -78,13 +80,13 @@ impl Readied {
                 && need != Need::PartialOrder
                 && !executor.asks_odds()
             {
-                // Whoever adopts it finds the forms of its network there.
+                // Fills the cache of dispatchable networks.
                 let _ = executor.build(Box::new(WholeRegion)).adopt(mission);
             }
             (size(&own) == before).then_some(mission)
         });
         let answer = made.ok()?;
-        self.bell.follow(is_done, Ring::PlanReady);
+        self.signal.arm(is_done, Completion::PlanReady);
         Some(Work {
             is_needless,
             answer,
@@ -92,13 +94,13 @@ impl Readied {
     }
 }
 
-impl Drop for Readied {
+impl Drop for BackgroundPreparer {
     fn drop(&mut self) {
         self.give_up();
     }
 }
 
-impl Preparer for Readied {
+impl Preparer for BackgroundPreparer {
     fn prepare(
         &mut self,
         task: &Arc<Task>,
@@ -110,19 +112,19 @@ impl Preparer for Readied {
 
     fn begin(&mut self, wanted: &Wanted<'_>) -> bool {
         self.give_up();
-        self.work = self.set_out(wanted);
+        self.work = self.spawn(wanted);
         if self.work.is_none() {
-            // Without a thread it is made ready when it is collected, which is at once. That it was begun
-            // is part of the record.
-            let (clapper, is_done) = self.bell.clapper();
-            self.bell.follow(is_done, Ring::PlanReady);
-            drop(clapper);
+            // Without a thread, the plan is prepared when it is collected, which is at once. The record contains the
+            // start of the preparation.
+            let (guard, is_done) = self.signal.guard();
+            self.signal.arm(is_done, Completion::PlanReady);
+            drop(guard);
         }
         true
     }
 
     fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
-        self.bell.silence();
+        self.signal.disarm();
         let made = self.work.take().and_then(|work| work.answer.join().ok()?);
         match made {
             Some(Ok(mission)) => Ok(Mission {
@@ -138,13 +140,13 @@ impl Preparer for Readied {
 
     fn give_up(&mut self) {
         if let Some(work) = self.work.take() {
-            self.bell.silence();
+            self.signal.disarm();
             work.is_needless.store(true, Ordering::SeqCst);
         }
     }
 }
 
-/// How many facts and fluents have been mentioned.
+/// Returns the numbers of facts and fluents in the table.
 fn size(task: &Task) -> (usize, usize) {
     (task.fact_count(), task.fluent_count())
 }

@@ -5,13 +5,13 @@ use elbowroom::execute::{Embedded, NamedText, RunSpec};
 use elbowroom::execution::{PlanAnswer, Planner, PlannerAnswer};
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
+use elbowroom::num::work::Stop;
 use elbowroom::pddl::{Source, read_problem};
 
-use super::{Ahead, Aside};
-use crate::bell::{Bell, Ring};
-use crate::interrupt::Interrupt;
+use super::{BackgroundPlanner, BackgroundSettings};
+use crate::completion_signal::{Completion, CompletionSignal};
 
-/// The planner that is asked where nothing was made ahead; it counts how often.
+/// Planner for situations without a plan in advance. Counts its calls.
 struct Asked<'a>(&'a AtomicUsize);
 
 impl Planner for Asked<'_> {
@@ -21,8 +21,8 @@ impl Planner for Asked<'_> {
     }
 }
 
-/// A case.
-pub(crate) fn delivery() -> (RunSpec, Task) {
+/// The case `delivery`.
+pub fn delivery() -> (RunSpec, Task) {
     let text = |name: &str| {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/delivery");
         NamedText {
@@ -36,10 +36,10 @@ pub(crate) fn delivery() -> (RunSpec, Task) {
     (RunSpec::new(domain, problem), Task::new(read))
 }
 
-fn aside(interrupt: &Interrupt) -> Aside {
-    Aside {
-        interrupt: interrupt.clone(),
-        bell: Bell::default(),
+fn settings(stop: &Stop) -> BackgroundSettings {
+    BackgroundSettings {
+        stop: stop.clone(),
+        signal: CompletionSignal::default(),
         most_memory: None,
     }
 }
@@ -52,93 +52,88 @@ fn steps(answer: PlanAnswer) -> Vec<(String, Rational)> {
     plan.steps.iter().map(step).collect()
 }
 
-/// What the thread answers is what the planner would have answered, and nobody asks that one again.
+/// The thread returns the answer of the planner, which is not called again.
 #[test]
-fn a_plan_that_was_made_ahead_is_the_one_that_would_have_been_made() {
+fn plan_in_advance_equals_awaited_plan() {
     let ((spec, task), asked) = (delivery(), AtomicUsize::new(0));
     let situation = Situation::initial(&task);
-    let mut ahead = Ahead::new(
-        Box::new(Asked(&asked)),
-        &spec,
-        &aside(&Interrupt::default()),
-    );
-    ahead.expect(&task, &situation);
-    let made = steps(ahead.plan(&task, &situation).answer);
+    let mut planner =
+        BackgroundPlanner::new(Box::new(Asked(&asked)), &spec, &settings(&Stop::default()));
+    planner.expect(&task, &situation);
+    let made = steps(planner.plan(&task, &situation).answer);
     assert_eq!(asked.load(Ordering::SeqCst), 0);
     assert_eq!(
         made,
         steps(Embedded::default().plan(&task, &situation).answer)
     );
-    // It was made for once: the next time, the planner is asked.
-    assert_eq!(made, steps(ahead.plan(&task, &situation).answer));
+    // The plan is used once.
+    assert_eq!(made, steps(planner.plan(&task, &situation).answer));
     assert_eq!(asked.load(Ordering::SeqCst), 1);
 }
 
-/// A plan for what did not come about is not taken, and neither is one that was interrupted.
+/// A plan for another situation is discarded, and so is an interrupted one.
 #[test]
-fn a_plan_that_was_made_for_something_else_is_not_taken() {
+fn plan_for_other_situation_is_discarded() {
     let ((spec, task), asked) = (delivery(), AtomicUsize::new(0));
     let situation = Situation::initial(&task);
     let mut later = situation.clone();
     later.time = Rational::from(1);
-    let interrupt = Interrupt::default();
-    let mut ahead = Ahead::new(Box::new(Asked(&asked)), &spec, &aside(&interrupt));
-    ahead.expect(&task, &later);
-    assert!(!steps(ahead.plan(&task, &situation).answer).is_empty());
+    let stop = Stop::default();
+    let mut planner = BackgroundPlanner::new(Box::new(Asked(&asked)), &spec, &settings(&stop));
+    planner.expect(&task, &later);
+    assert!(!steps(planner.plan(&task, &situation).answer).is_empty());
     assert_eq!(asked.load(Ordering::SeqCst), 1);
     // Only the last expectation counts.
-    ahead.expect(&task, &situation);
-    ahead.expect(&task, &later);
-    assert!(!steps(ahead.plan(&task, &situation).answer).is_empty());
+    planner.expect(&task, &situation);
+    planner.expect(&task, &later);
+    assert!(!steps(planner.plan(&task, &situation).answer).is_empty());
     assert_eq!(asked.load(Ordering::SeqCst), 2);
-    interrupt.request();
-    ahead.expect(&task, &situation);
-    assert!(!steps(ahead.plan(&task, &situation).answer).is_empty());
+    stop.request();
+    planner.expect(&task, &situation);
+    assert!(!steps(planner.plan(&task, &situation).answer).is_empty());
     assert_eq!(asked.load(Ordering::SeqCst), 3);
 }
 
-/// The bell rings for what was begun, and not for what was begun ahead or given up; what is collected
-/// is what would have been waited for.
+/// Only a begun plan is signalled, not one in advance or an abandoned one. It equals the awaited plan.
 #[test]
-fn the_bell_rings_for_what_was_begun() {
+fn begun_plan_is_signalled() {
     let ((spec, task), asked) = (delivery(), AtomicUsize::new(0));
     let situation = Situation::initial(&task);
-    let aside = aside(&Interrupt::default());
+    let settings = settings(&Stop::default());
     let long = std::time::Duration::from_secs(60);
-    let mut ahead = Ahead::new(Box::new(Asked(&asked)), &spec, &aside);
-    ahead.expect(&task, &situation);
-    assert!(!aside.bell.is_awaited());
+    let mut planner = BackgroundPlanner::new(Box::new(Asked(&asked)), &spec, &settings);
+    planner.expect(&task, &situation);
+    assert!(!settings.signal.is_awaited());
     for _ in 0..2 {
-        // The first time it is the one that was begun ahead.
-        assert!(ahead.begin(&task, &situation));
-        aside.bell.wait(long);
-        assert_eq!(aside.bell.heard(), Some(Ring::PlanMade));
-        let made = steps(ahead.collect(&task, &situation).answer);
+        // The first one was begun in advance.
+        assert!(planner.begin(&task, &situation));
+        settings.signal.wait(long);
+        assert_eq!(settings.signal.poll(), Some(Completion::PlanMade));
+        let made = steps(planner.collect(&task, &situation).answer);
         assert_eq!(
             made,
             steps(Embedded::default().plan(&task, &situation).answer)
         );
     }
-    assert!(ahead.begin(&task, &situation));
-    ahead.give_up();
-    assert!(!aside.bell.is_awaited() && aside.bell.heard().is_none());
+    assert!(planner.begin(&task, &situation));
+    planner.give_up();
+    assert!(!settings.signal.is_awaited() && settings.signal.poll().is_none());
     assert_eq!(asked.load(Ordering::SeqCst), 0);
 }
 
-/// A search that takes more memory than it may says so. (Where the system does not tell, there is no
-/// limit.)
+/// A search beyond the memory limit finds no plan. (The limit is effective on Linux only.)
 #[test]
-fn a_search_that_takes_too_much_memory_says_so() {
+fn search_beyond_memory_limit_finds_no_plan() {
     let ((spec, task), asked) = (delivery(), AtomicUsize::new(0));
     let mut situation = Situation::initial(&task);
-    // Nothing can be reached without the parcel, but much can be tried out.
+    // The goal is unreachable without the parcel, but the search space is large.
     situation.state.facts.clear();
-    let aside = Aside {
+    let settings = BackgroundSettings {
         most_memory: Some(0),
-        ..aside(&Interrupt::default())
+        ..settings(&Stop::default())
     };
-    let mut ahead = Ahead::new(Box::new(Asked(&asked)), &spec, &aside);
-    assert!(ahead.begin(&task, &situation));
-    let answer = ahead.collect(&task, &situation).answer;
+    let mut planner = BackgroundPlanner::new(Box::new(Asked(&asked)), &spec, &settings);
+    assert!(planner.begin(&task, &situation));
+    let answer = planner.collect(&task, &situation).answer;
     assert!(!matches!(answer, PlanAnswer::Plan(_)), "{answer:?}");
 }

@@ -1,18 +1,18 @@
-//! What is answered before there is a run.
+//! Queries of the state of an executive.
 
 use std::time::Duration;
 
 use elbowroom::executive::documents::{Activity, State};
 use elbowroom::num::Rational;
 
-use super::front::Front;
+use super::router::ApiRouter;
 
-/// A run with people at its queue asks its world many times a second: one that takes longer than this to answer
-/// stands still.
-const ANSWERS_WITHIN: Duration = Duration::from_secs(1);
+/// Answer time of the world from which the state reports it as unanswered. An interactive run queries its world many
+/// times a second.
+const SILENCE_THRESHOLD: Duration = Duration::from_secs(1);
 
-impl Front {
-    /// How things stand.
+impl ApiRouter {
+    /// Returns the state of the executive.
     pub(super) fn state(&self) -> State {
         match self.run() {
             Ok((status, _)) => State {
@@ -23,7 +23,7 @@ impl Front {
                 now: Rational::ZERO.into(),
                 unanswered: None,
                 activity: Activity::Beginning,
-                why: Some(refused.1),
+                why: Some(refused.error),
                 goals: Vec::new(),
                 running: Vec::new(),
                 plans: 0,
@@ -34,9 +34,9 @@ impl Front {
         }
     }
 
-    /// For how many seconds the world has not answered, if it is silent.
+    /// Returns the time in seconds for which the world has not answered, if that is more than one second.
     pub(super) fn unanswered(&self) -> Option<u64> {
         let silence = self.queue().unanswered()?;
-        (silence > ANSWERS_WITHIN).then_some(silence.as_secs())
+        (silence > SILENCE_THRESHOLD).then_some(silence.as_secs())
     }
 }

@@ -1,4 +1,4 @@
-//! A world whose answers have what is asked of the run, too.
+//! World decorator that adds operators' requests and completed background tasks to each answer.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -9,105 +9,103 @@ use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
+use elbowroom::num::work::Stop;
 
-use super::Attendance;
-use super::held::Held;
-use crate::bell::{Bell, Ring};
-use crate::interrupt::Interrupt;
-use elbowroom_executive::clock::Clock;
-use elbowroom_executive::request_queue::RequestQueue;
+use super::OperatorInterface;
+use super::throttle::SimulationThrottle;
+use crate::clock::Clock;
+use crate::completion_signal::{Completion, CompletionSignal};
+use crate::request_queue::RequestQueue;
 
-/// How often it is looked whether a plan is there, or ready, in a second on the wall clock.
-const PER_SECOND: i64 = 50;
+/// Number of polls for a completed background task per second.
+const POLLS_PER_SECOND: i64 = 50;
 
-/// The time on the wall clock after which a wait looks for requests.
-const GLANCE: Duration = Duration::from_millis(50);
+/// Wall-clock time between two polls for requests.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Waits in pieces, so that whatever waits at the queue is reported with the time that it is then.
+/// World that waits in short steps and reports pending requests after each step.
 ///
-/// While nothing is under way, or a plan is made beside the run, the world's time passes no faster
-/// than the wall clock's: there is nothing to wait for but people, and planners take time.
-pub(crate) struct Attended<'a, W> {
+/// While no action runs, or a plan is made in the background, the world's time passes no faster than the wall
+/// clock.
+pub struct InteractiveWorld<'a, W> {
     inner: W,
     queue: Option<RequestQueue>,
-    /// Where people ask what time it is.
+    /// Published status, for its time.
     status: Option<Status>,
     task: Arc<Task>,
-    interrupt: Interrupt,
-    /// Rings when a plan is there.
-    bell: Bell,
-    /// How many of the world's seconds pass in one of the wall clock's.
+    stop: Stop,
+    /// Signal of background tasks.
+    signal: CompletionSignal,
+    /// Seconds of the world per second of the wall clock.
     factor: Rational,
-    /// Whether the world is there, and not only what a journal has of it.
+    /// Returns `false` while a journal is replayed.
     is_live: Box<dyn Fn() -> bool + Send + 'a>,
-    /// How much of the world's time passes in a piece.
-    piece: Rational,
+    /// Time of the world in one step.
+    step: Rational,
     now: Rational,
-    /// How far it is held back while a plan is made.
-    held: Held,
-    /// What was told to start and has not ended.
+    /// Delays a simulation while a plan is made.
+    throttle: SimulationThrottle,
+    /// Tickets of durative actions that have not ended.
     open: BTreeSet<u64>,
 }
 
-impl<'a, W: World> Attended<'a, W> {
-    /// `factor` is how many of the world's seconds pass in one of the wall clock's.
-    pub(crate) fn new(
+impl<'a, W: World> InteractiveWorld<'a, W> {
+    /// Wraps a world. `factor` is the number of the world's seconds per second of the wall clock. `signal` is that of
+    /// the run's background tasks.
+    pub fn new(
         inner: W,
-        attendance: &Attendance,
+        operator: &OperatorInterface,
         task: &Arc<Task>,
-        interrupt: &Interrupt,
+        stop: &Stop,
+        signal: &CompletionSignal,
         factor: &Rational,
     ) -> Self {
-        let millis = i64::try_from(GLANCE.as_millis()).unwrap_or(i64::MAX);
+        let millis = i64::try_from(POLL_INTERVAL.as_millis()).unwrap_or(i64::MAX);
         Self {
             inner,
-            queue: attendance.queue().cloned(),
-            status: attendance.status().cloned(),
+            queue: operator.queue().cloned(),
+            status: operator.status().cloned(),
             task: Arc::clone(task),
-            interrupt: interrupt.clone(),
-            bell: Bell::default(),
+            stop: stop.clone(),
+            signal: signal.clone(),
             factor: factor.clone(),
             is_live: Box::new(|| true),
-            piece: Rational::new(millis, 1000) * factor,
+            step: Rational::new(millis, 1000) * factor,
             now: Rational::ZERO,
-            held: Held::start(),
+            throttle: SimulationThrottle::start(),
             open: BTreeSet::new(),
         }
     }
 
-    /// The same, which reports when a plan is there.
-    pub(crate) fn ringing(self, bell: &Bell) -> Self {
-        let bell = bell.clone();
-        Self { bell, ..self }
-    }
-
-    /// The same, of a run in which these are under way.
-    pub(crate) fn under_way(self, open: impl IntoIterator<Item = u64>) -> Self {
+    /// Sets the tickets of actions that run at the start of a resumed run.
+    #[must_use]
+    pub fn with_running(self, open: impl IntoIterator<Item = u64>) -> Self {
         let open = open.into_iter().collect();
         Self { open, ..self }
     }
 
-    /// The same, which takes no requests before that.
-    pub(crate) fn once(self, is_live: impl Fn() -> bool + Send + 'a) -> Self {
+    /// Accepts no requests until `is_live` returns `true`.
+    #[must_use]
+    pub fn live_when(self, is_live: impl Fn() -> bool + Send + 'a) -> Self {
         let is_live = Box::new(is_live);
         Self { is_live, ..self }
     }
 
-    /// The world itself.
-    pub(crate) fn into_inner(self) -> W {
+    /// Returns the wrapped world.
+    pub fn into_inner(self) -> W {
         self.inner
     }
 
-    fn observed(&self, ring: Ring) -> Observation {
-        let event = match ring {
-            Ring::PlanMade => Event::PlanMade,
-            Ring::PlanReady => Event::PlanReady,
+    fn observed(&self, completion: Completion) -> Observation {
+        let event = match completion {
+            Completion::PlanMade => Event::PlanMade,
+            Completion::PlanReady => Event::PlanReady,
         };
         let time = self.now.clone();
         Observation { time, event }
     }
 
-    /// Asks the world itself.
+    /// Asks the wrapped world.
     fn ask<T>(&mut self, question: impl FnOnce(&mut W) -> T) -> T {
         if let Some(queue) = &self.queue {
             queue.note_question();
@@ -132,7 +130,7 @@ impl<'a, W: World> Attended<'a, W> {
     }
 }
 
-impl<W: World> World for Attended<'_, W> {
+impl<W: World> World for InteractiveWorld<'_, W> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
         self.now = std::mem::take(&mut self.now).max(now.clone());
         if let Command::Start {
@@ -147,7 +145,7 @@ impl<W: World> World for Attended<'_, W> {
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        if self.queue.is_none() && !self.bell.is_awaited() {
+        if self.queue.is_none() && !self.signal.is_awaited() {
             let passage = self.inner.wait(until)?;
             self.note(&passage);
             return Ok(passage);
@@ -157,46 +155,46 @@ impl<W: World> World for Attended<'_, W> {
             self.note(&passage);
             return Ok(passage);
         }
-        if let Some(ring) = self.bell.heard_soon() {
+        if let Some(completion) = self.signal.poll_timeout() {
             return Ok(Passage {
                 now: self.now.clone(),
-                observations: vec![self.observed(ring)],
+                observations: vec![self.observed(completion)],
             });
         }
         loop {
             let clock = Clock::start();
-            let is_planning = self.bell.is_awaited();
-            let piece = if is_planning {
-                &self.factor * &Rational::new(1, PER_SECOND)
+            let is_planning = self.signal.is_awaited();
+            let step = if is_planning {
+                &self.factor * &Rational::new(1, POLLS_PER_SECOND)
             } else {
-                self.piece.clone()
+                self.step.clone()
             };
-            let piece = &self.now + piece;
+            let step = &self.now + step;
             let before = self.now.clone();
-            let mut passage = self.ask(|world| world.wait(until.min(&piece)))?;
+            let mut passage = self.ask(|world| world.wait(until.min(&step)))?;
             let has_passed = passage.now > self.now;
             self.note(&passage);
             if is_planning {
                 let passed = (&self.now - &before).to_f64() / self.factor.to_f64();
                 let passed = Duration::try_from_secs_f64(passed).unwrap_or_default();
-                self.bell.wait(self.held.after(passed));
+                self.signal.wait(self.throttle.delay_after(passed));
             } else {
-                self.held = Held::start();
+                self.throttle = SimulationThrottle::start();
             }
             if let Some(queue) = self.queue.as_ref().filter(|queue| !queue.is_empty()) {
                 let mut asked = queue.drain(&self.now, &self.task);
                 passage.observations.append(&mut asked);
             }
-            if let Some(ring) = self.bell.heard() {
-                passage.observations.push(self.observed(ring));
+            if let Some(completion) = self.signal.poll() {
+                passage.observations.push(self.observed(completion));
             }
-            // Whether a clock that stands still is broken, the run decides.
+            // The run decides if a clock without progress is broken.
             let is_over = !passage.observations.is_empty() || passage.now >= *until || !has_passed;
-            if is_over || self.interrupt.is_requested() {
+            if is_over || self.stop.is_requested() {
                 return Ok(passage);
             }
             if self.open.is_empty() && !is_planning {
-                std::thread::sleep(GLANCE.saturating_sub(clock.elapsed()));
+                std::thread::sleep(POLL_INTERVAL.saturating_sub(clock.elapsed()));
             }
         }
     }

@@ -7,11 +7,11 @@ use elbowroom::execution::{Mission, Need, PlanAnswer, Planner, Preparer, Wanted}
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 
-use super::super::ahead::tests::delivery;
-use super::Readied;
-use crate::bell::{Bell, Ring};
+use super::BackgroundPreparer;
+use crate::background_planner::tests::delivery;
+use crate::completion_signal::{Completion, CompletionSignal};
 
-/// What there is to say about a plan that is ready, but for its task.
+/// Returns a prepared plan as text, without its task.
 fn said(mission: &Mission) -> String {
     let Mission {
         plan,
@@ -26,9 +26,9 @@ fn said(mission: &Mission) -> String {
     format!("{plan:?} {instances:?} {nominal:?} {envelope:?} {running:?} {now:?} {origin:?}")
 }
 
-/// The same is made ready in a thread as by whoever waits for it, with every executor's need.
+/// Preparations in the background and in the foreground are the same for every form of plan.
 #[test]
-fn a_plan_that_is_made_ready_aside_is_what_it_would_be_otherwise() {
+fn background_preparation_equals_awaited_one() {
     let (spec, task): (RunSpec, Task) = delivery();
     let task = Arc::new(task);
     let situation = Situation::initial(&task);
@@ -42,7 +42,11 @@ fn a_plan_that_is_made_ready_aside_is_what_it_would_be_otherwise() {
             ..spec.clone()
         };
         let need = spec.executor.registered.need;
-        let (bell, zero, later) = (Bell::default(), Rational::ZERO, Rational::from(3));
+        let (signal, zero, later) = (
+            CompletionSignal::default(),
+            Rational::ZERO,
+            Rational::from(3),
+        );
         let mut wanted = Wanted {
             task: &task,
             plan: &plan,
@@ -51,21 +55,22 @@ fn a_plan_that_is_made_ready_aside_is_what_it_would_be_otherwise() {
             now: &zero,
             need,
         };
-        let mut readied = Readied::new(&spec, &task, &bell).expect("it has no world file");
-        assert!(readied.begin(&wanted) && bell.is_awaited());
-        bell.wait(Duration::from_secs(60));
-        assert_eq!(bell.heard(), Some(Ring::PlanReady));
+        let mut preparer =
+            BackgroundPreparer::new(&spec, &task, &signal).expect("it has no world file");
+        assert!(preparer.begin(&wanted) && signal.is_awaited());
+        signal.wait(Duration::from_secs(60));
+        assert_eq!(signal.poll(), Some(Completion::PlanReady));
         wanted.now = &later;
-        let aside = readied.collect(&wanted).expect("it works");
+        let aside = preparer.collect(&wanted).expect("it works");
         let mut analyst = Analyst::new(spec.envelopes());
         let waited_for = wanted.mission(&mut analyst).expect("it works");
         assert_eq!(said(&aside), said(&waited_for), "{name}");
         assert_eq!(aside.now, later);
         assert_eq!(aside.task.initial(), waited_for.task.initial());
         assert_eq!(need == Need::PartialOrder, aside.order.is_some());
-        // Whoever begins with another one, or gives it up, is not rung for.
-        assert!(readied.begin(&wanted));
-        readied.give_up();
-        assert!(!bell.is_awaited());
+        // An abandoned preparation is not signalled.
+        assert!(preparer.begin(&wanted));
+        preparer.give_up();
+        assert!(!signal.is_awaited());
     }
 }

@@ -1,5 +1,5 @@
-//! Requests that change something: checked here, in the thread of the client, and taken in by the run
-//! when it next looks.
+//! Requests that change the run. They are checked in the thread of the client, and processed by the run when it drains
+//! its queue.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
@@ -17,20 +17,20 @@ use elbowroom::model::{Problem, Task};
 use elbowroom::pddl::{self, Source};
 use serde::de::DeserializeOwned;
 
-use super::front::{Front, Refused};
-use elbowroom_executive::messages::counted;
-use elbowroom_executive::request_queue::{ExternalRequest, RequestStatus};
+use super::router::{ApiError, ApiRouter};
+use crate::messages::counted;
+use crate::request_queue::{ExternalRequest, RequestStatus};
 
-/// How long a client waits for the run to take its request in; afterwards it is told that it will.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Time limit for a client to wait until the run accepts its request.
+const ACCEPT_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// The longest name of a goal, in bytes.
+/// Limit on the name of a goal, in bytes.
 const LONGEST_NAME: usize = 64;
 
-impl Front {
-    /// Does what is asked for.
-    pub(super) fn change(&self, verb: &str, path: &str, body: &[u8]) -> Result<Taken, Refused> {
-        match (verb, path) {
+impl ApiRouter {
+    /// Processes a request.
+    pub(super) fn change(&self, method: &str, path: &str, body: &[u8]) -> Result<Taken, ApiError> {
+        match (method, path) {
             ("PUT", "/v1/problem") => self.problem(read(body)?),
             ("POST", "/v1/goals") => self.goal(read(body)?),
             ("DELETE", path) => self.abandon(path.trim_start_matches("/v1/goals/")),
@@ -54,13 +54,17 @@ impl Front {
     }
 
     /// Submits requests in this order, and waits up to two seconds until the run accepts them.
-    fn submit(&self, asks: Vec<ExternalRequest>, name: Option<String>) -> Result<Taken, Refused> {
+    fn submit(
+        &self,
+        requests: Vec<ExternalRequest>,
+        name: Option<String>,
+    ) -> Result<Taken, ApiError> {
         let (status, _) = self.run()?;
         if self.queue().has_journal_failed() {
-            return Err(lost());
+            return Err(journal_failed());
         }
         if status.state().activity == Activity::Over {
-            return Err(Refused::new(
+            return Err(ApiError::new(
                 409,
                 "the executive has ended",
                 "start another one",
@@ -68,16 +72,16 @@ impl Front {
         }
         let full = || {
             let help = "wait until it has taken some in; `elbowroom ctl state` says what it does";
-            Refused::new(503, "too many requests wait for the executive", help)
+            ApiError::new(503, "too many requests wait for the executive", help)
         };
-        let number = self.queue().submit(asks).ok_or_else(full)?;
-        let until = match self.queue().wait_until_accepted(number, PATIENCE) {
+        let number = self.queue().submit(requests).ok_or_else(full)?;
+        let until = match self.queue().wait_until_accepted(number, ACCEPT_TIMEOUT) {
             RequestStatus::Accepted => None,
             RequestStatus::Pending => Some(self.obstacle()),
-            RequestStatus::JournalFailed => return Err(lost()),
+            RequestStatus::JournalFailed => return Err(journal_failed()),
             RequestStatus::RunEnded => {
                 let error = "the executive has ended before it took this in";
-                return Err(Refused::new(409, error, "start another one"));
+                return Err(ApiError::new(409, error, "start another one"));
             }
         };
         Ok(Taken {
@@ -87,7 +91,7 @@ impl Front {
         })
     }
 
-    /// What a request waits for that is not taken in at once.
+    /// Returns the reason why a request is still pending.
     fn obstacle(&self) -> String {
         match self.unanswered() {
             Some(seconds) => format!(
@@ -98,15 +102,15 @@ impl Front {
         }
     }
 
-    fn goal(&self, given: NewGoal) -> Result<Taken, Refused> {
+    fn goal(&self, given: NewGoal) -> Result<Taken, ApiError> {
         let (status, task) = self.run()?;
         let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
         let read = read_goal(task, &given.goal);
-        let read = read.map_err(|why| Refused::new(422, why, help))?;
+        let read = read.map_err(|why| ApiError::new(422, why, help))?;
         if let Some(why) = misfit(task.problem(), &read) {
-            return Err(Refused::new(422, why, help));
+            return Err(ApiError::new(422, why, help));
         }
-        let name = given.name.map(named).transpose()?;
+        let name = given.name.map(checked_name).transpose()?;
         let name = name.unwrap_or_else(|| self.new_name(&status.goals()));
         let goal = given.goal.trim().to_owned();
         let request = Request::Pursue {
@@ -116,7 +120,7 @@ impl Front {
         self.submit(vec![ExternalRequest::Request(request)], Some(name))
     }
 
-    /// A name that no open goal has.
+    /// Returns a name that no open goal has.
     fn new_name(&self, open: &[String]) -> String {
         loop {
             let number = self.named.fetch_add(1, Ordering::SeqCst) + 1;
@@ -127,45 +131,45 @@ impl Front {
         }
     }
 
-    fn abandon(&self, name: &str) -> Result<Taken, Refused> {
+    fn abandon(&self, name: &str) -> Result<Taken, ApiError> {
         let open = self.run()?.0.goals();
-        // What is not taken in yet may be the goal.
+        // A pending request may add the goal.
         if !open.iter().any(|known| known == name) && self.queue().is_idle() {
             let help = match open.as_slice() {
                 [] => "no goals are open".to_owned(),
                 open => format!("these are open: {}", open.join(", ")),
             };
-            return Err(Refused::new(404, "no goal of that name is open", help));
+            return Err(ApiError::new(404, "no goal of that name is open", help));
         }
         let name = name.to_owned();
         let request = Request::Abandon { name: name.clone() };
         self.submit(vec![ExternalRequest::Request(request)], Some(name))
     }
 
-    fn fact(&self, given: &NewFact) -> Result<Taken, Refused> {
+    fn fact(&self, given: &NewFact) -> Result<Taken, ApiError> {
         let (_, task) = self.run()?;
         let help = "write it as the problem does, such as (at rover base)";
         let unknown = || {
             let error = format!("the problem has no fact `{}`", given.fact.escape_debug());
-            Refused::new(422, error, help)
+            ApiError::new(422, error, help)
         };
         let fact = task.fact_named(&given.fact).ok_or_else(unknown)?;
         if task.is_derived(fact) {
             let error = format!("`{}` follows from other facts", given.fact);
-            return Err(Refused::new(422, error, "say those instead"));
+            return Err(ApiError::new(422, error, "say those instead"));
         }
         let (fact, becomes) = (task.fact_name(fact), given.becomes);
         self.submit(vec![ExternalRequest::Fact { fact, becomes }], None)
     }
 
-    fn number(&self, given: NewNumber) -> Result<Taken, Refused> {
+    fn number(&self, given: NewNumber) -> Result<Taken, ApiError> {
         let (_, task) = self.run()?;
         let unknown = || {
             let error = format!(
                 "the problem has no fluent `{}`",
                 given.fluent.escape_debug()
             );
-            Refused::new(
+            ApiError::new(
                 422,
                 error,
                 "write it as the problem does, such as (charge rover)",
@@ -176,52 +180,53 @@ impl Front {
         self.submit(vec![ExternalRequest::Number { fluent, value }], None)
     }
 
-    /// The first problem begins the run. A later one is a new situation for the same objects.
-    fn problem(&self, given: NewProblem) -> Result<Taken, Refused> {
-        let domain = self.domain.source();
+    /// Starts the run with the initial problem, or changes the situation to that of a later problem with the same
+    /// objects.
+    fn problem(&self, given: NewProblem) -> Result<Taken, ApiError> {
+        let domain = self.domain().source();
         let read = pddl::read_problem(&domain, &Source::new("the problem", given.problem.as_str()));
         let (problem, _) = read.map_err(|mistakes| {
             let first = mistakes.errors().next().map(ToString::to_string);
             let help = "`elbowroom check DOMAIN PROBLEM` lists all mistakes";
-            Refused::new(422, first.unwrap_or_default(), help)
+            ApiError::new(422, first.unwrap_or_default(), help)
         })?;
         let Ok((status, task)) = self.run() else {
-            let taken = self.first.give(given.problem)?;
+            let taken = self.initial_problem().give(given.problem)?;
             let until = (!taken).then(|| "it is read".to_owned());
             let name = None;
             return Ok(Taken { taken, until, name });
         };
         let state = status.state();
         check_further(&problem, task, &state)?;
-        self.submit(turned(&Task::new(problem), task, &state), None)
+        self.submit(requests_for(&Task::new(problem), task, &state), None)
     }
 }
 
-/// What is asked while the journal cannot be written.
-fn lost() -> Refused {
+/// Returns the error for requests while the journal cannot be written.
+fn journal_failed() -> ApiError {
     let error = "the journal cannot be written, so this is not kept, and the executive ends";
     let help = "make room on the disk, go on with `elbowroom serve --resume`, and ask again";
-    Refused::new(503, error, help)
+    ApiError::new(503, error, help)
 }
 
-/// Whether a running executive can turn to another problem.
-fn check_further(problem: &Problem, task: &Task, state: &State) -> Result<(), Refused> {
+/// Checks that a running executive can adopt another problem.
+fn check_further(problem: &Problem, task: &Task, state: &State) -> Result<(), ApiError> {
     if problem.objects != task.problem().objects {
-        return Err(Refused::new(
+        return Err(ApiError::new(
             409,
             "this problem has other objects than the one that is executed",
             "stop the executive, and start one for this problem",
         ));
     }
     if !problem.timed.is_empty() {
-        return Err(Refused::new(
+        return Err(ApiError::new(
             409,
             "a problem with timed initials can only be the first one",
             "leave them out, or start another executive",
         ));
     }
     if !state.running.is_empty() {
-        return Err(Refused::new(
+        return Err(ApiError::new(
             409,
             "actions are under way, and what they do is no part of this problem",
             "pause, wait until they have ended, and give it again; or give goals and facts",
@@ -230,13 +235,13 @@ fn check_further(problem: &Problem, task: &Task, state: &State) -> Result<(), Re
     Ok(())
 }
 
-/// What is to be said so that things are as that problem has them, and its goal is the goal.
-fn turned(new: &Task, task: &Task, state: &State) -> Vec<ExternalRequest> {
-    let mut asks = Vec::new();
+/// Returns requests that change the situation and the goals to those of the new problem.
+fn requests_for(new: &Task, task: &Task, state: &State) -> Vec<ExternalRequest> {
+    let mut requests = Vec::new();
     let named = |fact: &_| new.fact_name(*fact);
     let facts: BTreeSet<String> = new.initial().facts.iter().map(named).collect();
     let timed: BTreeSet<FactId> = timed_facts(task).collect();
-    // Timed initials, such as those of a calendar, stay in force: they say when their facts hold.
+    // Timed initials, such as those of a calendar, stay in force.
     let is_given = |fact: &str| {
         task.fact_named(fact)
             .is_none_or(|fact| task.is_derived(fact) || timed.contains(&fact))
@@ -244,23 +249,23 @@ fn turned(new: &Task, task: &Task, state: &State) -> Vec<ExternalRequest> {
     let gone = state.facts.iter().filter(|fact| !facts.contains(*fact));
     for fact in gone.filter(|fact| !is_given(fact)) {
         let (fact, becomes) = (fact.clone(), false);
-        asks.push(ExternalRequest::Fact { fact, becomes });
+        requests.push(ExternalRequest::Fact { fact, becomes });
     }
     for fact in facts {
         let becomes = true;
-        asks.push(ExternalRequest::Fact { fact, becomes });
+        requests.push(ExternalRequest::Fact { fact, becomes });
     }
     for (fluent, value) in &new.initial().values {
         let (fluent, value) = (new.fluent_name(*fluent), value.clone());
-        asks.push(ExternalRequest::Number { fluent, value });
+        requests.push(ExternalRequest::Number { fluent, value });
     }
     for goal in &state.goals {
         let name = goal.name.clone();
-        asks.push(ExternalRequest::Request(Request::Abandon { name }));
+        requests.push(ExternalRequest::Request(Request::Abandon { name }));
     }
     let (name, goal) = (FIRST_GOAL.to_owned(), goal_text(new));
-    asks.push(ExternalRequest::Request(Request::Pursue { name, goal }));
-    asks
+    requests.push(ExternalRequest::Request(Request::Pursue { name, goal }));
+    requests
 }
 
 /// Returns the facts that timed initials of the running problem change.
@@ -272,11 +277,11 @@ fn timed_facts(task: &Task) -> impl Iterator<Item = FactId> {
     })
 }
 
-/// A name that can stand in a path.
-fn named(name: String) -> Result<String, Refused> {
+/// Checks that a name can be part of a path.
+fn checked_name(name: String) -> Result<String, ApiError> {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
     if name.is_empty() || name.len() > LONGEST_NAME || !name.bytes().all(is_plain) {
-        return Err(Refused::new(
+        return Err(ApiError::new(
             422,
             "this is no name for a goal",
             "use up to 64 letters, digits, and `-`, `_` or `.`",
@@ -285,13 +290,17 @@ fn named(name: String) -> Result<String, Refused> {
     Ok(name)
 }
 
-/// Reads a body.
-fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, Refused> {
+/// Parses a body.
+fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, ApiError> {
     let help = "GET /v1/openapi.json says what belongs into it";
     if body.trim_ascii_start().starts_with(b"[") {
-        // Serde would take the members in order.
-        return Err(Refused::new(422, "the body is a list, not an object", help));
+        // Serde would accept a list of the members.
+        return Err(ApiError::new(
+            422,
+            "the body is a list, not an object",
+            help,
+        ));
     }
     serde_json::from_slice(body)
-        .map_err(|error| Refused::new(422, format!("the body cannot be read: {error}"), help))
+        .map_err(|error| ApiError::new(422, format!("the body cannot be read: {error}"), help))
 }
