@@ -8,6 +8,7 @@
 //! - [`background_planner`], [`background_preparer`], [`completion_signal`]: planning during the run.
 //! - [`process_world`], [`world_protocol`], [`belief_updates`]: a world that is a process
 //!   (`docs/formats/world-protocol.md`). [`realtime`]: a simulated world on the wall clock.
+//! - [`run`], [`resume`]: assembly of a run from its specification, and recovery from its journal.
 //! - [`http`], [`api`], [`trace_buffer`]: HTTP server and client, the interface of an executive (`docs/serve.md`), and
 //!   the buffer of the trace for clients.
 //! - [`clock`], [`memory_limit`], [`messages`]: wall clock, memory limit, texts of messages.
@@ -31,6 +32,8 @@ pub mod operator;
 pub mod process_world;
 pub mod realtime;
 pub mod request_queue;
+pub mod resume;
+pub mod run;
 pub mod trace_buffer;
 pub mod world_protocol;
 

@@ -1,28 +1,35 @@
 //! `elbowroom run`: execute a plan in a world.
 
-pub(super) mod live;
+mod progress_line;
 mod replay;
 pub(super) mod resume;
-mod shown;
 pub(super) mod spec;
 mod text;
 pub(super) mod trace_file;
+mod viewers;
 
-use std::ops::ControlFlow;
+use std::cell::OnceCell;
 use std::sync::Arc;
-use std::time::Duration;
 
 use elbowroom::RoundingRule;
-use elbowroom::answers::run::{RunOutcome, run as execute};
-use elbowroom::answers::{Event, Halt, RunRequest, Watcher};
+use elbowroom::answers::run::RunOutcome;
 use elbowroom::execute::{NamedText, RunSpec, SpecError, check_vary};
 use elbowroom::execution::run::{MissingPlan, Verdict};
-use elbowroom::execution::{Planner, Progression, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
-use elbowroom::report::trace;
 use elbowroom::sim::WorldModel;
 use elbowroom::text::Source;
+use elbowroom_executive::Error;
+use elbowroom_executive::background_planner::BackgroundSettings;
+use elbowroom_executive::clock::Clock;
+use elbowroom_executive::completion_signal::CompletionSignal;
+use elbowroom_executive::journal::{JournalFile, Segments};
+use elbowroom_executive::messages::escape_control;
+use elbowroom_executive::operator::OperatorInterface;
+use elbowroom_executive::process_world::{ProcessLimits, check_program};
+use elbowroom_executive::request_queue::RequestQueue;
+use elbowroom_executive::run::{JournaledOutcome, RunError, RunHost, RunInputs};
+use elbowroom_executive::trace_buffer::TraceBuffer;
 
 use crate::args::RunArgs;
 use crate::calendar::dated;
@@ -32,21 +39,11 @@ use crate::interrupt::Interrupt;
 use crate::look::{BAD, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
-use elbowroom_executive::background_planner::{BackgroundPlanner, BackgroundSettings};
-use elbowroom_executive::background_preparer::BackgroundPreparer;
-use elbowroom_executive::belief_updates::BeliefUpdates;
-use elbowroom_executive::clock::Clock;
-use elbowroom_executive::completion_signal::CompletionSignal;
-use elbowroom_executive::journal::JournalFile;
-use elbowroom_executive::journaling::{JournalHealth, JournalWriter, JournaledWorld};
-use elbowroom_executive::messages::escape_control;
-use elbowroom_executive::operator::{InteractiveWorld, OperatorInterface};
-use elbowroom_executive::process_world::{ProcessLimits, ProcessWorld, check_program};
-use elbowroom_executive::realtime::{Pace, PacedPlanner, Realtime};
-use elbowroom_executive::request_queue::RequestQueue;
-use shown::Views;
+use progress_line::ProgressLine;
+use resume::ResumeHost;
 use spec::contradiction;
 use trace_file::TraceFile;
+use viewers::Viewers;
 
 /// Executes a plan, or plays a stored run back.
 pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
@@ -54,7 +51,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         return replay::run(path, arguments.json, output);
     }
     if let Some(path) = &arguments.resume {
-        return resume::run(path, arguments, &resume::Alone(arguments), output);
+        return resume::run(path, arguments, &resume::StandaloneHost(arguments), output);
     }
     let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) else {
         return Err(Failure::new(
@@ -80,9 +77,8 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let interrupt = Interrupt::listen_with_world();
     let job = Job {
         journal: journal(arguments, RESUME)?,
-        begun: &|| (),
+        started: &|| (),
         since,
-        background: background(arguments, &interrupt),
         spec: &spec,
         task: &task,
         first,
@@ -92,14 +88,16 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     job.execute(arguments, output)
 }
 
-/// What goes on with the journal of a run that ends with its goal.
+/// Command that resumes a run that ends with its goal.
 pub(super) const RESUME: &str = "elbowroom run --resume";
 
-/// What goes on with the journal of an executive.
+/// Command that resumes an executive.
 pub(super) const RESUME_SERVE: &str = "elbowroom serve --resume";
 
-/// The journal that is asked for, which is empty yet. That there is no such program as its world is told
-/// before.
+/// Creates the journal of the arguments, if there is one.
+///
+/// # Errors
+/// When the world process does not exist, or the file cannot be created.
 pub(super) fn journal(arguments: &RunArgs, resume: &str) -> Result<Option<JournalFile>, Failure> {
     let Some(command) = &arguments.world_process else {
         return Ok(None);
@@ -120,7 +118,7 @@ pub(super) fn background(arguments: &RunArgs, interrupt: &Interrupt) -> Backgrou
     }
 }
 
-/// Those who may ask something of a run on its page, if anybody may.
+/// Returns the channels for requests from the page of a run.
 pub(super) fn operator(arguments: &RunArgs) -> OperatorInterface {
     match &arguments.control {
         Some(_) => OperatorInterface::with_queue(RequestQueue::default()),
@@ -184,14 +182,16 @@ fn show(
     }
 }
 
-/// Shows what came of a run with a journal; `trouble` is why that could not be written.
+/// Prints the outcome of a run with a journal.
 pub(super) fn conclude(
     asked: (&RunArgs, &RunSpec),
-    mut outcome: RunOutcome,
-    trouble: Option<String>,
+    JournaledOutcome {
+        mut outcome,
+        journal_failure,
+    }: JournaledOutcome,
     output: &mut Output,
 ) -> Answer {
-    let Some(why) = trouble else {
+    let Some(why) = journal_failure else {
         show(asked, &outcome, false, output)?;
         let journal = asked.0.journal.as_ref().or(asked.0.resume.as_ref());
         return exit(&outcome, journal.map(|path| path.display().to_string()));
@@ -221,14 +221,68 @@ pub(super) fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure>
     Ok(Task::new(problem).with_epsilon(spec.epsilon.clone()))
 }
 
-/// Tells both what the run believes.
-fn both(
-    mut one: impl FnMut(&Progression) + Send,
-    mut other: impl FnMut(&Progression) + Send,
-) -> impl FnMut(&Progression) + Send {
-    move |belief| {
-        one(belief);
-        other(belief);
+/// Returns the limits of a world process.
+fn limits(arguments: &RunArgs) -> ProcessLimits {
+    ProcessLimits {
+        answer_timeout: arguments.answer_within.clone(),
+        is_strict: arguments.strict_world,
+    }
+}
+
+/// Returns the failure of a run without an outcome.
+fn failure(error: RunError) -> Failure {
+    match error {
+        RunError::Spec(error) => contradiction(error),
+        RunError::Failed(error) => error.into(),
+    }
+}
+
+/// Host of a run on the command line.
+struct CommandHost<'a> {
+    arguments: &'a RunArgs,
+    interrupt: &'a Interrupt,
+    /// The viewers, once they are open.
+    views: OnceCell<Viewers<'a>>,
+    /// Called when execution begins.
+    started: &'a dyn Fn(),
+    /// Support for operators of a resumed run.
+    resume: Option<&'a dyn ResumeHost>,
+}
+
+impl CommandHost<'_> {
+    /// Closes the viewers after a run with an outcome.
+    fn close<T, E>(self, outcome: Result<T, E>) -> Result<T, E> {
+        if let (Ok(_), Some(views)) = (&outcome, self.views.into_inner()) {
+            views.close();
+        }
+        outcome
+    }
+}
+
+impl RunHost for CommandHost<'_> {
+    fn operator(&self, spec: &RunSpec, task: &Arc<Task>) -> Result<OperatorInterface, Error> {
+        match self.resume {
+            Some(host) => host.operator(spec, task, self.interrupt),
+            None => Ok(OperatorInterface::default()),
+        }
+    }
+
+    fn segments(&self) -> Option<Segments> {
+        self.resume.and_then(ResumeHost::segments)
+    }
+
+    fn open_viewers(
+        &self,
+        spec: &RunSpec,
+        task: &Arc<Task>,
+        operator: &OperatorInterface,
+    ) -> Result<Option<TraceBuffer>, Error> {
+        let views = Viewers::open(self.arguments, spec, task, self.interrupt, operator)?;
+        Ok(self.views.get_or_init(|| views).buffer().cloned())
+    }
+
+    fn started(&self) {
+        (self.started)();
     }
 }
 
@@ -239,222 +293,55 @@ pub(super) struct Job<'a> {
     pub(super) first: Option<TimeTriggeredPlan>,
     pub(super) interrupt: &'a Interrupt,
     pub(super) operator: &'a OperatorInterface,
-    pub(super) background: BackgroundSettings,
-    /// Its journal, which is empty, if it is to have one.
+    /// The journal, which is empty, if the run has one.
     pub(super) journal: Option<JournalFile>,
-    /// Told when the run begins, and its first record is on the disk if there is a journal.
-    pub(super) begun: &'a dyn Fn(),
-    /// Runs from time 0, where that is a date and not the beginning of the run.
+    /// Called when execution begins. The first record is on the disk if there is a journal.
+    pub(super) started: &'a dyn Fn(),
+    /// Runs from time 0, if that is a date; otherwise time 0 is the start of the run.
     pub(super) since: Option<Clock>,
 }
 
 impl Job<'_> {
-    /// The run that the arguments ask for, from its beginning to its exit code.
-    pub(super) fn execute(mut self, arguments: &RunArgs, output: &mut Output) -> Answer {
-        if let (Some(file), Some(command)) = (self.journal.take(), &arguments.world_process) {
-            return self.journaled(file, command, arguments, output);
-        }
-        let (spec, task, interrupt) = (self.spec, self.task, self.interrupt);
-        let mut file = TraceFile::open(arguments.trace.as_deref())?;
-        let views = Views::open(arguments, spec, task, interrupt, self.operator)?;
-        let outcome = {
-            let mut sink = |line: &str| file.write(line);
-            let mut writer = trace::TraceWriter::new(Arc::clone(task), &mut sink);
-            let written = writer.header(spec);
-            written
-                .map_err(|error| Failure::new(format!("cannot write the trace: {error}"), ""))?;
-            let writer = self.operator.publishing(&mut writer, task, false);
-            let mut writer = views.shown(writer, task);
-            let mut writer = live::Live::new(&mut writer);
-            match &arguments.world_process {
-                Some(command) => {
-                    let limits = ProcessLimits {
-                        answer_timeout: arguments.answer_within.clone(),
-                        is_strict: arguments.strict_world,
-                    };
-                    let stop = interrupt.stop().clone();
-                    let world = ProcessWorld::start(command, task, limits, stop)?;
-                    let beliefs = BeliefUpdates::default();
-                    let world = world.with_beliefs(beliefs.clone());
-                    let mut world = self.attended(world, &Rational::ONE);
-                    (self.begun)();
-                    let outcome = self.run(&mut world, &mut writer, beliefs.listener());
-                    world.into_inner().stop();
-                    outcome.map_err(contradiction)?
-                }
-                None => self.simulated(&mut writer).map_err(contradiction)?,
-            }
+    /// Executes the run of the arguments, and returns its exit code.
+    pub(super) fn execute(self, arguments: &RunArgs, output: &mut Output) -> Answer {
+        let (spec, interrupt) = (self.spec, self.interrupt);
+        let mut line = ProgressLine::new();
+        let inputs = RunInputs {
+            spec,
+            task: self.task,
+            first_plan: self.first,
+            operator: self.operator,
+            background: background(arguments, interrupt),
+            limits: limits(arguments),
+            since: self.since,
+            observer: Some(Box::new(move |entry| line.update(entry))),
         };
-        views.close();
+        let host = CommandHost {
+            arguments,
+            interrupt,
+            views: OnceCell::new(),
+            started: self.started,
+            resume: None,
+        };
+        let mut watcher = Stopwatch::start(interrupt);
+        if let Some(file) = self.journal {
+            let outcome = inputs.execute_journaled(file, &host, &mut watcher);
+            let outcome = host.close(outcome).map_err(failure)?;
+            return conclude((arguments, spec), outcome, output);
+        }
+        let mut file = TraceFile::open(arguments.trace.as_deref())?;
+        let outcome = inputs.execute(&mut |line| file.write(line), &host, &mut watcher);
+        let outcome = host.close(outcome).map_err(failure)?;
         let is_valid = outcome.answer.invalid.is_empty();
         let trace = (!is_valid).then(|| file.of_invalid_run()).flatten();
         let trouble = file.close();
         let shown = show((arguments, spec), &outcome, false, output);
-        // The run has been what it was, whatever became of its record.
+        // The run is complete, even if its record is not.
         if let Some(trouble) = trouble {
             output::warn(&trouble);
         }
         shown?;
         exit(&outcome, trace)
-    }
-
-    /// A world that takes requests, if the run is attended.
-    fn attended<'w, W: World>(&self, world: W, factor: &Rational) -> InteractiveWorld<'w, W> {
-        let (stop, signal) = (self.interrupt.stop(), &self.background.signal);
-        InteractiveWorld::new(world, self.operator, self.task, stop, signal, factor)
-    }
-
-    fn run(
-        self,
-        world: &mut dyn World,
-        recorder: &mut dyn Recorder,
-        mut believes: impl FnMut(&Progression) + Send,
-    ) -> Result<RunOutcome, SpecError> {
-        let begun = Clock::start();
-        let clock = || begun.seconds();
-        let goes_on = || !self.interrupt.is_requested();
-        let model = self.spec.model(self.task.problem());
-        let model = model.map_err(SpecError::World)?;
-        let planner = self
-            .spec
-            .planner_for(self.task, model.as_ref(), &clock, &goes_on)?;
-        let request = RunRequest::new(self.spec, self.task)
-            .beginning_with(self.first)
-            .planned_by(BackgroundPlanner::new(planner, self.spec, &self.background))
-            .prepared_by(BackgroundPreparer::new(
-                self.spec,
-                self.task,
-                &self.background.signal,
-            )?)
-            .told_to(both(self.operator.listener(), &mut believes))
-            .recorded_by(recorder);
-        execute(request, world, &mut Stopwatch::start(self.interrupt))
-    }
-
-    /// A run in a world that is a process, with a journal.
-    fn journaled(
-        self,
-        mut file: JournalFile,
-        command: &str,
-        arguments: &RunArgs,
-        output: &mut Output,
-    ) -> Answer {
-        let mut is_kept = false;
-        let mut sink = |line: &str| is_kept = file.write(line);
-        let mut header = trace::TraceWriter::new(Arc::clone(self.task), &mut sink);
-        let written = header.header(self.spec);
-        written.map_err(|error| Failure::new(format!("cannot write the journal: {error}"), ""))?;
-        // Whoever has given the problem is told that it is on the disk. A run begins again without that.
-        if !is_kept || (self.spec.is_lasting && !file.sync()) {
-            let why = file.failure().unwrap_or_default();
-            return Err(Failure::new(
-                format!("cannot write the journal {}: {why}", file.path().display()),
-                "nothing was started; make room on the disk, or choose another file",
-            ));
-        }
-        let limits = ProcessLimits {
-            answer_timeout: arguments.answer_within.clone(),
-            is_strict: arguments.strict_world,
-        };
-        let health = JournalHealth::default();
-        let interrupt = self.interrupt;
-        let views = Views::open(arguments, self.spec, self.task, interrupt, self.operator)?;
-        let world = ProcessWorld::start(command, self.task, limits, interrupt.stop().clone())?;
-        let beliefs = BeliefUpdates::default();
-        let world = JournaledWorld::new(world.with_beliefs(beliefs.clone()), health.clone());
-        let mut world = self.attended(world, &Rational::ONE);
-        (self.begun)();
-        let outcome = {
-            let queue = self.operator.queue();
-            let writer = JournalWriter::new(self.task, &mut file, &health, queue);
-            let writer = self.operator.publishing(writer, self.task, true);
-            let mut writer = views.shown(writer, self.task);
-            let begun = Clock::start();
-            let clock = || begun.seconds();
-            let goes_on = || !interrupt.is_requested();
-            let planner = self.spec.planner_for(self.task, None, &clock, &goes_on);
-            let planner = planner.map_err(contradiction)?;
-            let readied = BackgroundPreparer::new(self.spec, self.task, &self.background.signal);
-            let readied = readied.map_err(contradiction)?;
-            let request = RunRequest::new(self.spec, self.task)
-                .beginning_with(self.first)
-                .planned_by(BackgroundPlanner::new(planner, self.spec, &self.background))
-                .prepared_by(readied)
-                .told_to(both(self.operator.listener(), beliefs.listener()))
-                .recorded_by(live::Live::new(&mut writer));
-            let mut watch = Attentive {
-                inner: Stopwatch::start(interrupt),
-                health,
-            };
-            execute(request, &mut world, &mut watch)
-        };
-        world.into_inner().into_inner().stop();
-        views.close();
-        let outcome = outcome.map_err(contradiction)?;
-        conclude((arguments, self.spec), outcome, file.failure(), output)
-    }
-
-    /// A run in the world that the specification describes, on a wall clock if it asks for one.
-    fn simulated(self, recorder: &mut dyn Recorder) -> Result<RunOutcome, SpecError> {
-        let (spec, task) = (self.spec, self.task);
-        let model = spec.model(task.problem()).map_err(SpecError::World)?;
-        let model = model.unwrap_or_default();
-        let mut world = spec.world(&model, task, self.first.as_ref())?;
-        (self.begun)();
-        let Some(factor) = &spec.realtime else {
-            return self.run(world.as_mut(), recorder, |_: &Progression| {});
-        };
-        let pace = Pace::new(factor, self.since);
-        let begun = Clock::start();
-        let clock = || begun.seconds();
-        let goes_on = || !self.interrupt.is_requested();
-        let planner = spec.planner_for(task, Some(&model), &clock, &goes_on)?;
-        let planner: Box<dyn Planner> =
-            Box::new(BackgroundPlanner::new(planner, spec, &self.background));
-        let world = Realtime {
-            inner: world.as_mut(),
-            pace: &pace,
-            stop: self.interrupt.stop(),
-        };
-        let mut world = self.attended(world, factor);
-        let request = RunRequest::new(spec, task)
-            .beginning_with(self.first)
-            .told_to(self.operator.listener())
-            .prepared_by(BackgroundPreparer::new(
-                spec,
-                task,
-                &self.background.signal,
-            )?)
-            .planned_by(PacedPlanner {
-                inner: planner,
-                pace: &pace,
-                planning_time: &spec.planning_time,
-            })
-            .recorded_by(recorder);
-        execute(request, &mut world, &mut Stopwatch::start(self.interrupt))
-    }
-}
-
-/// Ends a run also when its journal cannot be written.
-struct Attentive {
-    inner: Stopwatch,
-    health: JournalHealth,
-}
-
-impl Watcher for Attentive {
-    fn elapsed(&mut self) -> Duration {
-        self.inner.elapsed()
-    }
-
-    fn flow(&mut self) -> ControlFlow<Halt> {
-        if self.health.has_failed() {
-            return ControlFlow::Break(Halt::Cancelled);
-        }
-        self.inner.flow()
-    }
-
-    fn notice(&mut self, event: &Event<'_>) {
-        self.inner.notice(event);
     }
 }
 

@@ -8,15 +8,16 @@ use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 
-use super::run::resume::{self, Host};
+use super::run::resume::{self, ResumeHost};
 use super::run::spec;
-use super::run::{Job, RESUME_SERVE, background, checked, journal};
+use super::run::{Job, RESUME_SERVE, checked, journal};
 use crate::args::ServeArgs;
 use crate::calendar::dated;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
+use elbowroom_executive::Error;
 use elbowroom_executive::api::{self, ApiError, ApiRouter, Client};
 use elbowroom_executive::clock::Clock;
 use elbowroom_executive::http::AccessControl;
@@ -92,7 +93,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         since = at;
         (task, first, Some(client))
     };
-    let begun = || {
+    let started = || {
         if let Some(client) = &client {
             client.accept();
         }
@@ -102,14 +103,13 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         .map_err(Failure::from)
         .and_then(|operator| {
             let job = Job {
-                background: background(&arguments.run, &interrupt),
                 spec: &spec,
                 task: &task,
                 first,
                 interrupt: &interrupt,
                 operator: &operator,
                 journal,
-                begun: &begun,
+                started: &started,
                 since,
             };
             job.execute(&arguments.run, output)
@@ -214,12 +214,11 @@ fn in_order(answer: Answer) -> Answer {
     })
 }
 
-fn control(arguments: &ServeArgs, interrupt: &Interrupt) -> Result<Option<AccessControl>, Failure> {
+fn control(arguments: &ServeArgs, interrupt: &Interrupt) -> Result<Option<AccessControl>, Error> {
     let token = arguments.token.as_ref();
     token
         .map(|path| AccessControl::read(path, interrupt.stop().clone()))
         .transpose()
-        .map_err(Failure::from)
 }
 
 /// What belongs to `elbowroom run` alone.
@@ -256,7 +255,7 @@ fn open(
     arguments: &ServeArgs,
     interrupt: &Interrupt,
     domain: &NamedText,
-) -> Result<Arc<ApiRouter>, Failure> {
+) -> Result<Arc<ApiRouter>, Error> {
     let control = control(arguments, interrupt)?;
     let with_token = if control.is_some() {
         ""
@@ -285,21 +284,21 @@ struct Server<'a> {
     router: OnceCell<Arc<ApiRouter>>,
 }
 
-impl Host for Server<'_> {
-    fn attend(
+impl ResumeHost for Server<'_> {
+    fn operator(
         &self,
         spec: &RunSpec,
         task: &Arc<Task>,
         interrupt: &Interrupt,
-    ) -> Result<OperatorInterface, Failure> {
+    ) -> Result<OperatorInterface, Error> {
         if !spec.is_lasting {
-            return Err(Failure::new(
+            return Err(Error::new(
                 "this is the journal of a run that ends with its goal",
                 "go on with `elbowroom run --resume`",
             ));
         }
         let router = open(self.arguments, interrupt, &spec.domain)?;
-        let operator = router.begin(spec, task).map_err(Failure::from);
+        let operator = router.begin(spec, task);
         let _ = self.router.set(router);
         operator
     }

@@ -1,10 +1,9 @@
-//! The line that shows how a run is getting on.
+//! Progress line of a run.
 
 use std::collections::BTreeMap;
 
 use elbowroom::execution::Entry;
-use elbowroom::execution::run::Stand;
-use elbowroom::execution::{Command, Event, Recorder};
+use elbowroom::execution::{Command, Event};
 use elbowroom::num::Rational;
 
 use crate::number;
@@ -15,9 +14,8 @@ use elbowroom_executive::messages::{counted, escape_control};
 /// The limit on running actions that are named.
 const MOST_NAMED: usize = 3;
 
-/// Passes entries on to a recorder, and shows the time, the running actions and whether a plan is being made.
-pub(super) struct Live<'a> {
-    inner: &'a mut dyn Recorder,
+/// Line with the time, the running actions, and the number of new plans.
+pub(super) struct ProgressLine {
     line: Progress,
     clock: Clock,
     /// Actions that have started and not ended, by ticket.
@@ -25,11 +23,10 @@ pub(super) struct Live<'a> {
     replans: usize,
 }
 
-impl<'a> Live<'a> {
-    /// Shows what goes into this record.
-    pub(super) fn new(inner: &'a mut dyn Recorder) -> Self {
+impl ProgressLine {
+    /// Creates the line of a run that begins.
+    pub(super) fn new() -> Self {
         Self {
-            inner,
             line: Progress::new(),
             clock: Clock::start(),
             running: BTreeMap::new(),
@@ -53,11 +50,9 @@ impl<'a> Live<'a> {
             format!("at {time}: {what}; {}", counted(replans, "new plan"))
         });
     }
-}
 
-impl Recorder for Live<'_> {
-    fn record(&mut self, entry: &Entry<'_>) {
-        self.inner.record(entry);
+    /// Updates the line after an entry of the record.
+    pub(super) fn update(&mut self, entry: &Entry<'_>) {
         match entry {
             Entry::Command { now, command, .. } => {
                 if let Command::Start { ticket, action, .. } = command {
@@ -81,13 +76,5 @@ impl Recorder for Live<'_> {
             Entry::Passed { now, .. } => self.show(now, false),
             _ => {}
         }
-    }
-
-    fn commit(&mut self) {
-        self.inner.commit();
-    }
-
-    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
-        self.inner.begin_anew(stand)
     }
 }

@@ -1,72 +1,50 @@
-//! A run that is shown elsewhere, too: in browsers while it goes on, in other viewers afterwards.
+//! Viewers of a run: browsers during the run, files for other viewers after it.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::execute::RunSpec;
-use elbowroom::execution::run::Stand;
-use elbowroom::execution::{Entry, Recorder};
 use elbowroom::model::Task;
-use elbowroom::report::trace::{Line, TraceWriter};
+use elbowroom::report::trace::TraceWriter;
 use elbowroom_page::PageError;
 
 use crate::args::RunArgs;
-use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use crate::output;
+use elbowroom_executive::Error;
 use elbowroom_executive::http::{AccessControl, PageServer};
 use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::trace_buffer::{TRACE_NAME, TraceBuffer};
 
-/// Keeps a record, and shows it if that is asked for.
-pub(super) struct Shown<R> {
-    inner: R,
-    task: Arc<Task>,
-    buffer: Option<TraceBuffer>,
-}
-
-impl<R: Recorder> Recorder for Shown<R> {
-    fn record(&mut self, entry: &Entry<'_>) {
-        self.inner.record(entry);
-        if let Some(buffer) = &self.buffer {
-            buffer.add(&format!("{}\n", Line::of(&self.task, entry).text()));
-        }
-    }
-
-    fn commit(&mut self) {
-        self.inner.commit();
-    }
-
-    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
-        self.inner.begin_anew(stand)
-    }
-}
-
-/// The other places at which a run is shown: browsers and viewers.
-pub(super) struct Views<'a> {
+/// Browsers and files for viewers.
+pub(super) struct Viewers<'a> {
     arguments: &'a RunArgs,
     buffer: Option<TraceBuffer>,
 }
 
-impl<'a> Views<'a> {
-    /// Opens those that are asked for, so that one that cannot be had is told before anything is
-    /// done.
+impl<'a> Viewers<'a> {
+    /// Opens the viewers of the arguments.
+    ///
+    /// # Errors
+    /// When a file cannot be written, or the address of the page is not available.
     pub(super) fn open(
         arguments: &'a RunArgs,
         spec: &RunSpec,
         task: &Arc<Task>,
         interrupt: &Interrupt,
         operator: &OperatorInterface,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, Error> {
         let files = [&arguments.perfetto, &arguments.mcap];
         if arguments.serve.is_none() && files.iter().all(|file| file.is_none()) {
             let buffer = None;
             return Ok(Self { arguments, buffer });
         }
         for file in files.iter().copied().flatten() {
-            output::write_bytes(file, b"")?;
+            output::write_bytes(file, b"").map_err(|failure| {
+                Error::new(failure.message(), failure.advice().unwrap_or_default())
+            })?;
         }
-        // What is written for viewers in the end is the whole run.
+        // Files for viewers contain the whole run.
         let is_for_viewers = files.iter().any(|file| file.is_some());
         let buffer = if spec.is_lasting && !is_for_viewers {
             TraceBuffer::bounded()
@@ -75,7 +53,7 @@ impl<'a> Views<'a> {
         };
         let mut header = |line: &str| buffer.add(line);
         let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
-        written.map_err(|error| Failure::new(format!("cannot show the run: {error}"), ""))?;
+        written.map_err(|error| Error::new(format!("cannot show the run: {error}"), ""))?;
         if let Some(address) = arguments.serve {
             let control = match &arguments.control {
                 Some(path) => Some(AccessControl::read(path, interrupt.stop().clone())?),
@@ -94,17 +72,13 @@ impl<'a> Views<'a> {
         Ok(Self { arguments, buffer })
     }
 
-    /// A record that is shown, too.
-    pub(super) fn shown<R: Recorder>(&self, inner: R, task: &Arc<Task>) -> Shown<R> {
-        Shown {
-            inner,
-            task: Arc::clone(task),
-            buffer: self.buffer.clone(),
-        }
+    /// Returns the buffer that receives the trace of the run.
+    pub(super) fn buffer(&self) -> Option<&TraceBuffer> {
+        self.buffer.as_ref()
     }
 
-    /// Says that the run is over, and writes it for viewers. What goes wrong there is a warning: the
-    /// run has been what it was.
+    /// Marks the run as finished on its page, and writes the files for viewers. Failures are warnings: the run itself
+    /// is complete.
     pub(super) fn close(self) {
         let Some(buffer) = self.buffer else { return };
         buffer.close();

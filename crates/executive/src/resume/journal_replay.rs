@@ -1,4 +1,4 @@
-//! What stands in the journal of a run, played again.
+//! Replay of a journal: recorder, planner and watcher of a resumed run.
 
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
@@ -12,40 +12,39 @@ use elbowroom::execution::{Entry, Planner, PlannerAnswer, Recorder};
 use elbowroom::model::{Situation, Task};
 use elbowroom::report::trace::{Line, ReplayPlanner, Stored};
 
-use crate::stopwatch::Stopwatch;
-use elbowroom_executive::journaling::{JournalHealth, JournalWriter};
+use crate::journaling::{JournalHealth, JournalWriter};
 
-/// What stands in the journal, and how much of it has been played.
-pub(super) struct Past {
+/// Lines of a journal, and the progress of their replay.
+pub(super) struct JournalReplay {
     lines: Vec<Line>,
-    /// The number of the first of them in the file.
+    /// Line number of the first one in the file.
     first: usize,
     played: AtomicUsize,
-    /// The first line that came out otherwise; 0 if none has.
+    /// First line that deviates; 0 if there is none.
     difference: AtomicUsize,
     is_to_end: AtomicBool,
 }
 
-impl Past {
+impl JournalReplay {
     pub(super) fn new(stored: &Stored) -> Self {
-        let past = Self {
+        let replay = Self {
             lines: stored.lines.clone(),
             first: stored.first_number(),
             played: AtomicUsize::new(0),
             difference: AtomicUsize::new(0),
             is_to_end: AtomicBool::new(false),
         };
-        past.look_ahead(0);
-        past
+        replay.look_ahead(0);
+        replay
     }
 
-    /// The run was asked to end where its journal says so.
+    /// Ends the run where its journal contains an interruption.
     fn look_ahead(&self, next: usize) {
         let is_to_end = matches!(self.lines.get(next), Some(Line::Interrupted(_)));
         self.is_to_end.store(is_to_end, Ordering::SeqCst);
     }
 
-    /// Takes note of an entry; whether it is a new one.
+    /// Compares an entry with the journal. Returns `true` for a new entry after its end.
     fn play(&self, line: &Line) -> bool {
         let index = self.played.fetch_add(1, Ordering::SeqCst);
         let Some(stored) = self.lines.get(index) else {
@@ -58,31 +57,32 @@ impl Past {
         false
     }
 
-    /// Whether the last entry stands in the journal: what it tells the world, the world was told,
-    /// or may have been.
+    /// Returns `true` if the last entry is in the journal: the world has, or may have, received its command.
     pub(super) fn has_last(&self) -> bool {
         self.played.load(Ordering::SeqCst) <= self.lines.len()
     }
 
+    /// Returns `true` after the last line.
     pub(super) fn is_over(&self) -> bool {
         self.played.load(Ordering::SeqCst) >= self.lines.len()
     }
 
+    /// Returns the number of the first line that deviates.
     pub(super) fn difference(&self) -> Option<usize> {
         Some(self.difference.load(Ordering::SeqCst)).filter(|line| *line > 0)
     }
 }
 
-/// Compares what is in the journal, and writes what is not.
-pub(super) struct PastRecorder<'a> {
-    pub(super) past: Arc<Past>,
+/// Recorder that compares entries with the journal and writes new ones.
+pub(super) struct ReplayRecorder<'a> {
+    pub(super) replay: Arc<JournalReplay>,
     pub(super) task: Arc<Task>,
     pub(super) writer: JournalWriter<'a>,
 }
 
-impl Recorder for PastRecorder<'_> {
+impl Recorder for ReplayRecorder<'_> {
     fn record(&mut self, entry: &Entry<'_>) {
-        if self.past.play(&Line::of(&self.task, entry)) {
+        if self.replay.play(&Line::of(&self.task, entry)) {
             self.writer.record(entry);
         }
     }
@@ -92,33 +92,33 @@ impl Recorder for PastRecorder<'_> {
     }
 
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
-        // What the journal has is only played again until then.
-        self.past.is_over() && self.past.difference().is_none() && self.writer.begin_anew(stand)
+        // Only new entries can be replaced.
+        self.replay.is_over() && self.replay.difference().is_none() && self.writer.begin_anew(stand)
     }
 }
 
-/// Makes the plans that were made, and then new ones. One that was in the making when the journal ends
-/// is made anew.
-pub(super) struct PastPlanner<'a> {
-    /// For each plan that the journal says is made, in order: whether it has the answer.
+/// Planner that returns the plans of the journal, then new ones. A plan that was in progress at the end of the journal is
+/// made again.
+pub(super) struct ResumedPlanner<'a> {
+    /// For each request for a plan in the journal, in order: `true` if it has the answer.
     asked: VecDeque<bool>,
-    past: ReplayPlanner,
-    present: Box<dyn Planner + 'a>,
-    /// Whose plan is made beside the run.
-    begun: Begun,
+    journal: ReplayPlanner,
+    planner: Box<dyn Planner + 'a>,
+    /// Source of the plan that is made in the background.
+    begun: Source,
 }
 
-/// Whose plan is made beside the run.
+/// Source of a plan.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Begun {
-    /// One of the journal.
-    Past,
-    /// A new one.
-    Present,
+enum Source {
+    /// The journal.
+    Journal,
+    /// The planner.
+    Planner,
 }
 
-impl<'a> PastPlanner<'a> {
-    pub(super) fn new(stored: &Stored, present: Box<dyn Planner + 'a>) -> Self {
+impl<'a> ResumedPlanner<'a> {
+    pub(super) fn new(stored: &Stored, planner: Box<dyn Planner + 'a>) -> Self {
         let mut asked = VecDeque::new();
         for line in &stored.lines {
             match line {
@@ -133,54 +133,54 @@ impl<'a> PastPlanner<'a> {
         }
         Self {
             asked,
-            past: ReplayPlanner::new(stored),
-            present,
-            begun: Begun::Past,
+            journal: ReplayPlanner::new(stored),
+            planner,
+            begun: Source::Journal,
         }
     }
 
-    /// Who makes the next plan; `None` for one that the journal says is begun, and was given up.
-    fn next(&mut self) -> Option<Begun> {
+    /// Returns the source of the next plan, or `None` for a plan that was begun and abandoned in the journal.
+    fn next(&mut self) -> Option<Source> {
         match self.asked.pop_front() {
-            Some(true) => Some(Begun::Past),
+            Some(true) => Some(Source::Journal),
             Some(false) if !self.asked.is_empty() => None,
-            _ => Some(Begun::Present),
+            _ => Some(Source::Planner),
         }
     }
 }
 
-impl Planner for PastPlanner<'_> {
+impl Planner for ResumedPlanner<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         match self.next() {
-            Some(Begun::Past) => self.past.plan(task, situation),
-            _ => self.present.plan(task, situation),
+            Some(Source::Journal) => self.journal.plan(task, situation),
+            _ => self.planner.plan(task, situation),
         }
     }
 
     fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
-        self.begun = self.next().unwrap_or(Begun::Past);
+        self.begun = self.next().unwrap_or(Source::Journal);
         match self.begun {
-            Begun::Past => self.past.begin(task, situation),
-            Begun::Present => self.present.begin(task, situation),
+            Source::Journal => self.journal.begin(task, situation),
+            Source::Planner => self.planner.begin(task, situation),
         }
     }
 
     fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         match self.begun {
-            Begun::Past => self.past.collect(task, situation),
-            Begun::Present => self.present.collect(task, situation),
+            Source::Journal => self.journal.collect(task, situation),
+            Source::Planner => self.planner.collect(task, situation),
         }
     }
 
     fn give_up(&mut self) {
-        if self.begun == Begun::Present {
-            self.present.give_up();
+        if self.begun == Source::Planner {
+            self.planner.give_up();
         }
     }
 
     fn expect(&mut self, task: &Task, situation: &Situation) {
         if self.asked.is_empty() {
-            self.present.expect(task, situation);
+            self.planner.expect(task, situation);
         }
     }
 
@@ -189,23 +189,24 @@ impl Planner for PastPlanner<'_> {
     }
 }
 
-/// Ends the run where it was asked to end, and when it is asked to now, or cannot be written down.
-pub(super) struct Watch {
-    pub(super) inner: Stopwatch,
-    pub(super) past: Arc<Past>,
+/// Watcher that ends the run at an interruption in the journal, after a failure of the journal, and after its end as the
+/// inner watcher requests.
+pub(super) struct ReplayWatcher<'w> {
+    pub(super) inner: &'w mut (dyn Watcher + Send),
+    pub(super) replay: Arc<JournalReplay>,
     pub(super) health: JournalHealth,
 }
 
-impl Watcher for Watch {
+impl Watcher for ReplayWatcher<'_> {
     fn elapsed(&mut self) -> Duration {
         self.inner.elapsed()
     }
 
     fn flow(&mut self) -> ControlFlow<Halt> {
-        let is_to_end = self.past.is_to_end.load(Ordering::SeqCst) || self.health.has_failed();
+        let is_to_end = self.replay.is_to_end.load(Ordering::SeqCst) || self.health.has_failed();
         match () {
             () if is_to_end => ControlFlow::Break(Halt::Cancelled),
-            () if self.past.is_over() => self.inner.flow(),
+            () if self.replay.is_over() => self.inner.flow(),
             () => ControlFlow::Continue(()),
         }
     }

@@ -1,13 +1,13 @@
-//! Time that has passed since the last record of a journal.
+//! Time since the last record of a journal.
 
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, SnapshotLine, Stored};
 
-use elbowroom_executive::journal::{Journal, Reading, WallTime};
+use crate::journal::{Journal, Reading, WallTime};
 
-/// The readings of a world's clock in a journal, and of the wall clock beside it.
+/// Readings of the world's clock and of the wall clock in a journal.
 pub(super) struct Elapsed {
-    /// The first one and the last one, if records have a wall-clock time.
+    /// First and last reading, if records have a wall-clock time.
     readings: Option<(Reading, Reading)>,
 }
 
@@ -38,7 +38,7 @@ impl Elapsed {
     /// Returns the world's time from the last record until `now`.
     ///
     /// # Errors
-    /// In words, why it is not known.
+    /// When the time is unknown; the error is the reason.
     pub(super) fn until(&self, now: WallTime) -> Result<Rational, &'static str> {
         let Some((first, last)) = &self.readings else {
             return Err("its records have no wall-clock time");

@@ -1,4 +1,4 @@
-//! What had been started when a run was cut off.
+//! Actions that were running at the end of a journal.
 
 use std::collections::BTreeMap;
 
@@ -8,14 +8,15 @@ use elbowroom::report::trace::{Line, SnapshotLine, Stored};
 use elbowroom::report::wire;
 use serde_json::{Value, json};
 
-/// What had been started, and of whose end the journal does not know.
+/// Actions that were started and whose end is not in the journal.
 #[derive(Debug, Default)]
-pub(super) struct UnderWay {
+pub(super) struct RunningActions {
     pub(super) open: BTreeMap<u64, Open>,
-    /// The tickets below this one were given.
+    /// Tickets below this one were issued.
     pub(super) given: u64,
 }
 
+/// Action without an end.
 #[derive(Debug)]
 pub(super) struct Open {
     action: String,
@@ -24,13 +25,13 @@ pub(super) struct Open {
     pub(super) is_cancelled: bool,
 }
 
-/// The tickets of what was under way where the journal begins.
+/// Returns the tickets of the actions that were running at the snapshot.
 pub(super) fn open(before: Option<&SnapshotLine>) -> impl Iterator<Item = u64> {
     let starts = before.into_iter().flat_map(|it| &it.starts);
     starts.filter(|it| it.is_open()).map(|it| it.ticket)
 }
 
-impl UnderWay {
+impl RunningActions {
     pub(super) fn of(stored: &Stored, before: Option<&SnapshotLine>) -> Self {
         let starts = before.iter().flat_map(|it| &it.starts);
         let open = starts.filter(|it| it.is_open()).map(|it| {
@@ -42,19 +43,19 @@ impl UnderWay {
             };
             (it.ticket, open)
         });
-        let mut under_way = Self {
+        let mut running = Self {
             given: before.map_or(0, |it| it.started as u64),
             open: open.collect(),
         };
         for line in &stored.lines {
             match line {
-                Line::Command(line) => under_way.note(&line.command),
-                Line::Passed(line) => line.observations.iter().for_each(|it| under_way.hear(it)),
-                Line::Looked(line) => line.observations.iter().for_each(|it| under_way.hear(it)),
+                Line::Command(line) => running.note(&line.command),
+                Line::Passed(line) => line.observations.iter().for_each(|it| running.observe(it)),
+                Line::Looked(line) => line.observations.iter().for_each(|it| running.observe(it)),
                 _ => {}
             }
         }
-        under_way
+        running
     }
 
     fn note(&mut self, command: &GivenLine) {
@@ -81,7 +82,7 @@ impl UnderWay {
         }
     }
 
-    fn hear(&mut self, observation: &ObservationLine) {
+    fn observe(&mut self, observation: &ObservationLine) {
         match observation {
             ObservationLine::Started { ticket, .. } => match self.open.get_mut(ticket) {
                 Some(open) if open.is_instantaneous => {
@@ -97,8 +98,8 @@ impl UnderWay {
         }
     }
 
-    /// What the world is told about them.
-    pub(super) fn told(&self, now: &Rational) -> Value {
+    /// Returns the message about these actions for the world.
+    pub(super) fn message(&self, now: &Rational) -> Value {
         let open = self.open.iter().map(|(ticket, open)| {
             json!({ "ticket": ticket, "action": open.action, "started": open.has_started })
         });
