@@ -1,6 +1,9 @@
 //! Persistent execution of temporal plans: everything that an executive needs beside the state machine
 //! of `elbowroom::execution`.
 //!
+//! [`Executive`] is the entry point for programs that embed an executive: it accepts goals, executes plans for them, and
+//! resumes its run after a crash. The parts below are for programs that assemble a run themselves.
+//!
 //! - [`journal`], [`journaling`]: append-only record of a run that survives a crash (`docs/formats/journal.md`), and
 //!   the recorder and world decorator that write it ahead of each command.
 //! - [`request_queue`], [`operator`]: bounded queue of operators' requests, and the world decorator that adds them to
@@ -23,6 +26,7 @@ pub mod belief_updates;
 pub mod clock;
 pub mod completion_signal;
 mod error;
+mod executive;
 pub mod http;
 pub mod journal;
 pub mod journaling;
@@ -38,3 +42,4 @@ pub mod trace_buffer;
 pub mod world_protocol;
 
 pub use error::{Error, WarningSink};
+pub use executive::{Executive, ExecutiveSettings, make_persistent};

@@ -13,6 +13,7 @@ use elbowroom::execution::{Entry, Planner, Progression, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, TraceWriter};
+use elbowroom::text::Diagnostics;
 
 use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
 use crate::background_preparer::BackgroundPreparer;
@@ -64,6 +65,8 @@ pub trait RunHost {
 /// Run without an outcome.
 #[derive(Debug)]
 pub enum RunError {
+    /// The domain or the problem is invalid.
+    Problem(Diagnostics),
     /// The specification is contradictory.
     Spec(SpecError),
     /// The run cannot be started or recorded.
@@ -73,6 +76,10 @@ pub enum RunError {
 impl fmt::Display for RunError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Problem(mistakes) => match mistakes.errors().next() {
+                Some(first) => first.fmt(f),
+                None => f.write_str("the problem is invalid"),
+            },
             Self::Spec(error) => error.fmt(f),
             Self::Failed(error) => error.fmt(f),
         }

@@ -232,6 +232,7 @@ fn limits(arguments: &RunArgs) -> ProcessLimits {
 /// Returns the failure of a run without an outcome.
 fn failure(error: RunError) -> Failure {
     match error {
+        RunError::Problem(mistakes) => mistakes.into(),
         RunError::Spec(error) => contradiction(error),
         RunError::Failed(error) => error.into(),
     }

@@ -17,12 +17,12 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
-use elbowroom_executive::Error;
 use elbowroom_executive::api::{self, ApiError, ApiRouter, Client};
 use elbowroom_executive::clock::Clock;
 use elbowroom_executive::http::AccessControl;
 use elbowroom_executive::journal::Segments;
 use elbowroom_executive::operator::OperatorInterface;
+use elbowroom_executive::{Error, make_persistent};
 
 /// The length of a journal from which on it is begun anew, in bytes.
 const LONG: u64 = 10_000_000;
@@ -173,19 +173,7 @@ fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) -> Result<(), Failure> {
             spec.planning_time = elbowroom::execution::run::PlanningTime::Measured;
         }
     }
-    let knows_one_goal = spec.executor.registered.name == "lookahead";
-    if knows_one_goal || spec.executor.asks_odds() {
-        return Err(Failure::new(
-            format!(
-                "`{}` reckons with one goal, and goals change here",
-                spec.executor
-            ),
-            "choose another executor, such as guarded or live",
-        ));
-    }
-    spec.plans_aside = spec.can_plan_aside();
-    spec.readies_aside = spec.plans_aside;
-    Ok(())
+    Ok(make_persistent(spec)?)
 }
 
 /// A domain that no problem could be executed of is refused before anybody is asked for one. Whatever

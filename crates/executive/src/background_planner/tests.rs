@@ -22,7 +22,7 @@ impl Planner for Asked<'_> {
 }
 
 /// The case `delivery`.
-pub fn delivery() -> (RunSpec, Task) {
+pub(crate) fn delivery() -> (RunSpec, Task) {
     let text = |name: &str| {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/delivery");
         NamedText {
