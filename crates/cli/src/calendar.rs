@@ -7,11 +7,11 @@ use elbowroom::text::{Diagnostic, Source};
 use elbowroom_calendar::{Calendar, Origin};
 
 use crate::args::CalendarArgs;
-use crate::clock::{self, Clock};
 use crate::exit::Failure;
 use crate::file;
 use crate::look::{HINT, styled};
 use crate::output::{self, Output};
+use elbowroom_executive::clock::{self, Clock};
 
 /// A problem with the timed initials of a calendar.
 pub(crate) struct TimedProblem {

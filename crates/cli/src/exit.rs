@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 use elbowroom::text::{Diagnostics, Record};
 use serde::Serialize;
 
-use crate::words::counted;
+use elbowroom_executive::messages::counted;
 
 /// The meaning of an exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,6 +113,12 @@ impl Failure {
             version: 1,
             failure: self,
         }
+    }
+}
+
+impl From<elbowroom_executive::Error> for Failure {
+    fn from(error: elbowroom_executive::Error) -> Self {
+        Self::new(error.message(), error.advice())
     }
 }
 

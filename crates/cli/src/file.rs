@@ -8,7 +8,7 @@ use elbowroom::text::Source;
 
 use crate::exit::Failure;
 use crate::output;
-use crate::words::plain;
+use elbowroom_executive::messages::plain;
 
 /// Larger than any plan or problem, smaller than memory.
 const LARGEST_FILE: u64 = 256 << 20;

@@ -16,9 +16,9 @@ pub(crate) use elbowroom::AnyPlan;
 use crate::args::ProblemArgs;
 use crate::calendar::timed_problem;
 use crate::exit::Failure;
-use crate::journal::Journal;
 use crate::look::{HINT, styled};
 use crate::output::{self, Output};
+use elbowroom_executive::journal::Journal;
 
 /// Reads domain and problem. Warnings go to standard error.
 pub(crate) fn task(
@@ -118,12 +118,12 @@ pub(crate) fn tell_about_repairs() {
 /// Reads a trace, or another record of `what`. Of a journal, its lines without their checksums.
 pub(crate) fn record(path: &Path, what: &str) -> Result<Source, Failure> {
     let text = source(path, what)?;
-    if !crate::journal::is_journal(text.text()) {
+    if !elbowroom_executive::journal::is_journal(text.text()) {
         return Ok(text);
     }
     let journal = Journal::read(text.text()).map_err(|why| {
         let message = format!("the journal {}: {why}", path.display());
-        Failure::new(message, crate::journal::DAMAGED)
+        Failure::new(message, elbowroom_executive::journal::DAMAGE_ADVICE)
     })?;
     Ok(Source::new(text.name(), journal.text))
 }

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use elbowroom::num::work::Stop;
 
-use crate::clock::Clock;
 use crate::exit::Exit;
+use elbowroom_executive::clock::Clock;
 
 /// A second signal within this time of the first is the same request: `timeout` sends two, to the program and to its
 /// group.
@@ -53,6 +53,11 @@ impl Interrupt {
     pub(crate) fn listen_with_world() -> Self {
         HAS_WORLD.store(true, Ordering::SeqCst);
         Self::listen()
+    }
+
+    /// Returns the stop request that the first Ctrl-C makes.
+    pub(crate) fn stop(&self) -> &Stop {
+        &self.0
     }
 
     /// Asks to stop, as the first Ctrl-C does.

@@ -5,32 +5,21 @@
 //! compute is computed in the library.
 
 mod args;
-mod attendance;
-mod bell;
-mod board;
 mod bug;
 mod calendar;
-mod clock;
 mod commands;
-mod conversation;
-mod desk;
 mod exit;
 mod file;
-mod http;
 mod in_time;
 mod input;
 mod interrupt;
-mod journal;
 mod limits;
 mod look;
-mod memory;
 mod number;
 mod output;
 mod progress;
-mod serve;
 mod stopwatch;
 mod table;
-mod words;
 mod wrap;
 
 use std::ffi::OsString;

@@ -8,7 +8,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::exit::Failure;
-use crate::words::plain;
+use elbowroom_executive::WarningSink;
+use elbowroom_executive::messages::plain;
 
 /// Writes text to standard output. Escape sequences are dropped where colours are not wanted.
 ///
@@ -124,4 +125,9 @@ fn survive(result: io::Result<()>, target: &str) -> Result<(), Failure> {
         )),
         _ => Ok(()),
     }
+}
+
+/// Returns the receiver of an executive's warnings, which writes them to standard error.
+pub(crate) fn warnings() -> WarningSink {
+    WarningSink::new(warn)
 }

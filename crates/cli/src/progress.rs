@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::clock::Clock;
 use crate::output;
+use elbowroom_executive::clock::Clock;
 
 /// Searches that end sooner than this show no line at all.
 const PATIENCE: Duration = Duration::from_millis(200);

@@ -6,10 +6,10 @@ use std::time::Duration;
 use elbowroom::answers::{Event, Halt, Watcher};
 use elbowroom::num::Rational;
 
-use crate::clock::Clock;
 use crate::interrupt::Interrupt;
 use crate::look::{BAD, styled};
 use crate::output;
+use elbowroom_executive::clock::Clock;
 
 /// A clock since the start, with the reasons for which a computation ends early.
 #[derive(Clone)]

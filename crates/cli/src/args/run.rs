@@ -14,7 +14,7 @@ use super::envelope::{BoxMethod, Guarantee, Objective, controllable};
 use super::number::{count, factor, positive, positive_or_zero, timeout, whole};
 use super::plan::EMBEDDED;
 use crate::exit::Failure;
-use crate::serve::Address;
+use elbowroom_executive::http::Address;
 
 #[derive(Args, Debug)]
 #[command(after_long_help = executors_help())]

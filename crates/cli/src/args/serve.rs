@@ -7,8 +7,8 @@ use elbowroom::num::Rational;
 
 use super::CalendarArgs;
 use super::run::RunArgs;
-use crate::http::Target;
-use crate::serve::Address;
+use elbowroom_executive::http::Address;
+use elbowroom_executive::http::Target;
 
 /// The port of an executive where none is chosen.
 const PORT: &str = "7316";

@@ -17,8 +17,8 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
 use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
 use crate::output::Output;
-use crate::words::counted;
 use crate::{input, number, output};
+use elbowroom_executive::messages::counted;
 
 /// The advice for who gives a network.
 const FOR_NETWORKS: &str = "`elbowroom envelope` says whether all of them work; `check` judges a plan with \

@@ -19,8 +19,8 @@ use crate::look::{BAD, Look, styled};
 use crate::output::Output;
 use crate::progress::Progress;
 use crate::stopwatch::Stopwatch;
-use crate::words::plain;
 use crate::{input, output};
+use elbowroom_executive::messages::plain;
 
 /// Where traces of failed trials go, beside the results.
 pub(crate) const FAILURES: &str = "failures";

@@ -15,32 +15,31 @@ use serde_json::Value;
 
 use crate::args::{CtlArgs, CtlCommand};
 use crate::exit::{Answer, Exit, Failure};
-use crate::http::{self, ask};
-use crate::interrupt::Interrupt;
 use crate::look::{Look, STRONG, styled};
 use crate::number::nearest;
 use crate::output::{self, Output};
-use crate::serve::Control;
-use crate::words::{counted, plain, tame};
 use crate::wrap::wrapped;
+use elbowroom::num::work::Stop;
+use elbowroom_executive::http::{self, AccessControl};
+use elbowroom_executive::messages::{counted, escape_control, plain};
 
 /// Asks, and prints the answer.
 pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
-    let desk = Desk { arguments };
+    let queue = RequestQueue { arguments };
     match &arguments.what {
-        CtlCommand::State => desk.show(output, "/v1/state", state),
-        CtlCommand::Plan => desk.show(output, "/v1/plan", plan),
-        CtlCommand::Guarantee => desk.show(output, "/v1/guarantee", guarantee),
-        CtlCommand::Next => desk.show(output, "/v1/next", next),
-        CtlCommand::Events { after } => desk.events(*after),
+        CtlCommand::State => queue.show(output, "/v1/state", state),
+        CtlCommand::Plan => queue.show(output, "/v1/plan", plan),
+        CtlCommand::Guarantee => queue.show(output, "/v1/guarantee", guarantee),
+        CtlCommand::Next => queue.show(output, "/v1/next", next),
+        CtlCommand::Events { after } => queue.events(*after),
         CtlCommand::Openapi => {
-            let (document, _) = desk.ask::<Value>(("GET", "/v1/openapi.json"), None)?;
+            let (document, _) = queue.ask::<Value>(("GET", "/v1/openapi.json"), None)?;
             output.json(&document)?;
             Ok(Exit::Yes)
         }
         CtlCommand::Goal { goal, name } => {
             let (goal, name) = (goal.clone(), name.clone());
-            desk.change(output, ("POST", "/v1/goals"), Some(&NewGoal { name, goal }))
+            queue.change(output, ("POST", "/v1/goals"), Some(&NewGoal { name, goal }))
         }
         CtlCommand::Cancel { name } => {
             let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
@@ -50,11 +49,11 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
                     "`elbowroom ctl state` lists the goals with their names",
                 ));
             }
-            desk.change(output, ("DELETE", &format!("/v1/goals/{name}")), NOTHING)
+            queue.change(output, ("DELETE", &format!("/v1/goals/{name}")), NOTHING)
         }
         CtlCommand::Fact { fact, becomes } => {
             let (fact, becomes) = (fact.clone(), *becomes);
-            desk.change(
+            queue.change(
                 output,
                 ("POST", "/v1/facts"),
                 Some(&NewFact { fact, becomes }),
@@ -62,7 +61,7 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
         }
         CtlCommand::Number { fluent, value } => {
             let (fluent, value) = (fluent.clone(), GivenNumber(value.clone()));
-            desk.change(
+            queue.change(
                 output,
                 ("POST", "/v1/numbers"),
                 Some(&NewNumber { fluent, value }),
@@ -70,15 +69,15 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
         }
         CtlCommand::Problem { file } => {
             let problem = crate::input::source(file, "problem")?.text().to_owned();
-            desk.change(
+            queue.change(
                 output,
                 ("PUT", "/v1/problem"),
                 Some(&NewProblem { problem }),
             )
         }
-        CtlCommand::Pause => desk.change(output, ("POST", "/v1/pause"), NOTHING),
-        CtlCommand::Resume => desk.change(output, ("POST", "/v1/resume"), NOTHING),
-        CtlCommand::Stop => desk.change(output, ("POST", "/v1/stop"), NOTHING),
+        CtlCommand::Pause => queue.change(output, ("POST", "/v1/pause"), NOTHING),
+        CtlCommand::Resume => queue.change(output, ("POST", "/v1/resume"), NOTHING),
+        CtlCommand::Stop => queue.change(output, ("POST", "/v1/stop"), NOTHING),
     }
 }
 
@@ -86,11 +85,11 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
 const NOTHING: Option<&NewFact> = None;
 
 /// Where an executive is asked.
-struct Desk<'a> {
+struct RequestQueue<'a> {
     arguments: &'a CtlArgs,
 }
 
-impl Desk<'_> {
+impl RequestQueue<'_> {
     fn unreachable(&self, error: &io::Error) -> Failure {
         if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) {
             return Failure::new(
@@ -111,13 +110,13 @@ impl Desk<'_> {
         )
     }
 
-    fn asked(&self, what: (&str, &str), body: Option<&str>) -> Result<http::Answer, Failure> {
+    fn asked(&self, what: (&str, &str), body: Option<&str>) -> Result<http::Response, Failure> {
         let control = match &self.arguments.token {
-            Some(path) => Some(Control::read(path, Interrupt::default())?),
+            Some(path) => Some(AccessControl::read(path, Stop::default())?),
             None => None,
         };
-        let token = control.as_ref().map(Control::token);
-        let answer = ask(&self.arguments.to, what, token, body);
+        let token = control.as_ref().map(AccessControl::token);
+        let answer = http::send(&self.arguments.to, what, token, body);
         answer.map_err(|error| self.unreachable(&error))
     }
 
@@ -142,7 +141,10 @@ impl Desk<'_> {
     /// Why the executive does not do what it is asked, in its own words.
     fn refused(&self, status: u16, text: &str) -> Failure {
         match serde_json::from_str::<Refusal>(text) {
-            Ok(refusal) => Failure::new(tame(&refusal.error), tame(&refusal.help)),
+            Ok(refusal) => Failure::new(
+                escape_control(&refusal.error),
+                escape_control(&refusal.help),
+            ),
             Err(_) => self.unlike(&format!("it answers with status {status}")),
         }
     }
@@ -152,7 +154,7 @@ impl Desk<'_> {
             format!(
                 "what answers at {} is no executive: {}",
                 self.arguments.to,
-                tame(why)
+                escape_control(why)
             ),
             "`elbowroom serve` says where it listens; --to names another address",
         )
@@ -190,7 +192,10 @@ impl Desk<'_> {
             format!("{name}done\n")
         } else {
             let until = taken.until.as_deref().unwrap_or("it can be");
-            format!("{name}not yet taken in, but as soon as {}\n", tame(until))
+            format!(
+                "{name}not yet taken in, but as soon as {}\n",
+                escape_control(until)
+            )
         })?;
         Ok(Exit::Yes)
     }
@@ -234,7 +239,7 @@ fn state(state: &State) -> String {
         state.plans
     );
     if let Some(why) = &state.why {
-        let _ = write!(text, ": {}", tame(why));
+        let _ = write!(text, ": {}", escape_control(why));
     }
     text.push('\n');
     if let Some(seconds) = state.unanswered {
@@ -244,7 +249,12 @@ fn state(state: &State) -> String {
         let _ = writeln!(text, "{}", wrapped(&why, Look::of_stdout().width, 2));
     }
     for goal in &state.goals {
-        let _ = writeln!(text, "  goal {}: {}", tame(&goal.name), tame(&goal.goal));
+        let _ = writeln!(
+            text,
+            "  goal {}: {}",
+            escape_control(&goal.name),
+            escape_control(&goal.goal)
+        );
     }
     for running in &state.running {
         let _ = write!(
@@ -268,13 +278,16 @@ fn state(state: &State) -> String {
             );
         }
         if let Some(note) = &running.note {
-            let _ = write!(text, ": {}", tame(note));
+            let _ = write!(text, ": {}", escape_control(note));
         }
         text.push('\n');
     }
     for doubt in &state.in_doubt {
-        let (name, since) = (tame(&doubt.name), nearest(&doubt.since.0));
-        let line = format!("{name} is in doubt since {since}: {}", tame(&doubt.why));
+        let (name, since) = (escape_control(&doubt.name), nearest(&doubt.since.0));
+        let line = format!(
+            "{name} is in doubt since {since}: {}",
+            escape_control(&doubt.why)
+        );
         let _ = writeln!(text, "{}", wrapped(&line, Look::of_stdout().width, 2));
     }
     let _ = writeln!(text, "  {}", counted(state.facts.len(), "fact"));
@@ -329,7 +342,7 @@ fn guarantee(guarantee: &GuaranteeNow) -> String {
     }
     text.push('\n');
     if let Some(deviation) = &guarantee.deviation {
-        let _ = writeln!(text, "  last deviation: {}", tame(deviation));
+        let _ = writeln!(text, "  last deviation: {}", escape_control(deviation));
     }
     if let Some(condition) = condition {
         let before = match guarantee.timeout.as_str() {
@@ -364,7 +377,7 @@ fn next(next: &NextNow) -> String {
         let _ = write!(text, " until {}", nearest(&until.0));
     }
     if let Some(why) = &next.why {
-        let _ = write!(text, ": {}", tame(why));
+        let _ = write!(text, ": {}", escape_control(why));
     }
     text.push('\n');
     if let Some(own) = &next.step {

@@ -19,7 +19,7 @@ use crate::input;
 use crate::limits::{push_paragraph, push_wrapped};
 use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
-use crate::words::counted;
+use elbowroom_executive::messages::counted;
 
 /// Reads the logs, and says what they tell.
 pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {

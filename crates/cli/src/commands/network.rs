@@ -15,7 +15,7 @@ use crate::input;
 use crate::limits::push_wrapped;
 use crate::look::{BAD, FAINT, GOOD, HINT, Look, STRONG, styled};
 use crate::output::{self, Output};
-use crate::words::counted;
+use elbowroom_executive::messages::counted;
 
 /// Bounds of a reason that people get to see; `--json` has all.
 const STEPS_SHOWN: usize = 12;

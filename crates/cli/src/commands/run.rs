@@ -1,57 +1,49 @@
 //! `elbowroom run`: execute a plan in a world.
 
-mod ahead;
-mod believed;
-mod journaled;
-pub(super) mod live;
-pub(super) mod process;
-mod readied;
-mod realtime;
+mod progress_line;
 mod replay;
 pub(super) mod resume;
-mod shown;
 pub(super) mod spec;
 mod text;
 pub(super) mod trace_file;
+mod viewers;
 
-use std::ops::ControlFlow;
+use std::cell::OnceCell;
 use std::sync::Arc;
-use std::time::Duration;
 
 use elbowroom::RoundingRule;
-use elbowroom::answers::run::{RunOutcome, run as execute};
-use elbowroom::answers::{Event, Halt, RunRequest, Watcher};
+use elbowroom::answers::run::RunOutcome;
 use elbowroom::execute::{NamedText, RunSpec, SpecError, check_vary};
 use elbowroom::execution::run::{MissingPlan, Verdict};
-use elbowroom::execution::{Planner, Progression, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
-use elbowroom::report::trace;
 use elbowroom::sim::WorldModel;
 use elbowroom::text::Source;
+use elbowroom_executive::Error;
+use elbowroom_executive::background_planner::BackgroundSettings;
+use elbowroom_executive::clock::Clock;
+use elbowroom_executive::completion_signal::CompletionSignal;
+use elbowroom_executive::journal::{JournalFile, Segments};
+use elbowroom_executive::messages::escape_control;
+use elbowroom_executive::operator::OperatorInterface;
+use elbowroom_executive::process_world::{ProcessLimits, check_program};
+use elbowroom_executive::request_queue::RequestQueue;
+use elbowroom_executive::run::{JournaledOutcome, RunError, RunHost, RunInputs};
+use elbowroom_executive::trace_buffer::TraceBuffer;
 
 use crate::args::RunArgs;
-use crate::attendance::{Attendance, Attended};
-use crate::bell::Bell;
 use crate::calendar::dated;
-use crate::clock::Clock;
-use crate::desk::Desk;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::journal::JournalFile;
 use crate::look::{BAD, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
-use crate::words::tame;
-use ahead::{Ahead, Aside};
-use believed::Believed;
-use journaled::{Careful, JournalWriter, Kept};
-use readied::Readied;
-use realtime::{Pace, PacedPlanner, Realtime};
-use shown::Views;
+use progress_line::ProgressLine;
+use resume::ResumeHost;
 use spec::contradiction;
 use trace_file::TraceFile;
+use viewers::Viewers;
 
 /// Executes a plan, or plays a stored run back.
 pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
@@ -59,7 +51,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         return replay::run(path, arguments.json, output);
     }
     if let Some(path) = &arguments.resume {
-        return resume::run(path, arguments, &resume::Alone(arguments), output);
+        return resume::run(path, arguments, &resume::StandaloneHost(arguments), output);
     }
     let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) else {
         return Err(Failure::new(
@@ -81,54 +73,56 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let (mut spec, world) = spec::of(arguments, domain, problem)?;
     spec.is_attended = arguments.control.is_some();
     let (task, first) = checked(arguments, &spec, world.as_ref(), output)?;
-    let attendance = attendance(arguments);
+    let operator = operator(arguments);
     let interrupt = Interrupt::listen_with_world();
     let job = Job {
         journal: journal(arguments, RESUME)?,
-        begun: &|| (),
+        started: &|| (),
         since,
-        aside: aside(arguments, &interrupt),
         spec: &spec,
         task: &task,
         first,
         interrupt: &interrupt,
-        attendance: &attendance,
+        operator: &operator,
     };
     job.execute(arguments, output)
 }
 
-/// What goes on with the journal of a run that ends with its goal.
+/// Command that resumes a run that ends with its goal.
 pub(super) const RESUME: &str = "elbowroom run --resume";
 
-/// What goes on with the journal of an executive.
+/// Command that resumes an executive.
 pub(super) const RESUME_SERVE: &str = "elbowroom serve --resume";
 
-/// The journal that is asked for, which is empty yet. That there is no such program as its world is told
-/// before.
+/// Creates the journal of the arguments, if there is one.
+///
+/// # Errors
+/// When the world process does not exist, or the file cannot be created.
 pub(super) fn journal(arguments: &RunArgs, resume: &str) -> Result<Option<JournalFile>, Failure> {
     let Some(command) = &arguments.world_process else {
         return Ok(None);
     };
-    process::look_for(command)?;
+    check_program(command)?;
     let path = arguments.journal.as_deref();
     path.map(|path| JournalFile::create(path, resume))
         .transpose()
+        .map_err(Failure::from)
 }
 
-/// How plans are made in threads of their own.
-pub(super) fn aside(arguments: &RunArgs, interrupt: &Interrupt) -> Aside {
-    Aside {
-        interrupt: interrupt.clone(),
-        bell: Bell::default(),
+/// Returns the settings of background planning.
+pub(super) fn background(arguments: &RunArgs, interrupt: &Interrupt) -> BackgroundSettings {
+    BackgroundSettings {
+        stop: interrupt.stop().clone(),
+        signal: CompletionSignal::default(),
         most_memory: arguments.planner_memory.map(|megabytes| megabytes << 20),
     }
 }
 
-/// Those who may ask something of a run on its page, if anybody may.
-pub(super) fn attendance(arguments: &RunArgs) -> Attendance {
+/// Returns the channels for requests from the page of a run.
+pub(super) fn operator(arguments: &RunArgs) -> OperatorInterface {
     match &arguments.control {
-        Some(_) => Attendance::at(Desk::default()),
-        None => Attendance::default(),
+        Some(_) => OperatorInterface::with_queue(RequestQueue::default()),
+        None => OperatorInterface::default(),
     }
 }
 
@@ -188,14 +182,16 @@ fn show(
     }
 }
 
-/// Shows what came of a run with a journal; `trouble` is why that could not be written.
+/// Prints the outcome of a run with a journal.
 pub(super) fn conclude(
     asked: (&RunArgs, &RunSpec),
-    mut outcome: RunOutcome,
-    trouble: Option<String>,
+    JournaledOutcome {
+        mut outcome,
+        journal_failure,
+    }: JournaledOutcome,
     output: &mut Output,
 ) -> Answer {
-    let Some(why) = trouble else {
+    let Some(why) = journal_failure else {
         show(asked, &outcome, false, output)?;
         let journal = asked.0.journal.as_ref().or(asked.0.resume.as_ref());
         return exit(&outcome, journal.map(|path| path.display().to_string()));
@@ -225,14 +221,69 @@ pub(super) fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure>
     Ok(Task::new(problem).with_epsilon(spec.epsilon.clone()))
 }
 
-/// Tells both what the run believes.
-fn both(
-    mut one: impl FnMut(&Progression) + Send,
-    mut other: impl FnMut(&Progression) + Send,
-) -> impl FnMut(&Progression) + Send {
-    move |belief| {
-        one(belief);
-        other(belief);
+/// Returns the limits of a world process.
+fn limits(arguments: &RunArgs) -> ProcessLimits {
+    ProcessLimits {
+        answer_timeout: arguments.answer_within.clone(),
+        is_strict: arguments.strict_world,
+    }
+}
+
+/// Returns the failure of a run without an outcome.
+fn failure(error: RunError) -> Failure {
+    match error {
+        RunError::Problem(mistakes) => mistakes.into(),
+        RunError::Spec(error) => contradiction(error),
+        RunError::Failed(error) => error.into(),
+    }
+}
+
+/// Host of a run on the command line.
+struct CommandHost<'a> {
+    arguments: &'a RunArgs,
+    interrupt: &'a Interrupt,
+    /// The viewers, once they are open.
+    views: OnceCell<Viewers<'a>>,
+    /// Called when execution begins.
+    started: &'a dyn Fn(),
+    /// Support for operators of a resumed run.
+    resume: Option<&'a dyn ResumeHost>,
+}
+
+impl CommandHost<'_> {
+    /// Closes the viewers after a run with an outcome.
+    fn close<T, E>(self, outcome: Result<T, E>) -> Result<T, E> {
+        if let (Ok(_), Some(views)) = (&outcome, self.views.into_inner()) {
+            views.close();
+        }
+        outcome
+    }
+}
+
+impl RunHost for CommandHost<'_> {
+    fn operator(&self, spec: &RunSpec, task: &Arc<Task>) -> Result<OperatorInterface, Error> {
+        match self.resume {
+            Some(host) => host.operator(spec, task, self.interrupt),
+            None => Ok(OperatorInterface::default()),
+        }
+    }
+
+    fn segments(&self) -> Option<Segments> {
+        self.resume.and_then(ResumeHost::segments)
+    }
+
+    fn open_viewers(
+        &self,
+        spec: &RunSpec,
+        task: &Arc<Task>,
+        operator: &OperatorInterface,
+    ) -> Result<Option<TraceBuffer>, Error> {
+        let views = Viewers::open(self.arguments, spec, task, self.interrupt, operator)?;
+        Ok(self.views.get_or_init(|| views).buffer().cloned())
+    }
+
+    fn started(&self) {
+        (self.started)();
     }
 }
 
@@ -242,218 +293,56 @@ pub(super) struct Job<'a> {
     pub(super) task: &'a Arc<Task>,
     pub(super) first: Option<TimeTriggeredPlan>,
     pub(super) interrupt: &'a Interrupt,
-    pub(super) attendance: &'a Attendance,
-    pub(super) aside: Aside,
-    /// Its journal, which is empty, if it is to have one.
+    pub(super) operator: &'a OperatorInterface,
+    /// The journal, which is empty, if the run has one.
     pub(super) journal: Option<JournalFile>,
-    /// Told when the run begins, and its first record is on the disk if there is a journal.
-    pub(super) begun: &'a dyn Fn(),
-    /// Runs from time 0, where that is a date and not the beginning of the run.
+    /// Called when execution begins. The first record is on the disk if there is a journal.
+    pub(super) started: &'a dyn Fn(),
+    /// Runs from time 0, if that is a date; otherwise time 0 is the start of the run.
     pub(super) since: Option<Clock>,
 }
 
 impl Job<'_> {
-    /// The run that the arguments ask for, from its beginning to its exit code.
-    pub(super) fn execute(mut self, arguments: &RunArgs, output: &mut Output) -> Answer {
-        if let (Some(file), Some(command)) = (self.journal.take(), &arguments.world_process) {
-            return self.journaled(file, command, arguments, output);
-        }
-        let (spec, task, interrupt) = (self.spec, self.task, self.interrupt);
-        let mut file = TraceFile::open(arguments.trace.as_deref())?;
-        let views = Views::open(arguments, spec, task, interrupt, self.attendance)?;
-        let outcome = {
-            let mut sink = |line: &str| file.write(line);
-            let mut writer = trace::TraceWriter::new(Arc::clone(task), &mut sink);
-            let written = writer.header(spec);
-            written
-                .map_err(|error| Failure::new(format!("cannot write the trace: {error}"), ""))?;
-            let writer = self.attendance.witnessed(&mut writer, task, false);
-            let mut writer = views.shown(writer, task);
-            let mut writer = live::Live::new(&mut writer);
-            match &arguments.world_process {
-                Some(command) => {
-                    let manners = process::Manners {
-                        patience: arguments.answer_within.clone(),
-                        is_strict: arguments.strict_world,
-                    };
-                    let interrupt = interrupt.clone();
-                    let world = process::ProcessWorld::start(command, task, manners, interrupt)?;
-                    let believed = Believed::default();
-                    let world = world.telling(believed.clone());
-                    let mut world = self.attended(world, &Rational::ONE);
-                    (self.begun)();
-                    let outcome = self.run(&mut world, &mut writer, believed.listener());
-                    world.into_inner().stop();
-                    outcome.map_err(contradiction)?
-                }
-                None => self.simulated(&mut writer).map_err(contradiction)?,
-            }
+    /// Executes the run of the arguments, and returns its exit code.
+    pub(super) fn execute(self, arguments: &RunArgs, output: &mut Output) -> Answer {
+        let (spec, interrupt) = (self.spec, self.interrupt);
+        let mut line = ProgressLine::new();
+        let inputs = RunInputs {
+            spec,
+            task: self.task,
+            first_plan: self.first,
+            operator: self.operator,
+            background: background(arguments, interrupt),
+            limits: limits(arguments),
+            since: self.since,
+            observer: Some(Box::new(move |entry| line.update(entry))),
         };
-        views.close();
+        let host = CommandHost {
+            arguments,
+            interrupt,
+            views: OnceCell::new(),
+            started: self.started,
+            resume: None,
+        };
+        let mut watcher = Stopwatch::start(interrupt);
+        if let Some(file) = self.journal {
+            let outcome = inputs.execute_journaled(file, &host, &mut watcher);
+            let outcome = host.close(outcome).map_err(failure)?;
+            return conclude((arguments, spec), outcome, output);
+        }
+        let mut file = TraceFile::open(arguments.trace.as_deref())?;
+        let outcome = inputs.execute(&mut |line| file.write(line), &host, &mut watcher);
+        let outcome = host.close(outcome).map_err(failure)?;
         let is_valid = outcome.answer.invalid.is_empty();
         let trace = (!is_valid).then(|| file.of_invalid_run()).flatten();
         let trouble = file.close();
         let shown = show((arguments, spec), &outcome, false, output);
-        // The run has been what it was, whatever became of its record.
+        // The run is complete, even if its record is not.
         if let Some(trouble) = trouble {
             output::warn(&trouble);
         }
         shown?;
         exit(&outcome, trace)
-    }
-
-    /// A world that takes requests, if the run is attended.
-    fn attended<'w, W: World>(&self, world: W, factor: &Rational) -> Attended<'w, W> {
-        Attended::new(world, self.attendance, self.task, self.interrupt, factor)
-            .ringing(&self.aside.bell)
-    }
-
-    fn run(
-        self,
-        world: &mut dyn World,
-        recorder: &mut dyn Recorder,
-        mut believes: impl FnMut(&Progression) + Send,
-    ) -> Result<RunOutcome, SpecError> {
-        let begun = Clock::start();
-        let clock = || begun.seconds();
-        let goes_on = || !self.interrupt.is_requested();
-        let model = self.spec.model(self.task.problem());
-        let model = model.map_err(SpecError::World)?;
-        let planner = self
-            .spec
-            .planner_for(self.task, model.as_ref(), &clock, &goes_on)?;
-        let request = RunRequest::new(self.spec, self.task)
-            .beginning_with(self.first)
-            .planned_by(Ahead::new(planner, self.spec, &self.aside))
-            .prepared_by(Readied::new(self.spec, self.task, &self.aside.bell)?)
-            .told_to(both(self.attendance.listener(), &mut believes))
-            .recorded_by(recorder);
-        execute(request, world, &mut Stopwatch::start(self.interrupt))
-    }
-
-    /// A run in a world that is a process, with a journal.
-    fn journaled(
-        self,
-        mut file: JournalFile,
-        command: &str,
-        arguments: &RunArgs,
-        output: &mut Output,
-    ) -> Answer {
-        let mut is_kept = false;
-        let mut sink = |line: &str| is_kept = file.write(line);
-        let mut header = trace::TraceWriter::new(Arc::clone(self.task), &mut sink);
-        let written = header.header(self.spec);
-        written.map_err(|error| Failure::new(format!("cannot write the journal: {error}"), ""))?;
-        // Whoever has given the problem is told that it is on the disk. A run begins again without that.
-        if !is_kept || (self.spec.is_lasting && !file.sync()) {
-            let why = file.trouble().unwrap_or_default();
-            return Err(Failure::new(
-                format!("cannot write the journal {}: {why}", file.path().display()),
-                "nothing was started; make room on the disk, or choose another file",
-            ));
-        }
-        let manners = process::Manners {
-            patience: arguments.answer_within.clone(),
-            is_strict: arguments.strict_world,
-        };
-        let kept = Kept::default();
-        let interrupt = self.interrupt;
-        let views = Views::open(arguments, self.spec, self.task, interrupt, self.attendance)?;
-        let world = process::ProcessWorld::start(command, self.task, manners, interrupt.clone())?;
-        let believed = Believed::default();
-        let world = Careful {
-            inner: world.telling(believed.clone()),
-            kept: kept.clone(),
-            refused: Vec::new(),
-        };
-        let mut world = self.attended(world, &Rational::ONE);
-        (self.begun)();
-        let outcome = {
-            let desk = self.attendance.desk();
-            let writer = JournalWriter::new(self.task, &mut file, &kept, desk);
-            let writer = self.attendance.witnessed(writer, self.task, true);
-            let mut writer = views.shown(writer, self.task);
-            let begun = Clock::start();
-            let clock = || begun.seconds();
-            let goes_on = || !interrupt.is_requested();
-            let planner = self.spec.planner_for(self.task, None, &clock, &goes_on);
-            let planner = planner.map_err(contradiction)?;
-            let readied = Readied::new(self.spec, self.task, &self.aside.bell);
-            let readied = readied.map_err(contradiction)?;
-            let request = RunRequest::new(self.spec, self.task)
-                .beginning_with(self.first)
-                .planned_by(Ahead::new(planner, self.spec, &self.aside))
-                .prepared_by(readied)
-                .told_to(both(self.attendance.listener(), believed.listener()))
-                .recorded_by(live::Live::new(&mut writer));
-            let mut watch = Attentive {
-                inner: Stopwatch::start(interrupt),
-                kept,
-            };
-            execute(request, &mut world, &mut watch)
-        };
-        world.into_inner().inner.stop();
-        views.close();
-        let outcome = outcome.map_err(contradiction)?;
-        conclude((arguments, self.spec), outcome, file.trouble(), output)
-    }
-
-    /// A run in the world that the specification describes, on a wall clock if it asks for one.
-    fn simulated(self, recorder: &mut dyn Recorder) -> Result<RunOutcome, SpecError> {
-        let (spec, task) = (self.spec, self.task);
-        let model = spec.model(task.problem()).map_err(SpecError::World)?;
-        let model = model.unwrap_or_default();
-        let mut world = spec.world(&model, task, self.first.as_ref())?;
-        (self.begun)();
-        let Some(factor) = &spec.realtime else {
-            return self.run(world.as_mut(), recorder, |_: &Progression| {});
-        };
-        let pace = Pace::new(factor, self.since);
-        let begun = Clock::start();
-        let clock = || begun.seconds();
-        let goes_on = || !self.interrupt.is_requested();
-        let planner = spec.planner_for(task, Some(&model), &clock, &goes_on)?;
-        let planner: Box<dyn Planner> = Box::new(Ahead::new(planner, spec, &self.aside));
-        let world = Realtime {
-            inner: world.as_mut(),
-            pace: &pace,
-            interrupt: self.interrupt,
-        };
-        let mut world = self.attended(world, factor);
-        let request = RunRequest::new(spec, task)
-            .beginning_with(self.first)
-            .told_to(self.attendance.listener())
-            .prepared_by(Readied::new(spec, task, &self.aside.bell)?)
-            .planned_by(PacedPlanner {
-                inner: planner,
-                pace: &pace,
-                planning_time: &spec.planning_time,
-            })
-            .recorded_by(recorder);
-        execute(request, &mut world, &mut Stopwatch::start(self.interrupt))
-    }
-}
-
-/// Ends a run also when its journal cannot be written.
-struct Attentive {
-    inner: Stopwatch,
-    kept: Kept,
-}
-
-impl Watcher for Attentive {
-    fn elapsed(&mut self) -> Duration {
-        self.inner.elapsed()
-    }
-
-    fn flow(&mut self) -> ControlFlow<Halt> {
-        if self.kept.is_lost() {
-            return ControlFlow::Break(Halt::Cancelled);
-        }
-        self.inner.flow()
-    }
-
-    fn notice(&mut self, event: &Event<'_>) {
-        self.inner.notice(event);
     }
 }
 
@@ -482,13 +371,13 @@ fn exit(outcome: &RunOutcome, trace: Option<String>) -> Answer {
         Verdict::Interrupted => Exit::Interrupted,
         Verdict::PlannerFailed { why } => {
             return Err(Failure::new(
-                format!("the planner failed: {}", tame(why)),
+                format!("the planner failed: {}", escape_control(why)),
                 "`elbowroom plan` with the same planner says more; this does not say that there is no plan",
             ));
         }
         Verdict::WorldFailed { why } => {
             return Err(Failure::new(
-                format!("the world failed: {}", tame(why)),
+                format!("the world failed: {}", escape_control(why)),
                 "docs/formats/world-protocol.md says what a world must do",
             ));
         }

@@ -1,40 +1,28 @@
 //! `elbowroom serve`: a long-lived executive, `docs/serve.md`.
 
-mod answers;
-mod changes;
-mod first;
-mod front;
-
 use std::cell::OnceCell;
-use std::fmt;
-use std::net::TcpListener;
-use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::execute::{NamedText, RunSpec, SpecError};
-use elbowroom::executive::Status;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
-use elbowroom::report::trace::TraceWriter;
 
-use super::run::resume::{self, Host};
+use super::run::resume::{self, ResumeHost};
 use super::run::spec;
-use super::run::{Job, RESUME_SERVE, aside, checked, journal};
+use super::run::{Job, RESUME_SERVE, checked, journal};
 use crate::args::ServeArgs;
-use crate::attendance::Attendance;
 use crate::calendar::dated;
-use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
-use crate::http::{self, Listener};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::journal::Segments;
 use crate::output::{self, Output};
-use crate::serve::Control;
-use crate::words::plain;
-use first::Client;
-use front::{Front, Refused};
+use elbowroom_executive::api::{self, ApiError, ApiRouter, Client};
+use elbowroom_executive::clock::Clock;
+use elbowroom_executive::http::AccessControl;
+use elbowroom_executive::journal::Segments;
+use elbowroom_executive::operator::OperatorInterface;
+use elbowroom_executive::{Error, make_persistent};
 
 /// The length of a journal from which on it is begun anew, in bytes.
 const LONG: u64 = 10_000_000;
@@ -51,11 +39,11 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     if let Some(journal) = &arguments.run.resume {
         let server = Server {
             arguments,
-            front: OnceCell::new(),
+            router: OnceCell::new(),
         };
         let answer = resume::run(journal, &arguments.run, &server, output);
-        if let Some(front) = server.front.get() {
-            front.close();
+        if let Some(router) = server.router.get() {
+            router.close();
         }
         return in_order(answer);
     }
@@ -89,43 +77,47 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         None
     };
     let journal = journal(&arguments.run, RESUME_SERVE)?;
-    let journal = journal.map(|file| file.in_segments(Some(segments(arguments))));
-    let front = open(arguments, &interrupt, &domain_text)?;
+    let journal =
+        journal.map(|file| file.with_rotation(Some(segments(arguments)), &output::warnings()));
+    let router = open(arguments, &interrupt, &domain_text)?;
     let (task, first, client) = if let Some((task, first)) = given {
         (task, first, None)
     } else {
         let of = (&mut spec, world.as_ref());
-        let Some(((task, first), at, client)) = await_problem(&front, arguments, of, output) else {
+        let Some(((task, first), at, client)) = await_problem(&router, arguments, of, output)
+        else {
             // It was asked to end before there was a problem.
-            front.close();
+            router.close();
             return Ok(Exit::Yes);
         };
         since = at;
         (task, first, Some(client))
     };
-    let begun = || {
+    let started = || {
         if let Some(client) = &client {
             client.accept();
         }
     };
-    let answer = begin(&front, &spec, &task).and_then(|attendance| {
-        let job = Job {
-            aside: aside(&arguments.run, &interrupt),
-            spec: &spec,
-            task: &task,
-            first,
-            interrupt: &interrupt,
-            attendance: &attendance,
-            journal,
-            begun: &begun,
-            since,
-        };
-        job.execute(&arguments.run, output)
-    });
+    let answer = router
+        .begin(&spec, &task)
+        .map_err(Failure::from)
+        .and_then(|operator| {
+            let job = Job {
+                spec: &spec,
+                task: &task,
+                first,
+                interrupt: &interrupt,
+                operator: &operator,
+                journal,
+                started: &started,
+                since,
+            };
+            job.execute(&arguments.run, output)
+        });
     if let (Some(client), Err(failure)) = (&client, &answer) {
         client.refuse(refusal(503, failure));
     }
-    front.close();
+    router.close();
     in_order(answer)
 }
 
@@ -135,14 +127,14 @@ type Begun = (Arc<Task>, Option<TimeTriggeredPlan>);
 /// Waits for a problem that can be executed; whoever gives another one is told why it cannot. `None` if
 /// the executive is asked to end before.
 fn await_problem(
-    front: &Front,
+    router: &ApiRouter,
     arguments: &ServeArgs,
     (spec, world): (&mut RunSpec, Option<&Source>),
     output: &mut Output,
 ) -> Option<(Begun, Option<Clock>, Client)> {
     let interrupt = Interrupt::listen_with_world();
     loop {
-        let (text, client) = front.first.wait(&interrupt)?.parts();
+        let (text, client) = router.initial_problem().wait(interrupt.stop())?.parts();
         let given = Source::new(GIVEN, text);
         let begun =
             dated(arguments.calendar(), &spec.domain, given, output).and_then(|(problem, at)| {
@@ -153,7 +145,7 @@ fn await_problem(
             Ok((begun, at)) => return Some((begun, at, client)),
             Err(failure) => {
                 output::warn(&format!("a problem was refused: {}", failure.sentence()));
-                front.first.reopen();
+                router.initial_problem().reopen();
                 client.refuse(refusal(422, &failure));
             }
         }
@@ -161,11 +153,11 @@ fn await_problem(
 }
 
 /// A failure as it is told to a client.
-fn refusal(status: u16, failure: &Failure) -> Refused {
+fn refusal(status: u16, failure: &Failure) -> ApiError {
     let help = failure
         .advice()
         .unwrap_or("look at what the executive says");
-    Refused::new(status, failure.sentence(), help)
+    ApiError::new(status, failure.sentence(), help)
 }
 
 /// What a specification is of an executive, which stays.
@@ -181,19 +173,7 @@ fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) -> Result<(), Failure> {
             spec.planning_time = elbowroom::execution::run::PlanningTime::Measured;
         }
     }
-    let knows_one_goal = spec.executor.registered.name == "lookahead";
-    if knows_one_goal || spec.executor.asks_odds() {
-        return Err(Failure::new(
-            format!(
-                "`{}` reckons with one goal, and goals change here",
-                spec.executor
-            ),
-            "choose another executor, such as guarded or live",
-        ));
-    }
-    spec.plans_aside = spec.can_plan_aside();
-    spec.readies_aside = spec.plans_aside;
-    Ok(())
+    Ok(make_persistent(spec)?)
 }
 
 /// A domain that no problem could be executed of is refused before anybody is asked for one. Whatever
@@ -222,10 +202,10 @@ fn in_order(answer: Answer) -> Answer {
     })
 }
 
-fn control(arguments: &ServeArgs, interrupt: &Interrupt) -> Result<Option<Control>, Failure> {
+fn control(arguments: &ServeArgs, interrupt: &Interrupt) -> Result<Option<AccessControl>, Error> {
     let token = arguments.token.as_ref();
     token
-        .map(|path| Control::read(path, interrupt.clone()))
+        .map(|path| AccessControl::read(path, interrupt.stop().clone()))
         .transpose()
 }
 
@@ -258,99 +238,25 @@ fn check(arguments: &ServeArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Listens, and says where.
+/// Starts the HTTP interface, and prints its addresses.
 fn open(
     arguments: &ServeArgs,
     interrupt: &Interrupt,
     domain: &NamedText,
-) -> Result<Arc<Front>, Failure> {
+) -> Result<Arc<ApiRouter>, Error> {
     let control = control(arguments, interrupt)?;
-    let address = arguments.http.0;
-    let cannot = |why: &dyn fmt::Display| {
-        Failure::new(
-            format!("cannot listen at {address}: {why}"),
-            "choose another port with --http; with port 0, a free one is taken",
-        )
-    };
-    let listener = TcpListener::bind(address).map_err(|error| cannot(&plain(&error)))?;
-    let own = listener
-        .local_addr()
-        .map_err(|error| cannot(&plain(&error)))?;
-    let socket = match &arguments.socket {
-        Some(path) => Some(socket(path)?),
-        None => None,
-    };
-    let has_token = control.is_some();
-    let front = Arc::new(Front::new(control, own, domain));
-    for (listener, is_local_only) in [
-        (Some(Listener::Tcp(listener)), own.ip().is_loopback()),
-        (socket, false),
-    ] {
-        let Some(listener) = listener else { continue };
-        let (served, known) = (Arc::clone(&front), Arc::clone(&front));
-        let is_known = move |request: &http::Request| known.is_known(request);
-        http::serve(listener, is_known, move |request, stream| {
-            served.serve(request, is_local_only, stream)
-        });
-    }
-    let with_token = if has_token {
+    let with_token = if control.is_some() {
         ""
     } else {
         "; to be looked at only, as there is no --token"
     };
+    let router = api::serve(arguments.http, arguments.socket.as_deref(), control, domain)?;
+    let own = router.address();
     output::tell(&format!("listening at http://{own}/{with_token}"));
     if let Some(path) = &arguments.socket {
         output::tell(&format!("listening at {}", path.display()));
     }
-    Ok(front)
-}
-
-/// A socket that only its owner can reach. One that nobody listens at any more is replaced.
-#[cfg(unix)]
-fn socket(path: &Path) -> Result<Listener, Failure> {
-    use std::os::unix::fs::PermissionsExt as _;
-    use std::os::unix::net::{UnixListener, UnixStream};
-
-    let cannot = |why: &dyn fmt::Display| {
-        Failure::new(
-            format!("cannot listen at {}: {why}", path.display()),
-            "choose a path at which there is nothing, in a folder that exists and that you may write to",
-        )
-    };
-    let is_socket = std::fs::symlink_metadata(path)
-        .is_ok_and(|it| std::os::unix::fs::FileTypeExt::is_socket(&it.file_type()));
-    if is_socket {
-        if UnixStream::connect(path).is_ok() {
-            return Err(cannot(&"another program listens there"));
-        }
-        let _ = std::fs::remove_file(path);
-    }
-    let listener = UnixListener::bind(path).map_err(|error| cannot(&plain(&error)))?;
-    let owner_only = std::fs::Permissions::from_mode(0o600);
-    std::fs::set_permissions(path, owner_only).map_err(|error| cannot(&plain(&error)))?;
-    Ok(Listener::Unix(listener))
-}
-
-#[cfg(not(unix))]
-fn socket(path: &Path) -> Result<Listener, Failure> {
-    Err(Failure::new(
-        format!(
-            "cannot listen at {}: this system has no such sockets",
-            path.display()
-        ),
-        "leave out --socket; --http serves the same",
-    ))
-}
-
-/// From now on there is a run to ask about.
-fn begin(front: &Front, spec: &RunSpec, task: &Arc<Task>) -> Result<Attendance, Failure> {
-    let status = Status::new(task, spec.timeout.clone());
-    let board = front.board();
-    let mut header = |line: &str| board.add(line);
-    let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
-    written.map_err(|error| Failure::new(format!("cannot show the run: {error}"), ""))?;
-    front.begin(status.clone(), task);
-    Ok(Attendance::by(front.desk().clone(), status, board.clone()))
+    Ok(router)
 }
 
 fn segments(arguments: &ServeArgs) -> Segments {
@@ -363,26 +269,26 @@ fn segments(arguments: &ServeArgs) -> Segments {
 /// Attends a run that goes on after a crash.
 struct Server<'a> {
     arguments: &'a ServeArgs,
-    front: OnceCell<Arc<Front>>,
+    router: OnceCell<Arc<ApiRouter>>,
 }
 
-impl Host for Server<'_> {
-    fn attend(
+impl ResumeHost for Server<'_> {
+    fn operator(
         &self,
         spec: &RunSpec,
         task: &Arc<Task>,
         interrupt: &Interrupt,
-    ) -> Result<Attendance, Failure> {
+    ) -> Result<OperatorInterface, Error> {
         if !spec.is_lasting {
-            return Err(Failure::new(
+            return Err(Error::new(
                 "this is the journal of a run that ends with its goal",
                 "go on with `elbowroom run --resume`",
             ));
         }
-        let front = open(self.arguments, interrupt, &spec.domain)?;
-        let attendance = begin(&front, spec, task);
-        let _ = self.front.set(front);
-        attendance
+        let router = open(self.arguments, interrupt, &spec.domain)?;
+        let operator = router.begin(spec, task);
+        let _ = self.router.set(router);
+        operator
     }
 
     fn segments(&self) -> Option<Segments> {

@@ -7,7 +7,7 @@ use clap::CommandFactory;
 use crate::args::{CommandLine, CompletionsArgs, ManArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::output;
-use crate::words::plain;
+use elbowroom_executive::messages::plain;
 
 /// `elbowroom completions`: a script for a shell.
 pub(crate) fn completions(arguments: &CompletionsArgs) -> Answer {

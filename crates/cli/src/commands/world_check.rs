@@ -15,13 +15,13 @@ use elbowroom::text::Source;
 use serde_json::json;
 
 use crate::args::{ProblemArgs, WorldCheckArgs};
-use crate::conversation::{Ability, Greeting, launch};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::look::{BAD, GOOD, HINT, Look, styled};
 use crate::output::{self, Output};
-use crate::words::{excerpt, tame};
 use crate::wrap::wrapped;
+use elbowroom_executive::messages::{escape_control, excerpt};
+use elbowroom_executive::world_protocol::{Capability, Greeting, launch};
 use player::{Gone, Player};
 use resumed::resumed;
 use table::{Check, Findings, Outcome, Row};
@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
             }
             let last = if is_over {
                 Err(player.abandon())
-            } else if player.can(Ability::Resume) {
+            } else if player.can(Capability::Resume) {
                 resumed(player, &arguments.command, &task, &actions[0])
             } else {
                 Ok(player)
@@ -139,7 +139,7 @@ fn script(
 fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Result<(), Gone> {
     // Nothing has been told, so time passes.
     pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
-    if player.can(Ability::Beliefs) {
+    if player.can(Capability::Beliefs) {
         let faults = player.findings.faults();
         player.findings.look_at(Check::HearsBeliefs);
         let heard = beliefs(player, task);
@@ -308,12 +308,12 @@ fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
         Some(greeting) => {
             let name = match greeting.name.as_str() {
                 "" => "the world".to_owned(),
-                name => tame(name),
+                name => escape_control(name),
             };
             let can = if greeting.can.is_empty() {
                 "nothing of what is optional".to_owned()
             } else {
-                tame(&greeting.can.join(", "))
+                escape_control(&greeting.can.join(", "))
             };
             format!(
                 "{name} speaks version {}; it can: {can}\n",
@@ -331,7 +331,7 @@ fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
         let line = format!("{mark}  {}: {}", row.check, row.what);
         let _ = writeln!(text, "{}", wrapped(&line, width, 2));
         for why in &row.why {
-            let _ = writeln!(text, "{}", wrapped(&tame(why), width, 6));
+            let _ = writeln!(text, "{}", wrapped(&escape_control(why), width, 6));
         }
     }
     let wrong = rows

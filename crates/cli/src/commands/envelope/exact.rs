@@ -19,7 +19,7 @@ use crate::limits::push_wrapped;
 use crate::look::{BAD, FAINT, GOOD, HINT, Look, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::{Stopwatch, duration};
-use crate::words::counted;
+use elbowroom_executive::messages::counted;
 
 /// So many of the reasons for an inequality are printed; `--json` has all.
 const REASONS_SHOWN: usize = 2;

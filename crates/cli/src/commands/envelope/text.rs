@@ -18,8 +18,8 @@ use crate::limits::{self, push_paragraph, push_wrapped};
 use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
 use crate::number::{self, Rounding};
 use crate::table::{self, Row};
-use crate::words::counted;
 use best::{gained, goodness};
+use elbowroom_executive::messages::counted;
 use example::{example, what};
 
 /// The answer, whatever it is.

@@ -10,7 +10,7 @@ use elbowroom::report::table::Table;
 
 use crate::limits::push_paragraph;
 use crate::look::{BAD, HINT, Look, STRONG, styled};
-use crate::words::counted;
+use elbowroom_executive::messages::counted;
 
 /// More losses, or ways to gain, are not listed.
 const MOST_ROWS: usize = 12;

@@ -11,8 +11,8 @@ use crate::args::EMBEDDED;
 use crate::exit::Failure;
 use crate::look::{FAINT, HINT, Look, styled};
 use crate::number;
-use crate::words::counted;
 use crate::wrap::wrapped;
+use elbowroom_executive::messages::counted;
 
 /// The plan as text, with a last line, a comment, that says what it is worth where that is not
 /// simply when it ends.

@@ -9,11 +9,11 @@ use elbowroom::num::Rational;
 
 use crate::args::PlanArgs;
 use crate::interrupt::Interrupt;
-use crate::memory::MemoryLimit;
 use crate::number;
 use crate::progress::Progress;
 use crate::stopwatch::{Stopwatch, duration};
-use crate::words::counted;
+use elbowroom_executive::memory_limit::MemoryLimit;
+use elbowroom_executive::messages::counted;
 
 /// Watches the plans that come, Ctrl-C, and, for who keeps no time of its own, the time.
 pub(super) struct Watch {

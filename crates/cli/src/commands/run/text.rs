@@ -8,8 +8,8 @@ use elbowroom::execution::run::{Report, Verdict};
 
 use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::number::nearest;
-use crate::words::{counted, tame};
 use crate::wrap::wrapped;
+use elbowroom_executive::messages::{counted, escape_control};
 
 /// How a run ends.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +39,7 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
             styled(BAD, "failed")
         ),
         Verdict::NoPlan { why, missing } => {
-            let why = wrapped(&tame(why), width, 2);
+            let why = wrapped(&escape_control(why), width, 2);
             match missing.advice() {
                 Some(advice) => format!(
                     "{}: no plan found from here, at {time}, after {replans}:\n{why}\n{}\n",
@@ -85,13 +85,13 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
         ),
     };
     if let Some(choice) = &answer.first_plan {
-        let words = wrapped(&tame(choice), width, 2);
+        let words = wrapped(&escape_control(choice), width, 2);
         let _ = writeln!(text, "\n{}\n{words}", styled(STRONG, "The first plan"));
     }
     if let Some(why) = &answer.no_table {
         let what = format!(
             "{}; moves are tried out in samples of the world instead",
-            tame(why)
+            escape_control(why)
         );
         let words = wrapped(&what, width, 2);
         let _ = writeln!(text, "\n{}\n{words}", styled(STRONG, "No table of moves"));
@@ -101,7 +101,9 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
         ("Why the plan was given up", &report.reasons),
     ] {
         // What worlds and other programs say is in there. Nothing is said twice.
-        let reasons = reasons.iter().map(|reason| tame(&reason.to_string()));
+        let reasons = reasons
+            .iter()
+            .map(|reason| escape_control(&reason.to_string()));
         let reasons: Vec<String> = reasons
             .map(|reason| wrapped(&reason, width, 2))
             .filter(|reason| !text.contains(reason))

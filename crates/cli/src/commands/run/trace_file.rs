@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::exit::Failure;
-use crate::words::plain;
+use elbowroom_executive::messages::plain;
 
 /// Limit on the size of a trace that is kept in memory, in bytes.
 const MOST_KEPT: usize = 32 << 20;

@@ -14,7 +14,7 @@ use crate::limits::push_wrapped;
 use crate::look::{BAD, GOOD, Look, styled};
 use crate::number::nearest;
 use crate::output::{self, Output};
-use crate::words::counted;
+use elbowroom_executive::messages::counted;
 
 /// Whether the text is an answer of `elbowroom plan`.
 pub(super) fn is_meant(text: &str) -> bool {

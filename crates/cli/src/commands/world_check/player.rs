@@ -13,12 +13,12 @@ use elbowroom::report::wire;
 use serde_json::{Value, json};
 
 use super::table::{Check, Findings};
-use crate::clock::Clock;
-use crate::conversation::{
-    Ability, Ears, Greeting, Heard, LONGEST_ANSWER, Listener, Mouth, Said, Told, believed, ended,
-    hello,
+use elbowroom_executive::clock::Clock;
+use elbowroom_executive::messages::excerpt;
+use elbowroom_executive::world_protocol::{
+    Capability, Greeting, LONGEST_ANSWER, LineReader, LineWriter, Message, MessageParser,
+    ReadResult, WriteResult, belief_message, hello, wait_for_exit,
 };
-use crate::words::excerpt;
 
 /// How long a world may take to end when it was told to.
 const FAREWELL: Duration = Duration::from_secs(1);
@@ -29,9 +29,9 @@ pub(super) struct Gone;
 /// A world that is being checked.
 pub(super) struct Player {
     child: Child,
-    mouth: Mouth,
-    ears: Ears,
-    listener: Listener,
+    writer: LineWriter,
+    reader: LineReader,
+    parser: MessageParser,
     patience: Duration,
     pub(super) findings: Findings,
     /// What time it says it is.
@@ -63,7 +63,7 @@ struct Begun {
 impl Player {
     /// Greets a program that has just been started.
     pub(super) fn new(
-        program: (Child, Mouth, Ears),
+        program: (Child, LineWriter, LineReader),
         task: &Arc<Task>,
         patience: Duration,
     ) -> Result<Self, (Gone, Findings)> {
@@ -78,7 +78,7 @@ impl Player {
     /// Greets a program that was started again. `open` is what it was told before, as far as is known: ticket,
     /// action, and whether it has reported that it has started.
     pub(super) fn resumed(
-        program: (Child, Mouth, Ears),
+        program: (Child, LineWriter, LineReader),
         task: &Arc<Task>,
         rest: Rest,
         open: &[(u64, &str, bool)],
@@ -97,16 +97,16 @@ impl Player {
     }
 
     fn greeted(
-        (child, mouth, ears): (Child, Mouth, Ears),
+        (child, writer, reader): (Child, LineWriter, LineReader),
         task: &Arc<Task>,
         rest: Rest,
         hello: &Value,
     ) -> Result<Self, (Gone, Findings)> {
         let mut player = Self {
             child,
-            mouth,
-            ears,
-            listener: Listener::new(task),
+            writer,
+            reader,
+            parser: MessageParser::new(task),
             patience: rest.patience,
             findings: rest.findings,
             now: rest.now,
@@ -126,25 +126,25 @@ impl Player {
 
     /// How the program has introduced itself.
     pub(super) fn greeting(&self) -> Option<&Greeting> {
-        self.listener.greeting()
+        self.parser.greeting()
     }
 
     /// Whether it says it can do that.
-    pub(super) fn can(&self, ability: Ability) -> bool {
-        self.listener.greeting().is_some() && self.listener.can(ability)
+    pub(super) fn can(&self, ability: Capability) -> bool {
+        self.parser.greeting().is_some() && self.parser.can(ability)
     }
 
     /// Whether it may be told to stop actions; whoever has not greeted may, too.
     pub(super) fn can_cancel(&self) -> bool {
-        self.listener.can(Ability::Cancel)
+        self.parser.can(Capability::Cancel)
     }
 
     /// Notes what there is no occasion to look at, because it does not claim to do it.
     pub(super) fn note_what_it_cannot(&mut self) {
         for (check, can) in [
             (Check::Cancels, self.can_cancel()),
-            (Check::HearsBeliefs, self.can(Ability::Beliefs)),
-            (Check::Resumes, self.can(Ability::Resume)),
+            (Check::HearsBeliefs, self.can(Capability::Beliefs)),
+            (Check::Resumes, self.can(Capability::Resume)),
         ] {
             if !can {
                 self.findings.leave_out(check);
@@ -207,7 +207,7 @@ impl Player {
     }
 
     fn note_start(&mut self, ticket: u64, name: &str, is_instantaneous: bool) {
-        self.listener.note_start(ticket);
+        self.parser.note_start(ticket);
         let action = Begun {
             name: name.to_owned(),
             is_instantaneous,
@@ -231,7 +231,7 @@ impl Player {
         values: impl Iterator<Item = (FluentId, Option<&'a Rational>)>,
     ) -> Result<(), Gone> {
         let facts = facts.map(|fact| (fact, true));
-        let message = believed(task, &self.now, facts, values);
+        let message = belief_message(task, &self.now, facts, values);
         self.tell(&message)
     }
 
@@ -245,14 +245,14 @@ impl Player {
     }
 
     pub(super) fn look(&mut self) -> Result<(), Gone> {
-        let number = self.listener.next_question();
+        let number = self.parser.next_question();
         let question = json!({ "type": "look", "facts": [], "fluents": [], "question": number });
         self.ask(&question, None)
     }
 
     /// Asks what became of these.
     pub(super) fn recall(&mut self, tickets: &[u64]) -> Result<(), Gone> {
-        let number = self.listener.next_question();
+        let number = self.parser.next_question();
         let question = json!({
             "type": "look", "facts": [], "fluents": [], "tickets": tickets, "question": number,
         });
@@ -264,21 +264,21 @@ impl Player {
 
     /// Lets time pass until then, or until something is observed.
     pub(super) fn wait(&mut self, until: &Rational) -> Result<(), Gone> {
-        let number = self.listener.next_question();
+        let number = self.parser.next_question();
         let question = json!({ "type": "wait", "until": wire::number(until), "question": number });
         self.ask(&question, Some(until))
     }
 
     fn tell(&mut self, message: &Value) -> Result<(), Gone> {
-        match self.mouth.tell(format!("{message}\n"), self.patience) {
-            Told::Yes => Ok(()),
-            Told::NobodyReads => {
+        match self.writer.write(format!("{message}\n"), self.patience) {
+            WriteResult::Written => Ok(()),
+            WriteResult::Timeout => {
                 let what = message["type"].as_str().unwrap_or_default();
                 let why = format!("it has not read `{what}` within {} s", self.seconds());
                 self.findings.wrong(Check::Answers, why);
                 Err(Gone)
             }
-            Told::End => Err(self.dead()),
+            WriteResult::Closed => Err(self.dead()),
         }
     }
 
@@ -287,7 +287,7 @@ impl Player {
     }
 
     fn dead(&mut self) -> Gone {
-        let why = match ended(&mut self.child, FAREWELL) {
+        let why = match wait_for_exit(&mut self.child, FAREWELL) {
             Some(status) => format!("it has ended by itself ({status})"),
             None => "it has closed its standard input or output".to_owned(),
         };
@@ -303,24 +303,24 @@ impl Player {
         let (clock, mut said, mut observations) = (Clock::start(), 0, Vec::new());
         loop {
             let left = self.patience.saturating_sub(clock.elapsed());
-            let line = match self.ears.hear(left) {
-                Heard::Line(line) => line,
-                Heard::EndlessLine => {
+            let line = match self.reader.read(left) {
+                ReadResult::Line(line) => line,
+                ReadResult::EndlessLine => {
                     let why = "a line has more than a megabyte; one message a line";
                     self.findings.wrong(Check::Speaks, why);
                     return Err(Gone);
                 }
-                Heard::TooMuch => {
+                ReadResult::TooMuch => {
                     let why = "it says more than 16 MB without being asked";
                     self.findings.wrong(Check::Answers, why);
                     return Err(Gone);
                 }
-                Heard::Nothing => {
+                ReadResult::Timeout => {
                     let why = format!("no `time` within {} s after `{what}`", self.seconds());
                     self.findings.wrong(Check::Answers, why);
                     return Err(Gone);
                 }
-                Heard::End => return Err(self.dead()),
+                ReadResult::Closed => return Err(self.dead()),
             };
             said += line.len();
             if said > LONGEST_ANSWER {
@@ -332,11 +332,11 @@ impl Player {
             if line.is_empty() {
                 continue;
             }
-            match self.listener.read(line) {
-                Ok(Said::Greeting | Said::Clock) => {}
-                Ok(Said::Unknown) => self.unknown.extend(ticket_of(line)),
-                Ok(Said::Observation(observation)) => observations.push(observation),
-                Ok(Said::Time(now)) => {
+            match self.parser.parse(line) {
+                Ok(Message::Greeting | Message::Clock) => {}
+                Ok(Message::Unknown) => self.unknown.extend(ticket_of(line)),
+                Ok(Message::Observation(observation)) => observations.push(observation),
+                Ok(Message::Time(now)) => {
                     self.findings.look_at(Check::Speaks);
                     self.note_time(now, until, observations.is_empty());
                     self.take(&observations, &before);
@@ -452,16 +452,16 @@ impl Player {
     pub(super) fn stop(mut self) -> Findings {
         self.findings.look_at(Check::Stops);
         let told = self
-            .mouth
-            .tell("{\"type\":\"stop\"}\n".to_owned(), FAREWELL);
-        drop(self.mouth);
-        let ended = ended(&mut self.child, FAREWELL).is_some();
+            .writer
+            .write("{\"type\":\"stop\"}\n".to_owned(), FAREWELL);
+        drop(self.writer);
+        let ended = wait_for_exit(&mut self.child, FAREWELL).is_some();
         if !ended {
             let _ = self.child.kill();
             let _ = self.child.wait();
             let why = "it was still there a second later, and was killed";
             self.findings.wrong(Check::Stops, why);
-        } else if matches!(told, Told::Yes) {
+        } else if matches!(told, WriteResult::Written) {
             self.findings.look_at(Check::Lives);
         }
         self.findings

@@ -8,8 +8,8 @@ use elbowroom::num::Rational;
 use super::player::{Gone, Player};
 use super::table::{Check, Findings};
 use super::{longest, pass, until_begun};
-use crate::conversation::{Ability, launch};
-use crate::words::excerpt;
+use elbowroom_executive::messages::excerpt;
+use elbowroom_executive::world_protocol::{Capability, launch};
 
 /// A start that is over when the world is killed, one that is under way, and one that it was not told any more.
 const OVER: u64 = 0;
@@ -63,7 +63,7 @@ pub(super) fn resumed(
 fn asked(player: &mut Player, killed: &Rational, duration: &Rational) -> Result<(), Gone> {
     player.recall(&[OVER, UNDER_WAY, UNTOLD])?;
     player.findings.look_at(Check::Resumes);
-    if !player.can(Ability::Resume) {
+    if !player.can(Capability::Resume) {
         let why = "started again, it does not claim `resume` any more";
         player.findings.wrong(Check::Resumes, why);
     }

@@ -9,7 +9,7 @@ use elbowroom::num::Rational;
 
 use crate::number;
 use crate::table::{self, Row};
-use crate::words::counted;
+use elbowroom_executive::messages::counted;
 
 /// The promise, in words.
 pub(super) fn meaning(parameters: &[Room], rows: &[Row]) -> String {

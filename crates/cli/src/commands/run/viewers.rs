@@ -1,0 +1,102 @@
+//! Viewers of a run: browsers during the run, files for other viewers after it.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use elbowroom::execute::RunSpec;
+use elbowroom::model::Task;
+use elbowroom::report::trace::TraceWriter;
+use elbowroom_page::PageError;
+
+use crate::args::RunArgs;
+use crate::interrupt::Interrupt;
+use crate::output;
+use elbowroom_executive::Error;
+use elbowroom_executive::http::{AccessControl, PageServer};
+use elbowroom_executive::operator::OperatorInterface;
+use elbowroom_executive::trace_buffer::{TRACE_NAME, TraceBuffer};
+
+/// Browsers and files for viewers.
+pub(super) struct Viewers<'a> {
+    arguments: &'a RunArgs,
+    buffer: Option<TraceBuffer>,
+}
+
+impl<'a> Viewers<'a> {
+    /// Opens the viewers of the arguments.
+    ///
+    /// # Errors
+    /// When a file cannot be written, or the address of the page is not available.
+    pub(super) fn open(
+        arguments: &'a RunArgs,
+        spec: &RunSpec,
+        task: &Arc<Task>,
+        interrupt: &Interrupt,
+        operator: &OperatorInterface,
+    ) -> Result<Self, Error> {
+        let files = [&arguments.perfetto, &arguments.mcap];
+        if arguments.serve.is_none() && files.iter().all(|file| file.is_none()) {
+            let buffer = None;
+            return Ok(Self { arguments, buffer });
+        }
+        for file in files.iter().copied().flatten() {
+            output::write_bytes(file, b"").map_err(|failure| {
+                Error::new(failure.message(), failure.advice().unwrap_or_default())
+            })?;
+        }
+        // Files for viewers contain the whole run.
+        let is_for_viewers = files.iter().any(|file| file.is_some());
+        let buffer = if spec.is_lasting && !is_for_viewers {
+            TraceBuffer::bounded()
+        } else {
+            TraceBuffer::default()
+        };
+        let mut header = |line: &str| buffer.add(line);
+        let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
+        written.map_err(|error| Error::new(format!("cannot show the run: {error}"), ""))?;
+        if let Some(address) = arguments.serve {
+            let control = match &arguments.control {
+                Some(path) => Some(AccessControl::read(path, interrupt.stop().clone())?),
+                None => None,
+            };
+            let with_token = if control.is_some() {
+                "; with #token=TOKEN at its end, the run can be paused, cancelled and stopped there"
+            } else {
+                ""
+            };
+            let queue = operator.queue().cloned();
+            let own = PageServer::start(address, buffer.clone(), control, queue)?;
+            output::tell(&format!("the run is shown at http://{own}/{with_token}"));
+        }
+        let buffer = Some(buffer);
+        Ok(Self { arguments, buffer })
+    }
+
+    /// Returns the buffer that receives the trace of the run.
+    pub(super) fn buffer(&self) -> Option<&TraceBuffer> {
+        self.buffer.as_ref()
+    }
+
+    /// Marks the run as finished on its page, and writes the files for viewers. Failures are warnings: the run itself
+    /// is complete.
+    pub(super) fn close(self) {
+        let Some(buffer) = self.buffer else { return };
+        buffer.close();
+        let trace = buffer.trace();
+        let write = |file: &Path, made: Result<Vec<u8>, PageError>| match made {
+            Ok(bytes) => output::write_bytes(file, &bytes)
+                .err()
+                .map(|failure| failure.message().to_owned()),
+            Err(error) => Some(error.to_string()),
+        };
+        let perfetto = self.arguments.perfetto.as_ref();
+        let mcap = self.arguments.mcap.as_ref();
+        let troubles = [
+            perfetto.and_then(|file| write(file, elbowroom_page::perfetto(TRACE_NAME, &trace))),
+            mcap.and_then(|file| write(file, elbowroom_page::mcap(TRACE_NAME, &trace))),
+        ];
+        for trouble in troubles.into_iter().flatten() {
+            output::warn(&trouble);
+        }
+    }
+}

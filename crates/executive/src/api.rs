@@ -1,0 +1,11 @@
+//! HTTP interface of an executive: `docs/serve.md`.
+
+mod initial_problem;
+mod mutations;
+mod queries;
+mod router;
+mod server;
+
+pub use initial_problem::{Client, GivenProblem, InitialProblem};
+pub use router::{ApiError, ApiRouter};
+pub use server::serve;

@@ -1,0 +1,306 @@
+//! Requests that change the run. They are checked in the thread of the client, and processed by the run when it drains
+//! its queue.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use elbowroom::execute::{misfit, read_goal};
+use elbowroom::execution::Request;
+use elbowroom::execution::run::FIRST_GOAL;
+use elbowroom::executive::documents::{
+    Activity, NewFact, NewGoal, NewNumber, NewProblem, State, Taken,
+};
+use elbowroom::executive::goal_text;
+use elbowroom::model::ground::{Change, FactId};
+use elbowroom::model::{Problem, Task};
+use elbowroom::pddl::{self, Source};
+use serde::de::DeserializeOwned;
+
+use super::router::{ApiError, ApiRouter};
+use crate::messages::counted;
+use crate::request_queue::{ExternalRequest, RequestStatus};
+
+/// Time limit for a client to wait until the run accepts its request.
+const ACCEPT_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Limit on the name of a goal, in bytes.
+const LONGEST_NAME: usize = 64;
+
+impl ApiRouter {
+    /// Processes a request.
+    pub(super) fn change(&self, method: &str, path: &str, body: &[u8]) -> Result<Taken, ApiError> {
+        match (method, path) {
+            ("PUT", "/v1/problem") => self.problem(read(body)?),
+            ("POST", "/v1/goals") => self.goal(read(body)?),
+            ("DELETE", path) => self.abandon(path.trim_start_matches("/v1/goals/")),
+            ("POST", "/v1/facts") => self.fact(&read(body)?),
+            ("POST", "/v1/numbers") => self.number(read(body)?),
+            ("POST", "/v1/pause") => {
+                self.submit(vec![ExternalRequest::Request(Request::Pause)], None)
+            }
+            ("POST", "/v1/resume") => {
+                self.submit(vec![ExternalRequest::Request(Request::Resume)], None)
+            }
+            _ => {
+                self.stop();
+                Ok(Taken {
+                    taken: true,
+                    until: None,
+                    name: None,
+                })
+            }
+        }
+    }
+
+    /// Submits requests in this order, and waits up to two seconds until the run accepts them.
+    fn submit(
+        &self,
+        requests: Vec<ExternalRequest>,
+        name: Option<String>,
+    ) -> Result<Taken, ApiError> {
+        let (status, _) = self.run()?;
+        if self.queue().has_journal_failed() {
+            return Err(journal_failed());
+        }
+        if status.state().activity == Activity::Over {
+            return Err(ApiError::new(
+                409,
+                "the executive has ended",
+                "start another one",
+            ));
+        }
+        let full = || {
+            let help = "wait until it has taken some in; `elbowroom ctl state` says what it does";
+            ApiError::new(503, "too many requests wait for the executive", help)
+        };
+        let number = self.queue().submit(requests).ok_or_else(full)?;
+        let until = match self.queue().wait_until_accepted(number, ACCEPT_TIMEOUT) {
+            RequestStatus::Accepted => None,
+            RequestStatus::Pending => Some(self.obstacle()),
+            RequestStatus::JournalFailed => return Err(journal_failed()),
+            RequestStatus::RunEnded => {
+                let error = "the executive has ended before it took this in";
+                return Err(ApiError::new(409, error, "start another one"));
+            }
+        };
+        Ok(Taken {
+            taken: until.is_none(),
+            until,
+            name,
+        })
+    }
+
+    /// Returns the reason why a request is still pending.
+    fn obstacle(&self) -> String {
+        match self.unanswered() {
+            Some(seconds) => format!(
+                "the world answers, which it has not done for {}",
+                counted(usize::try_from(seconds).unwrap_or(usize::MAX), "second")
+            ),
+            None => "a plan is made".to_owned(),
+        }
+    }
+
+    fn goal(&self, given: NewGoal) -> Result<Taken, ApiError> {
+        let (status, task) = self.run()?;
+        let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
+        let read = read_goal(task, &given.goal);
+        let read = read.map_err(|why| ApiError::new(422, why, help))?;
+        if let Some(why) = misfit(task.problem(), &read) {
+            return Err(ApiError::new(422, why, help));
+        }
+        let name = given.name.map(checked_name).transpose()?;
+        let name = name.unwrap_or_else(|| self.new_name(&status.goals()));
+        let goal = given.goal.trim().to_owned();
+        let request = Request::Pursue {
+            name: name.clone(),
+            goal,
+        };
+        self.submit(vec![ExternalRequest::Request(request)], Some(name))
+    }
+
+    /// Returns a name that no open goal has.
+    fn new_name(&self, open: &[String]) -> String {
+        loop {
+            let number = self.named.fetch_add(1, Ordering::SeqCst) + 1;
+            let name = format!("goal-{number}");
+            if !open.contains(&name) {
+                return name;
+            }
+        }
+    }
+
+    fn abandon(&self, name: &str) -> Result<Taken, ApiError> {
+        let open = self.run()?.0.goals();
+        // A pending request may add the goal.
+        if !open.iter().any(|known| known == name) && self.queue().is_idle() {
+            let help = match open.as_slice() {
+                [] => "no goals are open".to_owned(),
+                open => format!("these are open: {}", open.join(", ")),
+            };
+            return Err(ApiError::new(404, "no goal of that name is open", help));
+        }
+        let name = name.to_owned();
+        let request = Request::Abandon { name: name.clone() };
+        self.submit(vec![ExternalRequest::Request(request)], Some(name))
+    }
+
+    fn fact(&self, given: &NewFact) -> Result<Taken, ApiError> {
+        let (_, task) = self.run()?;
+        let help = "write it as the problem does, such as (at rover base)";
+        let unknown = || {
+            let error = format!("the problem has no fact `{}`", given.fact.escape_debug());
+            ApiError::new(422, error, help)
+        };
+        let fact = task.fact_named(&given.fact).ok_or_else(unknown)?;
+        if task.is_derived(fact) {
+            let error = format!("`{}` follows from other facts", given.fact);
+            return Err(ApiError::new(422, error, "say those instead"));
+        }
+        let (fact, becomes) = (task.fact_name(fact), given.becomes);
+        self.submit(vec![ExternalRequest::Fact { fact, becomes }], None)
+    }
+
+    fn number(&self, given: NewNumber) -> Result<Taken, ApiError> {
+        let (_, task) = self.run()?;
+        let unknown = || {
+            let error = format!(
+                "the problem has no fluent `{}`",
+                given.fluent.escape_debug()
+            );
+            ApiError::new(
+                422,
+                error,
+                "write it as the problem does, such as (charge rover)",
+            )
+        };
+        let fluent = task.fluent_named(&given.fluent).ok_or_else(unknown)?;
+        let (fluent, value) = (task.fluent_name(fluent), given.value.0);
+        self.submit(vec![ExternalRequest::Number { fluent, value }], None)
+    }
+
+    /// Starts the run with the initial problem, or changes the situation to that of a later problem with the same
+    /// objects.
+    fn problem(&self, given: NewProblem) -> Result<Taken, ApiError> {
+        let domain = self.domain().source();
+        let read = pddl::read_problem(&domain, &Source::new("the problem", given.problem.as_str()));
+        let (problem, _) = read.map_err(|mistakes| {
+            let first = mistakes.errors().next().map(ToString::to_string);
+            let help = "`elbowroom check DOMAIN PROBLEM` lists all mistakes";
+            ApiError::new(422, first.unwrap_or_default(), help)
+        })?;
+        let Ok((status, task)) = self.run() else {
+            let taken = self.initial_problem().give(given.problem)?;
+            let until = (!taken).then(|| "it is read".to_owned());
+            let name = None;
+            return Ok(Taken { taken, until, name });
+        };
+        let state = status.state();
+        check_further(&problem, task, &state)?;
+        self.submit(requests_for(&Task::new(problem), task, &state), None)
+    }
+}
+
+/// Returns the error for requests while the journal cannot be written.
+fn journal_failed() -> ApiError {
+    let error = "the journal cannot be written, so this is not kept, and the executive ends";
+    let help = "make room on the disk, go on with `elbowroom serve --resume`, and ask again";
+    ApiError::new(503, error, help)
+}
+
+/// Checks that a running executive can adopt another problem.
+fn check_further(problem: &Problem, task: &Task, state: &State) -> Result<(), ApiError> {
+    if problem.objects != task.problem().objects {
+        return Err(ApiError::new(
+            409,
+            "this problem has other objects than the one that is executed",
+            "stop the executive, and start one for this problem",
+        ));
+    }
+    if !problem.timed.is_empty() {
+        return Err(ApiError::new(
+            409,
+            "a problem with timed initials can only be the first one",
+            "leave them out, or start another executive",
+        ));
+    }
+    if !state.running.is_empty() {
+        return Err(ApiError::new(
+            409,
+            "actions are under way, and what they do is no part of this problem",
+            "pause, wait until they have ended, and give it again; or give goals and facts",
+        ));
+    }
+    Ok(())
+}
+
+/// Returns requests that change the situation and the goals to those of the new problem.
+fn requests_for(new: &Task, task: &Task, state: &State) -> Vec<ExternalRequest> {
+    let mut requests = Vec::new();
+    let named = |fact: &_| new.fact_name(*fact);
+    let facts: BTreeSet<String> = new.initial().facts.iter().map(named).collect();
+    let timed: BTreeSet<FactId> = timed_facts(task).collect();
+    // Timed initials, such as those of a calendar, stay in force.
+    let is_given = |fact: &str| {
+        task.fact_named(fact)
+            .is_none_or(|fact| task.is_derived(fact) || timed.contains(&fact))
+    };
+    let gone = state.facts.iter().filter(|fact| !facts.contains(*fact));
+    for fact in gone.filter(|fact| !is_given(fact)) {
+        let (fact, becomes) = (fact.clone(), false);
+        requests.push(ExternalRequest::Fact { fact, becomes });
+    }
+    for fact in facts {
+        let becomes = true;
+        requests.push(ExternalRequest::Fact { fact, becomes });
+    }
+    for (fluent, value) in &new.initial().values {
+        let (fluent, value) = (new.fluent_name(*fluent), value.clone());
+        requests.push(ExternalRequest::Number { fluent, value });
+    }
+    for goal in &state.goals {
+        let name = goal.name.clone();
+        requests.push(ExternalRequest::Request(Request::Abandon { name }));
+    }
+    let (name, goal) = (FIRST_GOAL.to_owned(), goal_text(new));
+    requests.push(ExternalRequest::Request(Request::Pursue { name, goal }));
+    requests
+}
+
+/// Returns the facts that timed initials of the running problem change.
+fn timed_facts(task: &Task) -> impl Iterator<Item = FactId> {
+    let changes = task.timed().iter().flat_map(|happening| &happening.changes);
+    changes.filter_map(|change| match change {
+        Change::Add(fact) | Change::Delete(fact) => Some(*fact),
+        Change::Update { .. } => None,
+    })
+}
+
+/// Checks that a name can be part of a path.
+fn checked_name(name: String) -> Result<String, ApiError> {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
+    if name.is_empty() || name.len() > LONGEST_NAME || !name.bytes().all(is_plain) {
+        return Err(ApiError::new(
+            422,
+            "this is no name for a goal",
+            "use up to 64 letters, digits, and `-`, `_` or `.`",
+        ));
+    }
+    Ok(name)
+}
+
+/// Parses a body.
+fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, ApiError> {
+    let help = "GET /v1/openapi.json says what belongs into it";
+    if body.trim_ascii_start().starts_with(b"[") {
+        // Serde would accept a list of the members.
+        return Err(ApiError::new(
+            422,
+            "the body is a list, not an object",
+            help,
+        ));
+    }
+    serde_json::from_slice(body)
+        .map_err(|error| ApiError::new(422, format!("the body cannot be read: {error}"), help))
+}

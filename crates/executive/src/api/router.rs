@@ -1,0 +1,374 @@
+//! Router of the HTTP interface of an executive: paths, access, responses.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::atomic::AtomicU64;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Duration;
+
+use elbowroom::execute::{NamedText, RunSpec};
+use elbowroom::executive::documents::Refusal;
+use elbowroom::executive::{METHODS, Status, openapi};
+use elbowroom::model::Task;
+use elbowroom::report::trace::TraceWriter;
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::http::{
+    AccessControl, Request, RequestError, Stream, is_local_name, respond, respond_with_events,
+};
+use crate::operator::OperatorInterface;
+use crate::request_queue::RequestQueue;
+use crate::trace_buffer::TraceBuffer;
+
+use super::initial_problem::InitialProblem;
+
+const JSON: &str = "application/json";
+const TEXT: &str = "text/plain; charset=utf-8";
+const HTML: &str = "text/html; charset=utf-8";
+
+/// Page until the run begins. It reloads itself.
+const WAITING: &str = "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
+    <meta http-equiv=\"refresh\" content=\"1\">\n<title>Elbowroom</title>\n\
+    <h1>Waiting for a problem</h1>\n\
+    <p>The executive has no problem yet. Give it one with <code>elbowroom ctl problem FILE</code>; \
+    this page shows the run as soon as there is one.</p>\n</html>\n";
+
+/// Time limit for clients to receive pending responses at the end of the program.
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// Rejection of a request.
+#[derive(Clone, Debug)]
+pub struct ApiError {
+    /// Status code of the response.
+    pub status: u16,
+    /// Error message, in lower case.
+    pub error: String,
+    /// Advice for the user.
+    pub help: String,
+}
+
+impl ApiError {
+    /// Creates an error.
+    pub fn new(status: u16, error: impl Into<String>, help: impl Into<String>) -> Self {
+        Self {
+            status,
+            error: error.into(),
+            help: help.into(),
+        }
+    }
+}
+
+/// HTTP interface of an executive.
+pub struct ApiRouter {
+    control: Option<AccessControl>,
+    own: SocketAddr,
+    domain: NamedText,
+    queue: RequestQueue,
+    buffer: TraceBuffer,
+    /// Status and task of the run, once there is a problem. The task has its own table of facts, so that requests do not
+    /// change the numbers of the run.
+    run: OnceLock<(Status, Task)>,
+    initial: InitialProblem,
+    /// Number of mutations in progress.
+    changing: Mutex<usize>,
+    answered: Condvar,
+    /// Number of goals that were named by the router.
+    pub(super) named: AtomicU64,
+}
+
+impl ApiRouter {
+    pub(super) fn new(control: Option<AccessControl>, own: SocketAddr, domain: &NamedText) -> Self {
+        Self {
+            control,
+            own,
+            domain: domain.clone(),
+            queue: RequestQueue::default(),
+            buffer: TraceBuffer::bounded(),
+            run: OnceLock::new(),
+            initial: InitialProblem::default(),
+            changing: Mutex::new(0),
+            answered: Condvar::new(),
+            named: AtomicU64::new(0),
+        }
+    }
+
+    /// Returns the request queue.
+    pub fn queue(&self) -> &RequestQueue {
+        &self.queue
+    }
+
+    /// Returns the trace buffer.
+    pub fn buffer(&self) -> &TraceBuffer {
+        &self.buffer
+    }
+
+    /// Returns the slot for the initial problem.
+    pub fn initial_problem(&self) -> &InitialProblem {
+        &self.initial
+    }
+
+    /// Returns the TCP address of the server.
+    pub fn address(&self) -> SocketAddr {
+        self.own
+    }
+
+    /// Returns the text of the domain.
+    pub(super) fn domain(&self) -> &NamedText {
+        &self.domain
+    }
+
+    /// Connects the interface to a run, and writes the header of its trace.
+    ///
+    /// # Errors
+    /// When the specification cannot be written.
+    pub fn begin(&self, spec: &RunSpec, task: &Arc<Task>) -> Result<OperatorInterface, Error> {
+        let status = Status::new(task, spec.timeout.clone());
+        let mut header = |line: &str| self.buffer.add(line);
+        let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
+        written.map_err(|error| Error::new(format!("cannot show the run: {error}"), ""))?;
+        let _ = self.run.set((status.clone(), task.with_own_table()));
+        Ok(OperatorInterface::new(
+            self.queue.clone(),
+            status,
+            self.buffer.clone(),
+        ))
+    }
+
+    /// Returns the status and the task of the run.
+    ///
+    /// # Errors
+    /// When there is no problem yet.
+    pub(super) fn run(&self) -> Result<&(Status, Task), ApiError> {
+        let waiting = "the executive has no problem yet";
+        let help = "give it one: `elbowroom ctl problem FILE`, or PUT /v1/problem";
+        self.run
+            .get()
+            .ok_or_else(|| ApiError::new(409, waiting, help))
+    }
+
+    /// Ends the interface with its run. Waits up to three seconds for clients to read the end of the trace and pending
+    /// responses.
+    pub fn close(&self) {
+        self.queue.close();
+        self.initial.close();
+        self.buffer.close();
+        let waits = |changing: &mut usize| *changing > 0;
+        let waited = self
+            .answered
+            .wait_timeout_while(self.changing(), DRAIN_TIMEOUT, waits);
+        drop(waited.unwrap_or_else(PoisonError::into_inner));
+    }
+
+    fn changing(&self) -> MutexGuard<'_, usize> {
+        // The counter changes in one statement.
+        self.changing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Serves a client. With `is_local_only`, requests must name this machine as their host.
+    pub(super) fn serve(
+        &self,
+        request: Result<Request, RequestError>,
+        is_local_only: bool,
+        stream: &mut Stream,
+    ) -> io::Result<()> {
+        let request = match request {
+            Ok(request) => request,
+            Err(RequestError { status, reason }) => {
+                let help = "docs/serve.md says what an executive understands";
+                return refuse(stream, &ApiError::new(status, reason, help));
+            }
+        };
+        let is_own = |host: &str| is_local_name(host);
+        if is_local_only && !request.header("host").is_some_and(is_own) {
+            let error = format!("this is not the page of that host; {} is", self.own);
+            return refuse(stream, &ApiError::new(403, error, "use the address itself"));
+        }
+        let _counted = (request.method != "GET").then(|| Changing::begin(self));
+        match self.respond(&request, stream) {
+            Ok(sent) => sent,
+            Err(refused) => refuse(stream, &refused),
+        }
+    }
+
+    fn respond(&self, request: &Request, stream: &mut Stream) -> Result<io::Result<()>, ApiError> {
+        let broken = |why: String| ApiError::new(500, why, "this is a bug; please report it");
+        Ok(match (request.method.as_str(), request.path.as_str()) {
+            ("GET", "/") if self.run().is_err() => respond(stream, 409, HTML, WAITING),
+            ("GET", "/") => respond(stream, 200, HTML, &self.buffer.page().map_err(broken)?),
+            ("GET", "/document") => {
+                self.run()?;
+                respond(stream, 200, JSON, &self.buffer.document().map_err(broken)?)
+            }
+            ("GET", "/events") => {
+                let begun = respond_with_events(stream);
+                begun.and_then(|()| self.buffer.stream_changes(stream))
+            }
+            ("GET", "/v1/events") => {
+                let after = first_line(request)?;
+                if let (Some(after), Some(until)) = (after, self.buffer.last_omitted_line())
+                    && after < until
+                {
+                    let error = format!("the lines up to {until} are no longer kept here");
+                    let help = format!(
+                        "/v1/events?after={until} has the others; the files of --journal and --trace \
+                         have all of them"
+                    );
+                    return Err(ApiError::new(410, error, help));
+                }
+                let begun = respond_with_events(stream);
+                begun.and_then(|()| self.buffer.stream_lines(after, stream))
+            }
+            ("POST", "/stop") => {
+                self.allow(request)?;
+                self.stop();
+                respond(stream, 202, TEXT, "The executive is being stopped.\n")
+            }
+            // Requests of the buttons on the page.
+            ("POST", path @ ("/pause" | "/resume")) => {
+                self.allow(request)?;
+                self.change("POST", &format!("/v1{path}"), b"")?;
+                let words = match path {
+                    "/pause" => "Nothing more is started; what is under way goes on.\n",
+                    _ => "It goes on.\n",
+                };
+                respond(stream, 202, TEXT, words)
+            }
+            ("POST", "/cancel") => {
+                self.allow(request)?;
+                for name in self.run()?.0.goals() {
+                    self.change("DELETE", &format!("/v1/goals/{name}"), b"")?;
+                }
+                respond(
+                    stream,
+                    202,
+                    TEXT,
+                    "All goals are abandoned; nothing more is started.\n",
+                )
+            }
+            ("GET", "/v1/openapi.json") => respond(stream, 200, JSON, &text(&openapi())),
+            ("GET", "/v1/state") => respond(stream, 200, JSON, &text(&self.state())),
+            ("GET", "/v1/plan") => respond(stream, 200, JSON, &text(&self.run()?.0.plan())),
+            ("GET", "/v1/guarantee") => {
+                respond(stream, 200, JSON, &text(&self.run()?.0.guarantee()))
+            }
+            ("GET", "/v1/next") => respond(stream, 200, JSON, &text(&self.run()?.0.next())),
+            ("GET", path) => return Err(no_such(path, "GET")),
+            (method, path) => {
+                if !is_known(method, path) {
+                    return Err(no_such(path, method));
+                }
+                self.allow(request)?;
+                let taken = self.change(method, path, &request.body)?;
+                let status = if taken.taken { 200 } else { 202 };
+                respond(stream, status, JSON, &text(&taken))
+            }
+        })
+    }
+
+    /// Returns `true` if the request has the token.
+    pub(super) fn is_known(&self, request: &Request) -> bool {
+        self.control.is_some() && self.allow(request).is_ok()
+    }
+
+    /// Checks that the request has the token.
+    fn allow(&self, request: &Request) -> Result<(), ApiError> {
+        match (&self.control, request.header("authorization")) {
+            (None, _) => Err(ApiError::new(
+                403,
+                "this executive can only be looked at",
+                "start it with --token FILE",
+            )),
+            (Some(control), Some(given)) if control.accepts(given) => Ok(()),
+            (Some(_), given) => Err(ApiError::new(
+                401,
+                match given {
+                    Some(_) => "this is not the token",
+                    None => "this takes the executive's token",
+                },
+                "`elbowroom ctl --token FILE`, or the header `Authorization: Bearer TOKEN`",
+            )),
+        }
+    }
+
+    /// Requests an orderly shutdown of the run.
+    pub(super) fn stop(&self) {
+        if let Some(control) = &self.control {
+            control.stop();
+        }
+    }
+}
+
+/// Guard of a mutation in progress.
+struct Changing<'a>(&'a ApiRouter);
+
+impl<'a> Changing<'a> {
+    fn begin(front: &'a ApiRouter) -> Self {
+        *front.changing() += 1;
+        Self(front)
+    }
+}
+
+impl Drop for Changing<'_> {
+    fn drop(&mut self) {
+        *self.0.changing() -= 1;
+        self.0.answered.notify_all();
+    }
+}
+
+/// Returns the line of the trace after which a client wants events: the one that it names or received last.
+fn first_line(request: &Request) -> Result<Option<usize>, ApiError> {
+    let mut members = request.query.split('&');
+    let asked = members.find_map(|member| member.strip_prefix("after="));
+    let number = asked.or_else(|| request.header("last-event-id"));
+    let number = number.map(str::parse::<usize>).transpose();
+    number.map_err(|_| {
+        let help = "for example /v1/events?after=0 for all lines";
+        ApiError::new(422, "`after` is no number of a line", help)
+    })
+}
+
+/// Returns `true` if the interface has this method and path.
+fn is_known(method_name: &str, path: &str) -> bool {
+    METHODS
+        .iter()
+        .any(|method| method_name == method.verb && is_path(path, method.path))
+}
+
+fn is_path(path: &str, pattern: &str) -> bool {
+    match pattern.strip_suffix("{name}") {
+        Some(head) => path.strip_prefix(head).is_some_and(|name| !name.is_empty()),
+        None => path == pattern,
+    }
+}
+
+/// Returns the error for a path without this method.
+fn no_such(path: &str, method_name: &str) -> ApiError {
+    let mut own = METHODS.iter().filter(|method| is_path(path, method.path));
+    let help = "GET /v1/openapi.json lists what can be asked";
+    match own.next() {
+        Some(method) => {
+            let error = format!("{path} is not for {method_name}, but for {}", method.verb);
+            ApiError::new(405, error, help)
+        }
+        None => ApiError::new(404, "there is nothing at this path", help),
+    }
+}
+
+/// Sends an error as a JSON document.
+fn refuse(stream: &mut Stream, refused: &ApiError) -> io::Result<()> {
+    let (error, help) = (refused.error.clone(), refused.help.clone());
+    respond(
+        stream,
+        refused.status,
+        JSON,
+        &text(&Refusal { error, help }),
+    )
+}
+
+/// Returns a document as a line of JSON.
+fn text(document: &impl Serialize) -> String {
+    let mut text = serde_json::to_string(document).unwrap_or_else(|_| "null".to_owned());
+    text.push('\n');
+    text
+}

@@ -1,0 +1,237 @@
+//! Planning in the background: a thread makes a plan during the run, on demand or in advance.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+
+use elbowroom::execute::{FirstPlan, RunSpec};
+use elbowroom::execution::{PlanAnswer, Planner, PlannerAnswer};
+use elbowroom::model::problem::Condition;
+use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan};
+use elbowroom::num::work::Stop;
+
+use crate::clock::Clock;
+use crate::completion_signal::{Completion, CompletionSignal};
+use crate::memory_limit::MemoryLimit;
+
+/// Planner decorator that plans in a thread. It starts as soon as a plan is expected, and signals completion if the run
+/// continues during planning.
+///
+/// The thread uses the planner of the specification with its own table of facts, so that the answer is the same as
+/// that of a planner that is awaited.
+pub struct BackgroundPlanner<'a> {
+    inner: Box<dyn Planner + 'a>,
+    spec: Arc<RunSpec>,
+    settings: BackgroundSettings,
+    /// Plan that was begun in advance.
+    job: Option<Work>,
+    /// Plan that the run awaits.
+    search: Option<Work>,
+}
+
+/// Settings of background planning.
+#[derive(Clone, Default)]
+pub struct BackgroundSettings {
+    /// Stop request of the run. It also ends planning.
+    pub stop: Stop,
+    /// Signals completion.
+    pub signal: CompletionSignal,
+    /// Limit on the memory of planning, in bytes above the memory of the process at its start.
+    pub most_memory: Option<u64>,
+}
+
+/// Planning in progress.
+struct Work {
+    situation: Situation,
+    goal: Condition,
+    is_needless: Arc<AtomicBool>,
+    is_done: Arc<AtomicBool>,
+    answer: JoinHandle<Option<PlannerAnswer>>,
+}
+
+impl Work {
+    fn is_for(&self, task: &Task, situation: &Situation) -> bool {
+        self.situation == *situation && self.goal == task.problem().goal
+    }
+
+    /// Waits for the answer. Returns it with the fact numbers of `task`, or `None` if planning was interrupted.
+    fn answer(self, task: &Task, situation: &Situation) -> Option<PlannerAnswer> {
+        let mut made = self.answer.join().ok()??;
+        if let PlanAnswer::Plan(plan) = &made.answer {
+            made.answer = PlanAnswer::Plan(renumbered(plan, task, situation)?);
+        }
+        Some(made)
+    }
+}
+
+impl<'a> BackgroundPlanner<'a> {
+    /// Creates a planner for runs of `spec`. `inner` is used where no plan was begun in the background.
+    pub fn new(
+        inner: Box<dyn Planner + 'a>,
+        spec: &RunSpec,
+        settings: &BackgroundSettings,
+    ) -> Self {
+        // A plan in advance is never the first plan.
+        let spec = RunSpec {
+            first_plan: FirstPlan::Shortest,
+            ..spec.clone()
+        };
+        Self {
+            inner,
+            spec: Arc::new(spec),
+            settings: settings.clone(),
+            job: None,
+            search: None,
+        }
+    }
+
+    /// Starts a thread that makes a plan.
+    fn spawn(&self, task: &Task, situation: &Situation) -> Option<Work> {
+        let is_needless = Arc::new(AtomicBool::new(false));
+        let (guard, is_done) = self.settings.signal.guard();
+        let (spec, run_stop, stop) = (
+            Arc::clone(&self.spec),
+            self.settings.stop.clone(),
+            Arc::clone(&is_needless),
+        );
+        let most_memory = self.settings.most_memory;
+        let (own, from) = (task.with_own_table(), situation.clone());
+        let interrupted = Stop::of_this_thread();
+        let made = thread::Builder::new()
+            .name("planner".to_owned())
+            .spawn(move || {
+                let _notifies = guard;
+                interrupted.iter().for_each(Stop::obey);
+                let begun = Clock::start();
+                let clock = || begun.seconds();
+                let limit = most_memory.map(|most| Mutex::new(MemoryLimit::of(most)));
+                let is_too_much = || {
+                    limit.as_ref().is_some_and(|limit| {
+                        let mut limit = limit.lock().unwrap_or_else(PoisonError::into_inner);
+                        limit.is_exceeded()
+                    })
+                };
+                let is_needed = || !stop.load(Ordering::SeqCst) && !run_stop.is_requested();
+                let goes_on = || is_needed() && !is_too_much();
+                let mut planner = spec.planner_for(&own, None, &clock, &goes_on).ok()?;
+                let mut made = planner.plan(&own, &from);
+                if is_too_much() && !matches!(made.answer, PlanAnswer::Plan(_)) {
+                    let most = most_memory.unwrap_or_default() >> 20;
+                    made.answer = PlanAnswer::NotFound {
+                        why: format!("no plan was found with {most} MB (--planner-memory)"),
+                    };
+                }
+                is_needed().then_some(made)
+            });
+        Some(Work {
+            situation: situation.clone(),
+            goal: task.problem().goal.clone(),
+            is_needless,
+            is_done,
+            answer: made.ok()?,
+        })
+    }
+
+    /// Returns the plan that was begun in advance, if it is for this situation; cancels it otherwise.
+    fn take_expected(&mut self, task: &Task, situation: &Situation) -> Option<Work> {
+        let work = self.job.take()?;
+        if work.is_for(task, situation) {
+            return Some(work);
+        }
+        work.is_needless.store(true, Ordering::SeqCst);
+        None
+    }
+}
+
+impl Drop for BackgroundPlanner<'_> {
+    fn drop(&mut self) {
+        for work in self.job.iter().chain(&self.search) {
+            work.is_needless.store(true, Ordering::SeqCst);
+        }
+    }
+}
+
+impl Planner for BackgroundPlanner<'_> {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        let clock = Clock::start();
+        let expected = self.take_expected(task, situation);
+        if let Some(made) = expected.and_then(|work| work.answer(task, situation)) {
+            return PlannerAnswer {
+                seconds: Some(clock.seconds()),
+                ..made
+            };
+        }
+        self.inner.plan(task, situation)
+    }
+
+    fn expect(&mut self, task: &Task, situation: &Situation) {
+        if let Some(work) = self.job.take() {
+            work.is_needless.store(true, Ordering::SeqCst);
+        }
+        // A planner that compares probabilities keeps its results between plans.
+        if !self.spec.executor.asks_odds() {
+            self.job = self.spawn(task, situation);
+        }
+    }
+
+    fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
+        self.give_up();
+        let expected = self.take_expected(task, situation);
+        self.search = expected.or_else(|| self.spawn(task, situation));
+        if let Some(work) = &self.search {
+            self.settings
+                .signal
+                .arm(Arc::clone(&work.is_done), Completion::PlanMade);
+        }
+        self.search.is_some()
+    }
+
+    fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        self.settings.signal.disarm();
+        let Some(work) = self.search.take() else {
+            return self.inner.plan(task, situation);
+        };
+        work.answer(task, situation).unwrap_or_else(|| {
+            let why = "planning was interrupted".to_owned();
+            PlannerAnswer::from(PlanAnswer::NotFound { why })
+        })
+    }
+
+    fn give_up(&mut self) {
+        self.settings.signal.disarm();
+        if let Some(work) = self.search.take() {
+            work.is_needless.store(true, Ordering::SeqCst);
+        }
+    }
+}
+
+/// Returns the plan with the fact numbers of `task`.
+fn renumbered(
+    plan: &TimeTriggeredPlan,
+    task: &Task,
+    situation: &Situation,
+) -> Option<TimeTriggeredPlan> {
+    let problem = task.problem();
+    let numbered = plan.steps.iter().enumerate();
+    let steps = numbered.map(|(index, step)| {
+        let action = if let Some(running) = situation.running.get(index) {
+            Arc::clone(&running.action)
+        } else {
+            let name = step.action.name.trim_matches(['(', ')']);
+            let mut words = name.split_whitespace();
+            let schema = problem.schema(words.next()?)?;
+            let objects: Option<Vec<_>> = words.map(|word| problem.object(word)).collect();
+            Arc::new(task.instantiate(schema, &objects?).ok()?)
+        };
+        Some(Step {
+            action,
+            start: step.start.clone(),
+            duration: step.duration.clone(),
+        })
+    });
+    let steps = steps.collect::<Option<Vec<_>>>()?;
+    Some(TimeTriggeredPlan { steps })
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

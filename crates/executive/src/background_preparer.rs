@@ -1,0 +1,155 @@
+//! Preparation of plans in the background.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+
+use elbowroom::execute::{Analyst, RunSpec, SpecError, WholeRegion};
+use elbowroom::execution::executors::ExecutorSpec;
+use elbowroom::execution::{Mission, Need, PrepareError, Prepared, Preparer, Wanted};
+use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::work::Stop;
+
+use crate::completion_signal::{Completion, CompletionSignal};
+
+/// Preparer that works in a thread and signals completion.
+///
+/// The thread has its own table of facts, so that the answer is the same as that of a preparer that is awaited. If the
+/// preparation adds facts to that table, their numbers are unknown to the run; the plan is then prepared again when it
+/// is collected.
+pub struct BackgroundPreparer {
+    analyst: Analyst,
+    executor: ExecutorSpec,
+    signal: CompletionSignal,
+    work: Option<Work>,
+}
+
+/// Preparation in progress.
+struct Work {
+    is_needless: Arc<AtomicBool>,
+    answer: JoinHandle<Option<Result<Mission, PrepareError>>>,
+}
+
+impl BackgroundPreparer {
+    /// Creates a preparer for runs of `spec`, with the completion signal of the run.
+    ///
+    /// # Errors
+    /// When the world file cannot be read.
+    pub fn new(spec: &RunSpec, task: &Task, signal: &CompletionSignal) -> Result<Self, SpecError> {
+        Ok(Self {
+            analyst: spec.analyst(task.problem())?,
+            executor: spec.executor.clone(),
+            signal: signal.clone(),
+            work: None,
+        })
+    }
+
+    /// Starts a thread that prepares a plan and its dispatchable networks.
+    fn spawn(&self, wanted: &Wanted<'_>) -> Option<Work> {
+        let is_needless = Arc::new(AtomicBool::new(false));
+        let stop = Arc::clone(&is_needless);
+        let (guard, is_done) = self.signal.guard();
+        let own = wanted.task.with_own_table();
+        let (plan, situation) = (wanted.plan.clone(), wanted.situation.clone());
+        let (running, now, need) = (wanted.running.to_vec(), wanted.now.clone(), wanted.need);
+        let (analyst, executor) = (self.analyst.clone(), self.executor.clone());
+        let interrupted = Stop::of_this_thread();
+        let made = thread::Builder::new().name("preparer".to_owned());
+        let made = made.spawn(move || {
+            let _notifies = guard;
+            interrupted.iter().for_each(Stop::obey);
+            let mut analyst = analyst.until(move || {
+                if stop.load(Ordering::SeqCst) {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            });
+            let before = size(&own);
+            let mission = Wanted {
+                task: &own,
+                plan: &plan,
+                situation: &situation,
+                running: &running,
+                now: &now,
+                need,
+            }
+            .mission(&mut analyst);
+            if let Ok(mission) = &mission
+                && need != Need::PartialOrder
+                && !executor.asks_odds()
+            {
+                // Fills the cache of dispatchable networks.
+                let _ = executor.build(Box::new(WholeRegion)).adopt(mission);
+            }
+            (size(&own) == before).then_some(mission)
+        });
+        let answer = made.ok()?;
+        self.signal.arm(is_done, Completion::PlanReady);
+        Some(Work {
+            is_needless,
+            answer,
+        })
+    }
+}
+
+impl Drop for BackgroundPreparer {
+    fn drop(&mut self) {
+        self.give_up();
+    }
+}
+
+impl Preparer for BackgroundPreparer {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, PrepareError> {
+        self.analyst.prepare(task, plan, need)
+    }
+
+    fn begin(&mut self, wanted: &Wanted<'_>) -> bool {
+        self.give_up();
+        self.work = self.spawn(wanted);
+        if self.work.is_none() {
+            // Without a thread, the plan is prepared when it is collected, which is at once. The record contains the
+            // start of the preparation.
+            let (guard, is_done) = self.signal.guard();
+            self.signal.arm(is_done, Completion::PlanReady);
+            drop(guard);
+        }
+        true
+    }
+
+    fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
+        self.signal.disarm();
+        let made = self.work.take().and_then(|work| work.answer.join().ok()?);
+        match made {
+            Some(Ok(mission)) => Ok(Mission {
+                // With the run's own table.
+                task: Arc::new(wanted.situation.rest_of_task(wanted.task)),
+                now: wanted.now.clone(),
+                ..mission
+            }),
+            Some(Err(error)) => Err(error),
+            None => wanted.mission(&mut self.analyst),
+        }
+    }
+
+    fn give_up(&mut self) {
+        if let Some(work) = self.work.take() {
+            self.signal.disarm();
+            work.is_needless.store(true, Ordering::SeqCst);
+        }
+    }
+}
+
+/// Returns the numbers of facts and fluents in the table.
+fn size(task: &Task) -> (usize, usize) {
+    (task.fact_count(), task.fluent_count())
+}
+
+#[cfg(test)]
+mod tests;

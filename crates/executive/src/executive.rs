@@ -1,0 +1,347 @@
+//! Persistent executive in this process.
+
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use elbowroom::answers::{Halt, Watcher};
+use elbowroom::execute::{RunSpec, misfit, read_goal};
+use elbowroom::execution::Request;
+use elbowroom::execution::run::PlanningTime;
+use elbowroom::executive::Status;
+use elbowroom::executive::documents::State;
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+use elbowroom::num::work::Stop;
+use elbowroom::pddl;
+use elbowroom::report::trace::TraceWriter;
+
+use crate::background_planner::BackgroundSettings;
+use crate::clock::Clock;
+use crate::completion_signal::CompletionSignal;
+use crate::error::{Error, WarningSink};
+use crate::journal::{JournalFile, Segments};
+use crate::messages::plain;
+use crate::operator::OperatorInterface;
+use crate::process_world::ProcessLimits;
+use crate::request_queue::{ExternalRequest, RequestQueue, RequestStatus};
+use crate::resume::{InterruptedRun, ResumeSettings};
+use crate::run::{JournaledOutcome, RunError, RunHost, RunInputs};
+use crate::trace_buffer::TraceBuffer;
+
+/// Settings of an executive that its specification does not contain.
+#[derive(Clone, Debug)]
+pub struct ExecutiveSettings {
+    /// File of the journal. Only runs in a world that is a process can have one.
+    pub journal: Option<PathBuf>,
+    /// Rotation of the journal.
+    pub segments: Option<Segments>,
+    /// Limits of a world that is a process.
+    pub limits: ProcessLimits,
+    /// Limit on the memory of planning, in bytes above the memory of the process at its start.
+    pub planner_memory: Option<u64>,
+    /// Receiver of warnings.
+    pub warnings: WarningSink,
+}
+
+impl Default for ExecutiveSettings {
+    /// No journal; one hour for each answer of the world, whose invalid messages are ignored; 1 GB for planning.
+    fn default() -> Self {
+        Self {
+            journal: None,
+            segments: None,
+            limits: ProcessLimits {
+                answer_timeout: Rational::from(3600),
+                is_strict: false,
+            },
+            planner_memory: Some(1000 << 20),
+            warnings: WarningSink::default(),
+        }
+    }
+}
+
+/// Persistent run that accepts goals, facts and pauses until it is stopped.
+///
+/// One thread calls [`Executive::run`]. All other methods can be called from any thread during the run.
+pub struct Executive {
+    spec: RunSpec,
+    task: Arc<Task>,
+    /// The problem with its own table of facts, for checks of requests.
+    checks: Task,
+    settings: ExecutiveSettings,
+    queue: RequestQueue,
+    status: Status,
+    buffer: TraceBuffer,
+    stop: Stop,
+    /// Start of the run, until it is started.
+    start: Mutex<Option<Start>>,
+}
+
+/// Start of a run.
+enum Start {
+    /// A new run, with its empty journal.
+    New(Option<JournalFile>),
+    /// A run that is resumed.
+    Resumed(Box<InterruptedRun>),
+}
+
+impl Executive {
+    /// Creates an executive for the domain, the problem, the world and the planner of a specification. Planning takes
+    /// its measured time. A simulated world runs on the wall clock.
+    ///
+    /// # Errors
+    /// When the domain or the problem is invalid, the specification is contradictory or its executor does not support
+    /// changing goals, or the journal cannot be created.
+    pub fn new(mut spec: RunSpec, settings: ExecutiveSettings) -> Result<Self, RunError> {
+        if spec.world_process.is_none() && spec.realtime.is_none() {
+            spec.realtime = Some(Rational::ONE);
+        }
+        spec.planning_time = PlanningTime::Measured;
+        make_persistent(&mut spec)?;
+        spec.check()?;
+        let journal = match &settings.journal {
+            Some(_) if spec.world_process.is_none() => {
+                return Err(RunError::Failed(Error::new(
+                    "a simulated world ends with the program, so that its run has no journal",
+                    "name a world process, or leave out the journal",
+                )));
+            }
+            Some(path) => {
+                let file = JournalFile::create(path, "Executive::resume")?;
+                Some(file.with_rotation(settings.segments, &settings.warnings))
+            }
+            None => None,
+        };
+        Self::with_start(spec, settings, Start::New(journal))
+    }
+
+    /// Creates an executive that resumes the run of a journal. `settings.journal` is ignored.
+    ///
+    /// # Errors
+    /// When the journal cannot be read, is damaged, or is that of a finished run.
+    pub fn resume(journal: &Path, settings: ExecutiveSettings) -> Result<Self, RunError> {
+        let cannot = |error: &std::io::Error| {
+            let message = format!("cannot read {}: {}", journal.display(), plain(error));
+            Error::new(message, "check the path of the journal")
+        };
+        let text = fs::read_to_string(journal).map_err(|error| cannot(&error))?;
+        let run = InterruptedRun::read(journal, &text, text.len() as u64)?;
+        let spec = run.spec().clone();
+        Self::with_start(spec, settings, Start::Resumed(Box::new(run)))
+    }
+
+    fn with_start(
+        spec: RunSpec,
+        settings: ExecutiveSettings,
+        start: Start,
+    ) -> Result<Self, RunError> {
+        let read = pddl::read_problem(&spec.domain.source(), &spec.problem.source());
+        let (problem, _) = read.map_err(RunError::Problem)?;
+        let task = Arc::new(Task::new(problem).with_epsilon(spec.epsilon.clone()));
+        let buffer = TraceBuffer::bounded();
+        let mut header = |line: &str| buffer.add(line);
+        let written = TraceWriter::new(Arc::clone(&task), &mut header).header(&spec);
+        written.map_err(|error| Error::new(format!("cannot write the trace: {error}"), ""))?;
+        Ok(Self {
+            status: Status::new(&task, spec.timeout.clone()),
+            checks: task.with_own_table(),
+            spec,
+            task,
+            settings,
+            queue: RequestQueue::default(),
+            buffer,
+            stop: Stop::default(),
+            start: Mutex::new(Some(start)),
+        })
+    }
+
+    /// Submits a request, and waits until the run accepts it, for at most `timeout`.
+    ///
+    /// # Errors
+    /// When a goal is invalid, a fact or fluent is unknown, or the queue is full.
+    pub fn submit(
+        &self,
+        request: ExternalRequest,
+        timeout: Duration,
+    ) -> Result<RequestStatus, Error> {
+        self.check(&request)?;
+        let number = self.queue.submit(vec![request]).ok_or_else(|| {
+            Error::new(
+                "too many requests wait for the executive",
+                "wait until it has processed some",
+            )
+        })?;
+        Ok(self.queue.wait_until_accepted(number, timeout))
+    }
+
+    fn check(&self, request: &ExternalRequest) -> Result<(), Error> {
+        let task = &self.checks;
+        match request {
+            ExternalRequest::Request(Request::Pursue { goal, .. }) => {
+                let help = "write a condition as in the section :goal, such as (at rover base)";
+                let read = read_goal(task, goal).map_err(|why| Error::new(why, help))?;
+                match misfit(task.problem(), &read) {
+                    Some(why) => Err(Error::new(why, help)),
+                    None => Ok(()),
+                }
+            }
+            ExternalRequest::Request(_) => Ok(()),
+            ExternalRequest::Fact { fact, .. } => {
+                let is_known = task
+                    .fact_named(fact)
+                    .is_some_and(|fact| !task.is_derived(fact));
+                is_known.then_some(()).ok_or_else(|| {
+                    Error::new(
+                        format!("the problem has no fact `{fact}` that can be reported"),
+                        "write it as in the problem, such as (at rover base)",
+                    )
+                })
+            }
+            ExternalRequest::Number { fluent, .. } => {
+                task.fluent_named(fluent).map(drop).ok_or_else(|| {
+                    Error::new(
+                        format!("the problem has no fluent `{fluent}`"),
+                        "write it as in the problem, such as (charge rover)",
+                    )
+                })
+            }
+        }
+    }
+
+    /// Returns the state of the run: activity, goals, running actions, believed facts and numbers.
+    pub fn status(&self) -> State {
+        self.status.state()
+    }
+
+    /// Returns the trace of the run. Its streams send each new line.
+    pub fn events(&self) -> &TraceBuffer {
+        &self.buffer
+    }
+
+    /// Requests an orderly shutdown: running actions are cancelled, and the world is stopped.
+    pub fn stop(&self) {
+        self.stop.request();
+    }
+
+    /// Executes the run in this thread until it is stopped or fails. Computations of this thread obey the stop request.
+    ///
+    /// # Errors
+    /// When the run cannot be started, or was started before.
+    pub fn run(&self) -> Result<JournaledOutcome, RunError> {
+        let start = self.start.lock();
+        let start = start.unwrap_or_else(PoisonError::into_inner).take();
+        let start = start
+            .ok_or_else(|| Error::new("the run was started before", "create another executive"))?;
+        self.stop.obey();
+        let outcome = self.execute(start);
+        self.queue.close();
+        self.buffer.close();
+        outcome
+    }
+
+    fn execute(&self, start: Start) -> Result<JournaledOutcome, RunError> {
+        let mut watcher = StopWatcher {
+            clock: Clock::start(),
+            stop: self.stop.clone(),
+        };
+        let background = BackgroundSettings {
+            stop: self.stop.clone(),
+            signal: CompletionSignal::default(),
+            most_memory: self.settings.planner_memory,
+        };
+        let limits = self.settings.limits.clone();
+        let operator = self.operator_interface();
+        let journal = match start {
+            Start::Resumed(run) => {
+                let settings = ResumeSettings {
+                    task: &self.task,
+                    background,
+                    limits,
+                    warnings: self.settings.warnings.clone(),
+                };
+                return run.resume(settings, self, &mut watcher);
+            }
+            Start::New(journal) => journal,
+        };
+        let inputs = RunInputs {
+            spec: &self.spec,
+            task: &self.task,
+            first_plan: None,
+            operator: &operator,
+            background,
+            limits,
+            since: None,
+            observer: None,
+        };
+        match journal {
+            Some(file) => inputs.execute_journaled(file, self, &mut watcher),
+            None => Ok(JournaledOutcome {
+                outcome: inputs.execute(&mut |_| {}, self, &mut watcher)?,
+                journal_failure: None,
+            }),
+        }
+    }
+
+    fn operator_interface(&self) -> OperatorInterface {
+        OperatorInterface::new(self.queue.clone(), self.status.clone(), self.buffer.clone())
+    }
+}
+
+impl RunHost for Executive {
+    fn operator(&self, spec: &RunSpec, _: &Arc<Task>) -> Result<OperatorInterface, Error> {
+        if !spec.is_lasting {
+            return Err(Error::new(
+                "this is the journal of a run that ends with its goal",
+                "resume it with `elbowroom run --resume`",
+            ));
+        }
+        Ok(self.operator_interface())
+    }
+
+    fn segments(&self) -> Option<Segments> {
+        self.settings.segments
+    }
+}
+
+/// Makes the run of a specification persistent: it waits for further goals, and plans in the background.
+///
+/// # Errors
+/// When the executor does not support changing goals.
+pub fn make_persistent(spec: &mut RunSpec) -> Result<(), Error> {
+    spec.is_lasting = true;
+    let knows_one_goal = spec.executor.registered.name == "lookahead";
+    if knows_one_goal || spec.executor.asks_odds() {
+        return Err(Error::new(
+            format!(
+                "`{}` reckons with one goal, and goals change here",
+                spec.executor
+            ),
+            "choose another executor, such as guarded or live",
+        ));
+    }
+    spec.plans_aside = spec.can_plan_aside();
+    spec.readies_aside = spec.plans_aside;
+    Ok(())
+}
+
+/// Watcher that ends a run on a stop request.
+struct StopWatcher {
+    clock: Clock,
+    stop: Stop,
+}
+
+impl Watcher for StopWatcher {
+    fn elapsed(&mut self) -> Duration {
+        self.clock.elapsed()
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        if self.stop.is_requested() {
+            ControlFlow::Break(Halt::Cancelled)
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! Persistent execution of temporal plans: everything that an executive needs beside the state machine
+//! of `elbowroom::execution`.
+//!
+//! [`Executive`] is the entry point for programs that embed an executive: it accepts goals, executes plans for them, and
+//! resumes its run after a crash. The parts below are for programs that assemble a run themselves.
+//!
+//! - [`journal`], [`journaling`]: append-only record of a run that survives a crash (`docs/formats/journal.md`), and
+//!   the recorder and world decorator that write it ahead of each command.
+//! - [`request_queue`], [`operator`]: bounded queue of operators' requests, and the world decorator that adds them to
+//!   the observations of the run.
+//! - [`background_planner`], [`background_preparer`], [`completion_signal`]: planning during the run.
+//! - [`process_world`], [`world_protocol`], [`belief_updates`]: a world that is a process
+//!   (`docs/formats/world-protocol.md`). [`realtime`]: a simulated world on the wall clock.
+//! - [`run`], [`resume`]: assembly of a run from its specification, and recovery from its journal.
+//! - [`http`], [`api`], [`trace_buffer`]: HTTP server and client, the interface of an executive (`docs/serve.md`), and
+//!   the buffer of the trace for clients.
+//! - [`clock`], [`memory_limit`], [`messages`]: wall clock, memory limit, texts of messages.
+//!
+//! This crate makes threads, reads clocks and writes files. It prints nothing: warnings go to a
+//! [`WarningSink`].
+
+pub mod api;
+pub mod background_planner;
+pub mod background_preparer;
+pub mod belief_updates;
+pub mod clock;
+pub mod completion_signal;
+mod error;
+mod executive;
+pub mod http;
+pub mod journal;
+pub mod journaling;
+pub mod memory_limit;
+pub mod messages;
+pub mod operator;
+pub mod process_world;
+pub mod realtime;
+pub mod request_queue;
+pub mod resume;
+pub mod run;
+pub mod trace_buffer;
+pub mod world_protocol;
+
+pub use error::{Error, WarningSink};
+pub use executive::{Executive, ExecutiveSettings, make_persistent};

@@ -1,0 +1,140 @@
+//! Interface of operators to a run: requests to the run, and its status and trace.
+//!
+//! Requests wait in a [`RequestQueue`]. The run drains it as observations of its world ([`InteractiveWorld`]), so that
+//! requests are recorded in the trace and the run never waits for clients.
+
+mod interactive_world;
+mod throttle;
+
+use std::sync::Arc;
+
+use elbowroom::execution::run::Stand;
+use elbowroom::execution::{Entry, Recorder};
+use elbowroom::executive::Status;
+use elbowroom::model::Task;
+use elbowroom::report::trace::{Line, SnapshotLine, snapshot_text};
+
+pub use interactive_world::InteractiveWorld;
+
+use crate::request_queue::RequestQueue;
+use crate::trace_buffer::TraceBuffer;
+
+/// Channels between operators and a run. The default has none.
+#[derive(Clone, Default)]
+pub struct OperatorInterface(Option<Channels>);
+
+#[derive(Clone)]
+struct Channels {
+    queue: RequestQueue,
+    /// Status and trace for clients of the HTTP interface.
+    published: Option<(Status, TraceBuffer)>,
+}
+
+impl OperatorInterface {
+    /// Creates an interface with a request queue, a status and a trace buffer.
+    pub fn new(queue: RequestQueue, status: Status, buffer: TraceBuffer) -> Self {
+        let published = Some((status, buffer));
+        Self(Some(Channels { queue, published }))
+    }
+
+    /// Creates an interface with a request queue only.
+    pub fn with_queue(queue: RequestQueue) -> Self {
+        Self(Some(Channels {
+            queue,
+            published: None,
+        }))
+    }
+
+    /// Publishes the snapshot at which a resumed run begins.
+    pub fn begin_at(&self, snapshot: &SnapshotLine) {
+        if let Some((status, buffer)) = self.0.as_ref().and_then(|it| it.published.as_ref()) {
+            status.begin_at(snapshot);
+            buffer.add(&format!("{}\n", snapshot_text(snapshot)));
+        }
+    }
+
+    /// Returns the request queue.
+    pub fn queue(&self) -> Option<&RequestQueue> {
+        self.0.as_ref().map(|channels| &channels.queue)
+    }
+
+    /// Returns the published status.
+    pub fn status(&self) -> Option<&Status> {
+        let published = self.0.as_ref().and_then(|it| it.published.as_ref());
+        published.map(|(status, _)| status)
+    }
+
+    /// Returns a callback that publishes the belief state of the run.
+    pub fn listener(&self) -> impl FnMut(&elbowroom::execution::Progression) + Send + use<> {
+        let status = self.status().cloned();
+        move |belief| {
+            if let Some(status) = &status {
+                status.believe(belief);
+            }
+        }
+    }
+
+    /// Wraps a recorder so that entries are published as well. With `written_ahead`, the recorder reports when
+    /// requests are on the disk; otherwise they count as recorded at once.
+    pub fn publishing<R: Recorder>(
+        &self,
+        inner: R,
+        task: &Arc<Task>,
+        written_ahead: bool,
+    ) -> TeeRecorder<R> {
+        TeeRecorder {
+            inner,
+            task: Arc::clone(task),
+            channels: self.0.clone(),
+            written_ahead,
+            unprocessed: 0,
+        }
+    }
+}
+
+/// Recorder that passes entries on and publishes them to operators.
+pub struct TeeRecorder<R> {
+    inner: R,
+    task: Arc<Task>,
+    channels: Option<Channels>,
+    written_ahead: bool,
+    /// Number of observations that the run has received but not processed.
+    unprocessed: usize,
+}
+
+impl<R: Recorder> Recorder for TeeRecorder<R> {
+    fn record(&mut self, entry: &Entry<'_>) {
+        self.inner.record(entry);
+        if let Some(channels) = &self.channels {
+            if let Some((status, buffer)) = &channels.published {
+                status.record(entry);
+                let line = Line::of(&self.task, entry);
+                buffer.add(&format!("{}\n", line.text()));
+            }
+            let queue = &channels.queue;
+            match entry {
+                Entry::Passed { observations, .. } => {
+                    self.unprocessed = observations.len();
+                    if !self.written_ahead {
+                        queue.note_recorded();
+                    }
+                }
+                Entry::Taken { .. } => {
+                    self.unprocessed = self.unprocessed.saturating_sub(1);
+                }
+                _ => return,
+            }
+            if self.unprocessed == 0 {
+                queue.acknowledge();
+            }
+        }
+    }
+
+    fn commit(&mut self) {
+        self.inner.commit();
+    }
+
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        self.inner.begin_anew(stand)
+    }
+}

@@ -1,0 +1,213 @@
+//! Replay of a journal: recorder, planner and watcher of a resumed run.
+
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use elbowroom::answers::{Halt, Watcher};
+use elbowroom::execution::run::Stand;
+use elbowroom::execution::{Entry, Planner, PlannerAnswer, Recorder};
+use elbowroom::model::{Situation, Task};
+use elbowroom::report::trace::{Line, ReplayPlanner, Stored};
+
+use crate::journaling::{JournalHealth, JournalWriter};
+
+/// Lines of a journal, and the progress of their replay.
+pub(super) struct JournalReplay {
+    lines: Vec<Line>,
+    /// Line number of the first one in the file.
+    first: usize,
+    played: AtomicUsize,
+    /// First line that deviates; 0 if there is none.
+    difference: AtomicUsize,
+    is_to_end: AtomicBool,
+}
+
+impl JournalReplay {
+    pub(super) fn new(stored: &Stored) -> Self {
+        let replay = Self {
+            lines: stored.lines.clone(),
+            first: stored.first_number(),
+            played: AtomicUsize::new(0),
+            difference: AtomicUsize::new(0),
+            is_to_end: AtomicBool::new(false),
+        };
+        replay.look_ahead(0);
+        replay
+    }
+
+    /// Ends the run where its journal contains an interruption.
+    fn look_ahead(&self, next: usize) {
+        let is_to_end = matches!(self.lines.get(next), Some(Line::Interrupted(_)));
+        self.is_to_end.store(is_to_end, Ordering::SeqCst);
+    }
+
+    /// Compares an entry with the journal. Returns `true` for a new entry after its end.
+    fn play(&self, line: &Line) -> bool {
+        let index = self.played.fetch_add(1, Ordering::SeqCst);
+        let Some(stored) = self.lines.get(index) else {
+            return self.difference().is_none();
+        };
+        self.look_ahead(index + 1);
+        if stored != line && self.difference().is_none() {
+            self.difference.store(index + self.first, Ordering::SeqCst);
+        }
+        false
+    }
+
+    /// Returns `true` if the last entry is in the journal: the world has, or may have, received its command.
+    pub(super) fn has_last(&self) -> bool {
+        self.played.load(Ordering::SeqCst) <= self.lines.len()
+    }
+
+    /// Returns `true` after the last line.
+    pub(super) fn is_over(&self) -> bool {
+        self.played.load(Ordering::SeqCst) >= self.lines.len()
+    }
+
+    /// Returns the number of the first line that deviates.
+    pub(super) fn difference(&self) -> Option<usize> {
+        Some(self.difference.load(Ordering::SeqCst)).filter(|line| *line > 0)
+    }
+}
+
+/// Recorder that compares entries with the journal and writes new ones.
+pub(super) struct ReplayRecorder<'a> {
+    pub(super) replay: Arc<JournalReplay>,
+    pub(super) task: Arc<Task>,
+    pub(super) writer: JournalWriter<'a>,
+}
+
+impl Recorder for ReplayRecorder<'_> {
+    fn record(&mut self, entry: &Entry<'_>) {
+        if self.replay.play(&Line::of(&self.task, entry)) {
+            self.writer.record(entry);
+        }
+    }
+
+    fn commit(&mut self) {
+        self.writer.commit();
+    }
+
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        // Only new entries can be replaced.
+        self.replay.is_over() && self.replay.difference().is_none() && self.writer.begin_anew(stand)
+    }
+}
+
+/// Planner that returns the plans of the journal, then new ones. A plan that was in progress at the end of the journal is
+/// made again.
+pub(super) struct ResumedPlanner<'a> {
+    /// For each request for a plan in the journal, in order: `true` if it has the answer.
+    asked: VecDeque<bool>,
+    journal: ReplayPlanner,
+    planner: Box<dyn Planner + 'a>,
+    /// Source of the plan that is made in the background.
+    begun: Source,
+}
+
+/// Source of a plan.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Source {
+    /// The journal.
+    Journal,
+    /// The planner.
+    Planner,
+}
+
+impl<'a> ResumedPlanner<'a> {
+    pub(super) fn new(stored: &Stored, planner: Box<dyn Planner + 'a>) -> Self {
+        let mut asked = VecDeque::new();
+        for line in &stored.lines {
+            match line {
+                Line::Planning(_) => asked.push_back(false),
+                Line::Planned(_) => {
+                    if let Some(last) = asked.back_mut() {
+                        *last = true;
+                    }
+                }
+                _ => {}
+            }
+        }
+        Self {
+            asked,
+            journal: ReplayPlanner::new(stored),
+            planner,
+            begun: Source::Journal,
+        }
+    }
+
+    /// Returns the source of the next plan, or `None` for a plan that was begun and abandoned in the journal.
+    fn next(&mut self) -> Option<Source> {
+        match self.asked.pop_front() {
+            Some(true) => Some(Source::Journal),
+            Some(false) if !self.asked.is_empty() => None,
+            _ => Some(Source::Planner),
+        }
+    }
+}
+
+impl Planner for ResumedPlanner<'_> {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        match self.next() {
+            Some(Source::Journal) => self.journal.plan(task, situation),
+            _ => self.planner.plan(task, situation),
+        }
+    }
+
+    fn begin(&mut self, task: &Task, situation: &Situation) -> bool {
+        self.begun = self.next().unwrap_or(Source::Journal);
+        match self.begun {
+            Source::Journal => self.journal.begin(task, situation),
+            Source::Planner => self.planner.begin(task, situation),
+        }
+    }
+
+    fn collect(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        match self.begun {
+            Source::Journal => self.journal.collect(task, situation),
+            Source::Planner => self.planner.collect(task, situation),
+        }
+    }
+
+    fn give_up(&mut self) {
+        if self.begun == Source::Planner {
+            self.planner.give_up();
+        }
+    }
+
+    fn expect(&mut self, task: &Task, situation: &Situation) {
+        if self.asked.is_empty() {
+            self.planner.expect(task, situation);
+        }
+    }
+
+    fn is_recorded(&self) -> bool {
+        self.asked.front() == Some(&true)
+    }
+}
+
+/// Watcher that ends the run at an interruption in the journal, after a failure of the journal, and after its end as the
+/// inner watcher requests.
+pub(super) struct ReplayWatcher<'w> {
+    pub(super) inner: &'w mut (dyn Watcher + Send),
+    pub(super) replay: Arc<JournalReplay>,
+    pub(super) health: JournalHealth,
+}
+
+impl Watcher for ReplayWatcher<'_> {
+    fn elapsed(&mut self) -> Duration {
+        self.inner.elapsed()
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        let is_to_end = self.replay.is_to_end.load(Ordering::SeqCst) || self.health.has_failed();
+        match () {
+            () if is_to_end => ControlFlow::Break(Halt::Cancelled),
+            () if self.replay.is_over() => self.inner.flow(),
+            () => ControlFlow::Continue(()),
+        }
+    }
+}

@@ -1,0 +1,368 @@
+//! Assembly of a run from its specification: world, planner, preparer and recorders.
+
+use std::fmt;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom::answers::run::{RunOutcome, run as execute};
+use elbowroom::answers::{Event, Halt, RunRequest, Watcher};
+use elbowroom::execute::{RunSpec, SpecError};
+use elbowroom::execution::run::Stand;
+use elbowroom::execution::{Entry, Planner, Progression, Recorder, World};
+use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::{Line, TraceWriter};
+use elbowroom::text::Diagnostics;
+
+use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
+use crate::background_preparer::BackgroundPreparer;
+use crate::belief_updates::BeliefUpdates;
+use crate::clock::Clock;
+use crate::error::Error;
+use crate::journal::{JournalFile, Segments};
+use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
+use crate::operator::{InteractiveWorld, OperatorInterface};
+use crate::process_world::{ProcessLimits, ProcessWorld};
+use crate::realtime::{Pace, PacedPlanner, Realtime};
+use crate::trace_buffer::TraceBuffer;
+
+/// Application that embeds a run. The defaults have neither operators nor viewers.
+pub trait RunHost {
+    /// Returns the operators' interface to a resumed run.
+    ///
+    /// # Errors
+    /// When the host does not support such a run.
+    fn operator(&self, spec: &RunSpec, task: &Arc<Task>) -> Result<OperatorInterface, Error> {
+        let _ = (spec, task);
+        Ok(OperatorInterface::default())
+    }
+
+    /// Returns the rotation settings for the journal of a resumed run.
+    fn segments(&self) -> Option<Segments> {
+        None
+    }
+
+    /// Opens viewers of the run. Returns the buffer that receives its trace, if there are any. Called before the world
+    /// starts.
+    ///
+    /// # Errors
+    /// When a viewer cannot be opened. Nothing is executed then.
+    fn open_viewers(
+        &self,
+        spec: &RunSpec,
+        task: &Arc<Task>,
+        operator: &OperatorInterface,
+    ) -> Result<Option<TraceBuffer>, Error> {
+        let _ = (spec, task, operator);
+        Ok(None)
+    }
+
+    /// Called when execution begins. The first record is on the disk if there is a journal.
+    fn started(&self) {}
+}
+
+/// Run without an outcome.
+#[derive(Debug)]
+pub enum RunError {
+    /// The domain or the problem is invalid.
+    Problem(Diagnostics),
+    /// The specification is contradictory.
+    Spec(SpecError),
+    /// The run cannot be started or recorded.
+    Failed(Error),
+}
+
+impl fmt::Display for RunError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Problem(mistakes) => match mistakes.errors().next() {
+                Some(first) => first.fmt(f),
+                None => f.write_str("the problem is invalid"),
+            },
+            Self::Spec(error) => error.fmt(f),
+            Self::Failed(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for RunError {}
+
+impl From<SpecError> for RunError {
+    fn from(error: SpecError) -> Self {
+        Self::Spec(error)
+    }
+}
+
+impl From<Error> for RunError {
+    fn from(error: Error) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// Outcome of a run with a journal.
+#[derive(Clone, Debug)]
+pub struct JournaledOutcome {
+    /// The outcome.
+    pub outcome: RunOutcome,
+    /// Reason why the journal is incomplete, or `None` if all records are written.
+    pub journal_failure: Option<String>,
+}
+
+/// Callback for entries of the record.
+pub type EntryObserver<'a> = Box<dyn FnMut(&Entry<'_>) + Send + 'a>;
+
+/// Inputs of a run.
+pub struct RunInputs<'a> {
+    /// The specification.
+    pub spec: &'a RunSpec,
+    /// The problem of the specification.
+    pub task: &'a Arc<Task>,
+    /// The first plan; without it, the planner makes one.
+    pub first_plan: Option<TimeTriggeredPlan>,
+    /// Channels to operators.
+    pub operator: &'a OperatorInterface,
+    /// Background planning, with the stop request of the run.
+    pub background: BackgroundSettings,
+    /// Limits of a world that is a process.
+    pub limits: ProcessLimits,
+    /// Runs from time 0 if that is a date; otherwise time 0 is the start of the run.
+    pub since: Option<Clock>,
+    /// Called for each entry after it is recorded, for example by a progress display.
+    pub observer: Option<EntryObserver<'a>>,
+}
+
+impl RunInputs<'_> {
+    /// Executes a run without a journal. `trace` receives the lines of the trace, with their line feeds. `watcher` can
+    /// end the run early.
+    ///
+    /// # Errors
+    /// When the specification is contradictory, or the run cannot be started.
+    pub fn execute(
+        mut self,
+        trace: &mut (dyn FnMut(&str) + Send),
+        host: &dyn RunHost,
+        watcher: &mut (dyn Watcher + Send),
+    ) -> Result<RunOutcome, RunError> {
+        let task = self.task;
+        let buffer = host.open_viewers(self.spec, task, self.operator)?;
+        let mut writer = TraceWriter::new(Arc::clone(task), trace);
+        let written = writer.header(self.spec);
+        written.map_err(|error| Error::new(format!("cannot write the trace: {error}"), ""))?;
+        let writer = self.operator.publishing(&mut writer, task, false);
+        let mut writer = ViewedRecorder::new(writer, task, buffer, self.observer.take());
+        let Some(command) = &self.spec.world_process else {
+            return Ok(self.simulated(&mut writer, host, watcher)?);
+        };
+        let (limits, stop) = (self.limits.clone(), self.background.stop.clone());
+        let world = ProcessWorld::start(command, task, limits, stop)?;
+        let beliefs = BeliefUpdates::default();
+        let world = world.with_beliefs(beliefs.clone());
+        let mut world = self.interactive(world, &Rational::ONE);
+        host.started();
+        let outcome = self.run(&mut world, &mut writer, beliefs.listener(), watcher);
+        world.into_inner().stop();
+        Ok(outcome?)
+    }
+
+    /// Executes a run in a world that is a process, with an empty journal.
+    ///
+    /// # Errors
+    /// As [`RunInputs::execute`], and when the first record cannot be written.
+    pub fn execute_journaled(
+        mut self,
+        mut file: JournalFile,
+        host: &dyn RunHost,
+        watcher: &mut (dyn Watcher + Send),
+    ) -> Result<JournaledOutcome, RunError> {
+        let (spec, task) = (self.spec, self.task);
+        let mut is_written = false;
+        let mut sink = |line: &str| is_written = file.write(line);
+        let mut header = TraceWriter::new(Arc::clone(task), &mut sink);
+        let written = header.header(spec);
+        written.map_err(|error| Error::new(format!("cannot write the journal: {error}"), ""))?;
+        // A client that submits the problem is notified that it is on the disk. Other runs can be started again.
+        if !is_written || (spec.is_lasting && !file.sync()) {
+            let why = file.failure().unwrap_or_default();
+            return Err(RunError::Failed(Error::new(
+                format!("cannot write the journal {}: {why}", file.path().display()),
+                "nothing was started; make room on the disk, or choose another file",
+            )));
+        }
+        let health = JournalHealth::default();
+        let buffer = host.open_viewers(spec, task, self.operator)?;
+        let command = spec.world_process.as_deref().unwrap_or_default();
+        let (limits, stop) = (self.limits.clone(), self.background.stop.clone());
+        let world = ProcessWorld::start(command, task, limits, stop)?;
+        let beliefs = BeliefUpdates::default();
+        let world = JournaledWorld::new(world.with_beliefs(beliefs.clone()), health.clone());
+        let mut world = self.interactive(world, &Rational::ONE);
+        host.started();
+        let outcome = {
+            let writer = JournalWriter::new(task, &mut file, &health, self.operator.queue());
+            let writer = self.operator.publishing(writer, task, true);
+            let mut writer = ViewedRecorder::new(writer, task, buffer, self.observer.take());
+            let mut watcher = JournalWatcher {
+                inner: watcher,
+                health,
+            };
+            self.run(&mut world, &mut writer, beliefs.listener(), &mut watcher)
+        };
+        world.into_inner().into_inner().stop();
+        Ok(JournaledOutcome {
+            outcome: outcome?,
+            journal_failure: file.failure(),
+        })
+    }
+
+    /// Wraps a world for operators' requests and background planning.
+    fn interactive<'w, W: World>(&self, world: W, factor: &Rational) -> InteractiveWorld<'w, W> {
+        let BackgroundSettings { stop, signal, .. } = &self.background;
+        InteractiveWorld::new(world, self.operator, self.task, stop, signal, factor)
+    }
+
+    fn run(
+        self,
+        world: &mut dyn World,
+        recorder: &mut dyn Recorder,
+        mut listener: impl FnMut(&Progression) + Send,
+        watcher: &mut (dyn Watcher + Send),
+    ) -> Result<RunOutcome, SpecError> {
+        let begun = Clock::start();
+        let clock = || begun.seconds();
+        let continues = || !self.background.stop.is_requested();
+        let model = self.spec.model(self.task.problem());
+        let model = model.map_err(SpecError::World)?;
+        let planner = self
+            .spec
+            .planner_for(self.task, model.as_ref(), &clock, &continues)?;
+        let signal = &self.background.signal;
+        let request = RunRequest::new(self.spec, self.task)
+            .beginning_with(self.first_plan)
+            .planned_by(BackgroundPlanner::new(planner, self.spec, &self.background))
+            .prepared_by(BackgroundPreparer::new(self.spec, self.task, signal)?)
+            .told_to(both(self.operator.listener(), &mut listener))
+            .recorded_by(recorder);
+        execute(request, world, watcher)
+    }
+
+    /// Executes a run in the simulated world of the specification, on a wall clock if it has one.
+    fn simulated(
+        self,
+        recorder: &mut dyn Recorder,
+        host: &dyn RunHost,
+        watcher: &mut (dyn Watcher + Send),
+    ) -> Result<RunOutcome, SpecError> {
+        let (spec, task) = (self.spec, self.task);
+        let model = spec.model(task.problem()).map_err(SpecError::World)?;
+        let model = model.unwrap_or_default();
+        let mut world = spec.world(&model, task, self.first_plan.as_ref())?;
+        host.started();
+        let Some(factor) = &spec.realtime else {
+            return self.run(world.as_mut(), recorder, |_: &Progression| {}, watcher);
+        };
+        let pace = Pace::new(factor, self.since);
+        let begun = Clock::start();
+        let clock = || begun.seconds();
+        let continues = || !self.background.stop.is_requested();
+        let planner = spec.planner_for(task, Some(&model), &clock, &continues)?;
+        let planner: Box<dyn Planner> =
+            Box::new(BackgroundPlanner::new(planner, spec, &self.background));
+        let world = Realtime {
+            inner: world.as_mut(),
+            pace: &pace,
+            stop: &self.background.stop,
+        };
+        let mut world = self.interactive(world, factor);
+        let signal = &self.background.signal;
+        let request = RunRequest::new(spec, task)
+            .beginning_with(self.first_plan)
+            .told_to(self.operator.listener())
+            .prepared_by(BackgroundPreparer::new(spec, task, signal)?)
+            .planned_by(PacedPlanner {
+                inner: planner,
+                pace: &pace,
+                planning_time: &spec.planning_time,
+            })
+            .recorded_by(recorder);
+        execute(request, &mut world, watcher)
+    }
+}
+
+/// Returns a callback that passes the belief state to both callbacks.
+pub(crate) fn both(
+    mut one: impl FnMut(&Progression) + Send,
+    mut other: impl FnMut(&Progression) + Send,
+) -> impl FnMut(&Progression) + Send {
+    move |belief| {
+        one(belief);
+        other(belief);
+    }
+}
+
+/// Recorder that passes entries on, then shows them to viewers.
+pub(crate) struct ViewedRecorder<'a, R> {
+    inner: R,
+    task: Arc<Task>,
+    buffer: Option<TraceBuffer>,
+    observer: Option<EntryObserver<'a>>,
+}
+
+impl<'a, R: Recorder> ViewedRecorder<'a, R> {
+    pub(crate) fn new(
+        inner: R,
+        task: &Arc<Task>,
+        buffer: Option<TraceBuffer>,
+        observer: Option<EntryObserver<'a>>,
+    ) -> Self {
+        Self {
+            inner,
+            task: Arc::clone(task),
+            buffer,
+            observer,
+        }
+    }
+}
+
+impl<R: Recorder> Recorder for ViewedRecorder<'_, R> {
+    fn record(&mut self, entry: &Entry<'_>) {
+        self.inner.record(entry);
+        if let Some(buffer) = &self.buffer {
+            buffer.add(&format!("{}\n", Line::of(&self.task, entry).text()));
+        }
+        if let Some(observer) = &mut self.observer {
+            observer(entry);
+        }
+    }
+
+    fn commit(&mut self) {
+        self.inner.commit();
+    }
+
+    fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
+        self.inner.begin_anew(stand)
+    }
+}
+
+/// Watcher that also ends a run after a failure of its journal.
+struct JournalWatcher<'w> {
+    inner: &'w mut (dyn Watcher + Send),
+    health: JournalHealth,
+}
+
+impl Watcher for JournalWatcher<'_> {
+    fn elapsed(&mut self) -> Duration {
+        self.inner.elapsed()
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        if self.health.has_failed() {
+            return ControlFlow::Break(Halt::Cancelled);
+        }
+        self.inner.flow()
+    }
+
+    fn notice(&mut self, event: &Event<'_>) {
+        self.inner.notice(event);
+    }
+}

@@ -1,0 +1,405 @@
+//! In-memory buffer of the trace of a run, read by HTTP clients.
+
+use std::collections::VecDeque;
+use std::io::{self, Write};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// Interval of keep-alive comments to clients without news, to detect clients that have disconnected.
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
+
+/// Time limit for clients to read the end of the run.
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Interval between two checks that a waiting client is still connected.
+const POLL_INTERVAL: Duration = Duration::from_millis(250);
+
+/// Client that receives new lines.
+pub trait Subscriber: Write {
+    /// Returns `true` if the client has closed its connection.
+    fn has_left(&mut self) -> bool;
+}
+
+/// Name of the trace on its page.
+pub const TRACE_NAME: &str = "the run";
+
+/// Limit on the trace that is kept of a persistent run, in bytes.
+const MOST_KEPT: usize = 4_000_000;
+
+/// Trace of a run so far, or its last part if the buffer is bounded. Clones share the same buffer.
+#[derive(Clone, Default)]
+pub struct TraceBuffer(Arc<Shared>);
+
+#[derive(Default)]
+struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+    /// Cached document of the page, with the number of lines that it covers.
+    document: Mutex<Option<(usize, Arc<str>)>>,
+    /// Limit on the kept lines, in bytes.
+    most: Option<usize>,
+}
+
+#[derive(Default)]
+struct State {
+    /// First line: the specification of the run.
+    header: Option<Arc<str>>,
+    /// Last lines.
+    kept: VecDeque<Arc<str>>,
+    /// Length of the kept lines in bytes.
+    bytes: usize,
+    /// Number of omitted lines between the header and the kept ones.
+    left_out: usize,
+    is_over: bool,
+    /// Number of clients that read the stream.
+    listeners: usize,
+}
+
+impl State {
+    fn lines(&self) -> usize {
+        usize::from(self.header.is_some()) + self.left_out + self.kept.len()
+    }
+
+    fn add(&mut self, line: &str) {
+        if self.header.is_none() {
+            self.header = Some(line.into());
+        } else {
+            self.bytes += line.len();
+            self.kept.push_back(line.into());
+        }
+    }
+
+    /// Drops the first lines until at most `most` bytes remain, and further to the next request for a plan if there
+    /// is one: a trace that begins there is self-contained.
+    fn shorten(&mut self, most: usize) {
+        let mut left = self.bytes;
+        let mut cut = 0;
+        let mut is_enough = false;
+        for (index, line) in self.kept.iter().enumerate() {
+            if left <= most && !is_enough {
+                (cut, is_enough) = (index, true);
+            }
+            if is_enough && line.starts_with(r#"{"event":"planning""#) {
+                cut = index;
+                break;
+            }
+            left -= line.len();
+        }
+        for line in self.kept.drain(..cut) {
+            self.bytes -= line.len();
+            self.left_out += 1;
+        }
+    }
+
+    /// Returns the kept lines after line `sent`, and the number of omitted lines after it.
+    fn after(&self, sent: usize) -> (Vec<Arc<str>>, usize) {
+        let header = self.header.iter().filter(|_| sent == 0).cloned();
+        let of_kept = sent.saturating_sub(1 + self.left_out);
+        let missed = (1 + self.left_out).saturating_sub(sent.max(1));
+        let news = header.chain(self.kept.iter().skip(of_kept).cloned());
+        (news.collect(), missed)
+    }
+
+    fn trace(&self) -> String {
+        let lines = self.header.iter().chain(&self.kept);
+        lines.map(|line| &**line).collect()
+    }
+}
+
+impl TraceBuffer {
+    /// Creates a buffer for a persistent run: it keeps the last 4 MB of the trace.
+    pub fn bounded() -> Self {
+        Self::with_limit(MOST_KEPT)
+    }
+
+    fn with_limit(most: usize) -> Self {
+        Self(Arc::new(Shared {
+            most: Some(most),
+            ..Shared::default()
+        }))
+    }
+
+    /// Appends a line of the trace, which ends with its line feed.
+    pub fn add(&self, line: &str) {
+        let mut state = self.lock();
+        state.add(line);
+        if let Some(most) = self.0.most
+            && state.bytes > most
+        {
+            state.shorten(most / 2);
+        }
+        drop(state);
+        self.0.changed.notify_all();
+    }
+
+    /// Returns the kept trace.
+    pub fn trace(&self) -> String {
+        self.lock().trace()
+    }
+
+    /// Returns the number of the last omitted line, or `None` if the trace is complete. The header is line 1 and is
+    /// always kept.
+    pub fn last_omitted_line(&self) -> Option<usize> {
+        let left_out = self.lock().left_out;
+        (left_out > 0).then_some(left_out + 1)
+    }
+
+    /// Marks the run as finished, and waits up to two seconds for clients to read its end.
+    pub fn close(&self) {
+        let mut state = self.lock();
+        state.is_over = true;
+        self.0.changed.notify_all();
+        let waits = |state: &mut State| state.listeners > 0;
+        state = self
+            .0
+            .changed
+            .wait_timeout_while(state, DRAIN_TIMEOUT, waits)
+            .unwrap_or_else(PoisonError::into_inner)
+            .0;
+        drop(state);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // A thread that panicked while it held the lock has left complete lines.
+        let state = self.0.state.lock();
+        state.unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the document of the page as JSON. It is cached for all clients.
+    ///
+    /// # Errors
+    /// When the page cannot be made from the trace.
+    pub fn document(&self) -> Result<Arc<str>, String> {
+        let cached = self.0.document.lock();
+        let mut cached = cached.unwrap_or_else(PoisonError::into_inner);
+        let (lines, left_out, trace) = {
+            let state = self.lock();
+            if let Some((lines, document)) = &*cached
+                && *lines == state.lines()
+            {
+                return Ok(Arc::clone(document));
+            }
+            (state.lines(), state.left_out, state.trace())
+        };
+        let document = elbowroom_page::live_document(TRACE_NAME, &trace, left_out)
+            .map_err(|error| error.to_string())?;
+        let text = serde_json::to_string(&document).map_err(|error| error.to_string())?;
+        let text: Arc<str> = text.into();
+        *cached = Some((lines, Arc::clone(&text)));
+        Ok(text)
+    }
+
+    /// Returns the page of the run so far as HTML.
+    ///
+    /// # Errors
+    /// When the page cannot be made from the trace.
+    pub fn page(&self) -> Result<String, String> {
+        let (trace, left_out) = {
+            let state = self.lock();
+            (state.trace(), state.left_out)
+        };
+        elbowroom_page::live_page(TRACE_NAME, &trace, left_out).map_err(|error| error.to_string())
+    }
+
+    /// Sends an event for each change, until the run ends or the client disconnects.
+    ///
+    /// # Errors
+    /// When the client cannot be written to.
+    pub fn stream_changes(&self, client: &mut dyn Subscriber) -> io::Result<()> {
+        self.counted(|| self.stream_all_changes(client))
+    }
+
+    /// Sends each line of the trace after line `after`, or each new line, until the run ends or the client
+    /// disconnects.
+    ///
+    /// # Errors
+    /// When the client cannot be written to.
+    pub fn stream_lines(
+        &self,
+        after: Option<usize>,
+        client: &mut dyn Subscriber,
+    ) -> io::Result<()> {
+        self.counted(|| self.stream_all_lines(after, client))
+    }
+
+    fn counted(&self, stream: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+        self.lock().listeners += 1;
+        let streamed = stream();
+        self.lock().listeners -= 1;
+        self.0.changed.notify_all();
+        streamed
+    }
+
+    /// Waits until the trace has more than `sent` lines or is complete, for at most [`KEEP_ALIVE`].
+    ///
+    /// # Errors
+    /// When the client has disconnected.
+    fn await_lines(
+        &self,
+        sent: usize,
+        client: &mut dyn Subscriber,
+    ) -> io::Result<MutexGuard<'_, State>> {
+        let waits = |state: &mut State| state.lines() <= sent && !state.is_over;
+        let mut waited = Duration::ZERO;
+        loop {
+            let changed = &self.0.changed;
+            let state = changed.wait_timeout_while(self.lock(), POLL_INTERVAL, waits);
+            let (state, timeout) = state.unwrap_or_else(PoisonError::into_inner);
+            waited += POLL_INTERVAL;
+            if !timeout.timed_out() || waited >= KEEP_ALIVE {
+                return Ok(state);
+            }
+            drop(state);
+            if client.has_left() {
+                return Err(io::ErrorKind::ConnectionAborted.into());
+            }
+        }
+    }
+
+    fn stream_all_changes(&self, client: &mut dyn Subscriber) -> io::Result<()> {
+        let mut sent = 0;
+        loop {
+            let (lines, is_over) = {
+                let state = self.await_lines(sent, client)?;
+                (state.lines(), state.is_over)
+            };
+            if is_over {
+                let document = self.document().map_err(io::Error::other)?;
+                write!(client, "event: over\ndata: {document}\n\n")?;
+                return client.flush();
+            }
+            if lines == sent {
+                client.write_all(b": nothing new\n\n")?;
+            } else {
+                sent = lines;
+                write!(client, "event: change\ndata: {lines}\n\n")?;
+            }
+            client.flush()?;
+        }
+    }
+
+    fn stream_all_lines(
+        &self,
+        after: Option<usize>,
+        client: &mut dyn Subscriber,
+    ) -> io::Result<()> {
+        let mut sent = after.unwrap_or_else(|| self.lock().lines());
+        loop {
+            let (news, missed, lines, is_over) = {
+                let state = self.await_lines(sent, client)?;
+                sent = sent.min(state.lines());
+                let (news, missed) = state.after(sent);
+                (news, missed, state.lines(), state.is_over)
+            };
+            if missed > 0 {
+                // The client reads too slowly: report the number of omitted lines.
+                write!(client, "event: missed\ndata: {missed}\n\n")?;
+            }
+            let first = lines - news.len();
+            for (number, line) in (first + 1..).zip(&news) {
+                write!(client, "id: {number}\nevent: entry\ndata: {line}\n")?;
+            }
+            sent = lines;
+            if is_over {
+                client.write_all(b"event: over\ndata: {}\n\n")?;
+                return client.flush();
+            }
+            if news.is_empty() {
+                client.write_all(b": nothing new\n\n")?;
+            }
+            client.flush()?;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Subscriber, TraceBuffer};
+
+    impl Subscriber for Vec<u8> {
+        fn has_left(&mut self) -> bool {
+            false
+        }
+    }
+
+    /// Every fifth line is a request for a plan.
+    fn line(number: usize) -> String {
+        let event = if number.is_multiple_of(5) {
+            "planning"
+        } else {
+            "passed"
+        };
+        format!("{{\"event\":\"{event}\",\"now\":{number:04}}}\n")
+    }
+
+    fn filled(most: Option<usize>, lines: usize) -> TraceBuffer {
+        let buffer = most.map_or_else(TraceBuffer::default, TraceBuffer::with_limit);
+        buffer.add("header\n");
+        (2..=lines).for_each(|number| buffer.add(&line(number)));
+        buffer
+    }
+
+    fn streamed(buffer: &TraceBuffer, after: Option<usize>) -> String {
+        let mut bytes = Vec::new();
+        buffer.lock().is_over = true;
+        buffer.stream_lines(after, &mut bytes).expect("to memory");
+        String::from_utf8(bytes).expect("text")
+    }
+
+    #[test]
+    fn unbounded_buffer_keeps_whole_trace() {
+        let buffer = filled(None, 1000);
+        assert_eq!(buffer.trace().lines().count(), 1000);
+        assert_eq!(buffer.last_omitted_line(), None);
+        assert_eq!(
+            streamed(&buffer, Some(0)).matches("event: entry").count(),
+            1000
+        );
+        assert!(streamed(&buffer, Some(998)).starts_with("id: 999\n"));
+    }
+
+    /// A bounded buffer keeps the header and a last part of limited length that begins with a request for a plan.
+    /// Lines keep their numbers.
+    #[test]
+    fn bounded_buffer_keeps_header_and_last_part() {
+        let most = 3000;
+        for lines in (2..600).step_by(7) {
+            let buffer = filled(Some(most), lines);
+            let trace = buffer.trace();
+            let kept: Vec<&str> = trace.lines().collect();
+            assert_eq!(kept[0], "header");
+            assert!(trace.len() <= most + "header\n".len(), "{lines} lines");
+            let Some(until) = buffer.last_omitted_line() else {
+                assert_eq!(kept.len(), lines);
+                continue;
+            };
+            assert_eq!(kept.len() + until, lines + 1);
+            assert_eq!(format!("{}\n", kept[1]), line(until + 1));
+            assert!(kept[1].contains("planning"));
+            let behind = streamed(&buffer, Some(until));
+            let first = format!("id: {}\nevent: entry\ndata: {}\n", until + 1, kept[1]);
+            assert!(behind.starts_with(&first), "{behind}");
+            assert_eq!(behind.matches("event: entry").count(), lines - until);
+            assert!(!behind.contains("missed"));
+        }
+    }
+
+    #[test]
+    fn trace_without_plan_is_shortened() {
+        let buffer = TraceBuffer::with_limit(3000);
+        buffer.add("header\n");
+        let line = line(1);
+        (2..=1000).for_each(|_| buffer.add(&line));
+        let left = buffer.trace().len();
+        assert!((1400..=3007).contains(&left), "{left} bytes");
+    }
+
+    #[test]
+    fn slow_client_receives_number_of_omitted_lines() {
+        let buffer = filled(Some(3000), 600);
+        let until = buffer.last_omitted_line().expect("600 lines are more");
+        let behind = streamed(&buffer, Some(17));
+        let first = format!("event: missed\ndata: {}\n\nid: {}\n", until - 17, until + 1);
+        assert!(behind.starts_with(&first), "{behind}");
+    }
+}
