@@ -1,0 +1,169 @@
+//! The difference between two states in what is settled, as a short sequence of bytes.
+//!
+//! Numbers are written in groups of seven bits, small ones first. Of lists, only what changed is written: the
+//! distance from the last place that changed, and the change; 0 ends the list.
+
+use elbowroom_num::Rational;
+
+use super::super::state::State;
+use super::super::time::Ticks;
+
+/// Writes how `state` differs from `base`. `None` if it has a number that is too large.
+pub(super) fn write(base: &State, state: &State, bytes: &mut Vec<u8>) -> Option<()> {
+    put(bytes, u64::from(state.timed));
+    put_change(bytes, base.settled_end, state.settled_end);
+    put_change(bytes, base.last.floor, state.last.floor);
+    put_number(bytes, (state.cost != base.cost).then_some(&state.cost))?;
+    let mut places = Places::default();
+    for (word, (old, new)) in base.facts.iter().zip(&state.facts).enumerate() {
+        let mut changed = old ^ new;
+        while changed != 0 {
+            places.put(bytes, 64 * word + changed.trailing_zeros() as usize);
+            changed &= changed - 1;
+        }
+    }
+    put(bytes, 0);
+    put_annotations(bytes, base, state);
+    let mut places = Places::default();
+    for (place, (old, new)) in base.values.iter().zip(&state.values).enumerate() {
+        if old != new {
+            places.put(bytes, place);
+            put_number(bytes, new.as_ref())?;
+        }
+    }
+    put(bytes, 0);
+    Some(())
+}
+
+/// How many annotations are compared at once.
+const BLOCK: usize = 16;
+
+fn put_annotations(bytes: &mut Vec<u8>, base: &State, state: &State) {
+    let mut places = Places::default();
+    // Most of them are as late as the one before.
+    let mut before = state.settled_end;
+    let blocks = base.annotations.chunks(BLOCK);
+    for (block, (old, new)) in blocks.zip(state.annotations.chunks(BLOCK)).enumerate() {
+        if old == new {
+            continue;
+        }
+        for (place, (old, new)) in old.iter().zip(new).enumerate() {
+            if old != new {
+                places.put(bytes, BLOCK * block + place);
+                put_change(bytes, before, *new);
+                before = *new;
+            }
+        }
+    }
+    put(bytes, 0);
+}
+
+/// Makes `state`, which is as the base was, what was written.
+pub(super) fn apply(bytes: &[u8], state: &mut State) {
+    let mut bytes = Bytes(bytes);
+    state.timed = u32::try_from(bytes.take()).unwrap_or(u32::MAX);
+    state.settled_end = bytes.take_change(state.settled_end);
+    state.last.floor = bytes.take_change(state.last.floor);
+    if let Some(cost) = bytes.take_number() {
+        state.cost = cost;
+    }
+    let mut place = 0;
+    while bytes.moves(&mut place) {
+        state.facts[(place - 1) / 64] ^= 1 << ((place - 1) % 64);
+    }
+    let (mut place, mut before) = (0, state.settled_end);
+    while bytes.moves(&mut place) {
+        before = bytes.take_change(before);
+        state.annotations[place - 1] = before;
+    }
+    let mut place = 0;
+    while bytes.moves(&mut place) {
+        state.values[place - 1] = bytes.take_number();
+    }
+}
+
+/// The places of a list, in ascending order.
+#[derive(Default)]
+struct Places {
+    /// The last one, and one more.
+    last: usize,
+}
+
+impl Places {
+    fn put(&mut self, bytes: &mut Vec<u8>, place: usize) {
+        put(bytes, (place + 1 - self.last) as u64);
+        self.last = place + 1;
+    }
+}
+
+fn put(bytes: &mut Vec<u8>, mut number: u64) {
+    while number >= 1 << 7 {
+        bytes.push(low_bits(number) | 1 << 7);
+        number >>= 7;
+    }
+    bytes.push(low_bits(number));
+}
+
+fn low_bits(number: u64) -> u8 {
+    number.to_le_bytes()[0] & 0x7f
+}
+
+/// Writes a number of either sign so that small ones are short.
+fn put_signed(bytes: &mut Vec<u8>, number: i64) {
+    put(bytes, ((number << 1) ^ (number >> 63)).cast_unsigned());
+}
+
+fn put_change(bytes: &mut Vec<u8>, old: Ticks, new: Ticks) {
+    put_signed(bytes, new.wrapping_sub(old));
+}
+
+/// Writes the denominator and the numerator; a denominator of 0 for nothing.
+fn put_number(bytes: &mut Vec<u8>, number: Option<&Rational>) -> Option<()> {
+    let Some(number) = number else {
+        put(bytes, 0);
+        return Some(());
+    };
+    let (numerator, denominator) = number.as_small()?;
+    put(bytes, denominator.cast_unsigned());
+    put_signed(bytes, numerator);
+    Some(())
+}
+
+/// What is left to read.
+struct Bytes<'a>(&'a [u8]);
+
+impl Bytes<'_> {
+    fn take(&mut self) -> u64 {
+        let (mut number, mut shift) = (0, 0);
+        loop {
+            let byte = self.0[0];
+            self.0 = &self.0[1..];
+            number |= u64::from(byte & 0x7f) << shift;
+            if byte < 1 << 7 {
+                return number;
+            }
+            shift += 7;
+        }
+    }
+
+    /// Goes to the next place of a list, counted from 1. Returns `false` at the end.
+    fn moves(&mut self, place: &mut usize) -> bool {
+        let distance = usize::try_from(self.take()).unwrap_or(usize::MAX);
+        *place += distance;
+        distance > 0
+    }
+
+    fn take_signed(&mut self) -> i64 {
+        let number = self.take();
+        (number >> 1).cast_signed() ^ -(number & 1).cast_signed()
+    }
+
+    fn take_change(&mut self, old: Ticks) -> Ticks {
+        old.wrapping_add(self.take_signed())
+    }
+
+    fn take_number(&mut self) -> Option<Rational> {
+        let denominator = self.take().cast_signed();
+        (denominator != 0).then(|| Rational::new(self.take_signed(), denominator))
+    }
+}
