@@ -11,9 +11,6 @@ use super::super::time::Ticks;
 /// Writes how `state` differs from `base`. `None` if it has a number that is too large.
 pub(super) fn write(base: &State, state: &State, bytes: &mut Vec<u8>) -> Option<()> {
     put(bytes, u64::from(state.timed));
-    put_change(bytes, base.settled_end, state.settled_end);
-    put_change(bytes, base.last.floor, state.last.floor);
-    put_number(bytes, (state.cost != base.cost).then_some(&state.cost))?;
     let mut places = Places::default();
     for (word, (old, new)) in base.facts.iter().zip(&state.facts).enumerate() {
         let mut changed = old ^ new;
@@ -23,6 +20,9 @@ pub(super) fn write(base: &State, state: &State, bytes: &mut Vec<u8>) -> Option<
         }
     }
     put(bytes, 0);
+    put_change(bytes, base.settled_end, state.settled_end);
+    put_change(bytes, base.last.floor, state.last.floor);
+    put_number(bytes, (state.cost != base.cost).then_some(&state.cost))?;
     put_annotations(bytes, base, state);
     let mut places = Places::default();
     for (place, (old, new)) in base.values.iter().zip(&state.values).enumerate() {
@@ -61,15 +61,12 @@ fn put_annotations(bytes: &mut Vec<u8>, base: &State, state: &State) {
 /// Makes `state`, which is as the base was, what was written.
 pub(super) fn apply(bytes: &[u8], state: &mut State) {
     let mut bytes = Bytes(bytes);
-    state.timed = u32::try_from(bytes.take()).unwrap_or(u32::MAX);
+    state.timed = bytes.take_timed();
+    bytes.take_facts(&mut state.facts);
     state.settled_end = bytes.take_change(state.settled_end);
     state.last.floor = bytes.take_change(state.last.floor);
     if let Some(cost) = bytes.take_number() {
         state.cost = cost;
-    }
-    let mut place = 0;
-    while bytes.moves(&mut place) {
-        state.facts[(place - 1) / 64] ^= 1 << ((place - 1) % 64);
     }
     let (mut place, mut before) = (0, state.settled_end);
     while bytes.moves(&mut place) {
@@ -80,6 +77,14 @@ pub(super) fn apply(bytes: &[u8], state: &mut State) {
     while bytes.moves(&mut place) {
         state.values[place - 1] = bytes.take_number();
     }
+}
+
+/// Changes the facts as was written, and returns the number of timed initials that have happened.
+pub(super) fn apply_facts(bytes: &[u8], facts: &mut [u64]) -> u32 {
+    let mut bytes = Bytes(bytes);
+    let timed = bytes.take_timed();
+    bytes.take_facts(facts);
+    timed
 }
 
 /// The places of a list, in ascending order.
@@ -134,15 +139,24 @@ struct Bytes<'a>(&'a [u8]);
 
 impl Bytes<'_> {
     fn take(&mut self) -> u64 {
-        let (mut number, mut shift) = (0, 0);
-        loop {
-            let byte = self.0[0];
-            self.0 = &self.0[1..];
-            number |= u64::from(byte & 0x7f) << shift;
-            if byte < 1 << 7 {
-                return number;
-            }
-            shift += 7;
+        let (byte, rest) = self.0.split_first().unwrap_or((&0, &[]));
+        self.0 = rest;
+        let low = u64::from(byte & 0x7f);
+        if *byte < 1 << 7 {
+            low
+        } else {
+            low | self.take() << 7
+        }
+    }
+
+    fn take_timed(&mut self) -> u32 {
+        u32::try_from(self.take()).unwrap_or(u32::MAX)
+    }
+
+    fn take_facts(&mut self, facts: &mut [u64]) {
+        let mut place = 0;
+        while self.moves(&mut place) {
+            facts[(place - 1) / 64] ^= 1 << ((place - 1) % 64);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::super::state::{Projection, State};
 use super::Search;
+use super::states::is_settled;
 
 /// The numbers of states by their hash: a table of lists, the newest state of each first.
 #[derive(Debug, Default)]
@@ -77,8 +78,20 @@ impl Search<'_> {
         if state.joint.is_some() {
             return false;
         }
+        let only_facts_count = self.is_timeless
+            && self.step_costs.is_none()
+            && state.values.is_empty()
+            && state.symbolic.is_none()
+            && is_settled(state);
         let mut variants = 0;
         for number in self.known.like(hash) {
+            if only_facts_count && !self.states.is_unsettled(number) {
+                let facts = &mut self.compared.facts;
+                if self.states.has_facts_of(number, state, facts) {
+                    return true;
+                }
+                continue;
+            }
             let other = if let Some(other) = self.states.whole_or_recent(number) {
                 other
             } else {

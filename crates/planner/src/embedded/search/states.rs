@@ -13,7 +13,7 @@ use super::super::state::{Joint, Last, Open, State};
 use super::difference;
 
 /// After so many differences in a row the next one is to the first state, so that few have to be followed.
-const MOST_LINKS: u8 = 32;
+const MOST_LINKS: u8 = 8;
 
 /// How many states stay as they are.
 const MOST_RECENT: usize = 8;
@@ -114,11 +114,7 @@ impl States {
     }
 
     fn keep_unsettled(&mut self, number: u32, state: &State) -> usize {
-        if state.open.is_empty()
-            && state.network.is_empty()
-            && state.joint.is_none()
-            && state.last.node == SETTLED
-        {
+        if is_settled(state) {
             return 0;
         }
         let mut unsettled = Unsettled {
@@ -157,9 +153,35 @@ impl States {
 
     /// The state, if it need not be restored.
     pub(super) fn whole_or_recent(&self, number: u32) -> Option<&Arc<State>> {
-        let recent = self.recent.iter().rev().find(|recent| recent.0 == number);
-        let recent = recent.map(|recent| &recent.1);
-        recent.or_else(|| self.whole.get(&number))
+        let mut recent = self.recent.iter().rev();
+        let recent = recent.find(|recent| recent.0 == number);
+        recent.map(|recent| &recent.1).or_else(|| self.whole(number))
+    }
+
+    fn whole(&self, number: u32) -> Option<&Arc<State>> {
+        let is_whole = self.kept[number as usize].base == WHOLE;
+        is_whole.then(|| &self.whole[&number])
+    }
+
+    /// Whether the state has something that is not settled.
+    pub(super) fn is_unsettled(&self, number: u32) -> bool {
+        self.unsettled.contains_key(&number) || !self.whole(number).is_none_or(|whole| is_settled(whole))
+    }
+
+    /// Whether two states have the same facts and have seen as many timed initials. `facts` is overwritten.
+    pub(super) fn has_facts_of(&self, number: u32, state: &State, facts: &mut Vec<u64>) -> bool {
+        facts.clone_from(&state.facts);
+        let (mut base, mut timed) = (number, None);
+        let whole = loop {
+            if let Some(whole) = self.whole(base) {
+                break whole;
+            }
+            // Changes of facts undo themselves, in any order.
+            let of_link = difference::apply_facts(&self.written_at(base)[1..], facts);
+            timed = timed.or(Some(of_link));
+            base = self.kept[base as usize].base;
+        };
+        *facts == whole.facts && timed.unwrap_or(whole.timed) == state.timed
     }
 
     /// Makes the state anew.
@@ -167,7 +189,12 @@ impl States {
         let mut links = Vec::with_capacity(usize::from(MOST_LINKS));
         let mut base = number;
         let whole = loop {
-            if let Some(whole) = self.whole_or_recent(base) {
+            let whole = if links.len() < 2 {
+                self.whole_or_recent(base)
+            } else {
+                self.whole(base)
+            };
+            if let Some(whole) = whole {
                 break whole;
             }
             links.push(base);
@@ -205,6 +232,14 @@ impl States {
         }
         self.recent.push_back((number, state));
     }
+}
+
+/// Whether all that was chosen has its time, and no action is under way.
+pub(super) fn is_settled(state: &State) -> bool {
+    state.open.is_empty()
+        && state.network.is_empty()
+        && state.joint.is_none()
+        && state.last.node == SETTLED
 }
 
 /// Copies what a difference is about.
