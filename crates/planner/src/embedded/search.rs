@@ -38,7 +38,7 @@ use goals::misses_goal;
 use known::Hashes;
 use landmarks::SearchLandmarks;
 use novelty::{Novelty, Progress};
-use queue::Queue;
+use queue::{Queue, Waiting};
 use runaway::Drift;
 use states::States;
 use strategy::NoveltyOf;
@@ -64,7 +64,7 @@ pub(crate) struct Search<'a> {
     all: Queue,
     preferred: Queue,
     /// All successors, first come first served, in a search that has to come by everywhere.
-    oldest: VecDeque<(u32, Step)>,
+    oldest: VecDeque<Waiting>,
     turns: [i64; 2],
     /// The best estimate, and the number of landmarks left where they count.
     best: (u32, u32),
@@ -126,7 +126,7 @@ struct Notes {
     /// How far the way to it has come, in a search for new states.
     progress: Option<Progress>,
     /// The landmarks accepted on the way to it, where they count.
-    accepted: Vec<u64>,
+    accepted: Box<[u64]>,
     /// Where there are numbers.
     drift: Drift,
 }
@@ -151,7 +151,9 @@ impl Node {
     }
 
     fn drift(&self) -> Drift {
-        self.notes.as_ref().map_or_else(Drift::default, |notes| notes.drift)
+        self.notes
+            .as_ref()
+            .map_or_else(Drift::default, |notes| notes.drift)
     }
 }
 
@@ -375,7 +377,7 @@ impl<'a> Search<'a> {
             .drawn
             .is_multiple_of(self.compiled.tuning.exploration_interval)
             && !self.all.is_empty()
-            && let Some(oldest) = self.oldest.pop_front()
+            && let Some(oldest) = self.pop_oldest()
         {
             return Some(oldest);
         }
@@ -384,11 +386,17 @@ impl<'a> Search<'a> {
             && self.compiled.tuning.uses(Technique::PreferredOperators);
         let queue = usize::from(!is_preferred_turn);
         self.turns[queue] += 1;
-        match queue {
-            0 if self.is_on_plateau() => self.preferred.pop_alternately(),
-            0 => self.preferred.pop(),
-            _ => self.all.pop().or_else(|| self.preferred.pop()),
+        if queue == 1
+            && let Some(next) = self.pop_any()
+        {
+            return Some(next);
         }
+        let (_, waiting) = if queue == 0 && self.is_on_plateau() {
+            self.preferred.pop_alternately()
+        } else {
+            self.preferred.pop()
+        }?;
+        Some((waiting.parent, waiting.next()?))
     }
 
     /// Whether no better estimate was found for a while, in a search where only that decides.
@@ -452,7 +460,7 @@ impl<'a> Search<'a> {
         let notes = Notes {
             projection,
             progress: None,
-            accepted,
+            accepted: accepted.into(),
             drift,
         };
         let number = self.add(parent, step, left, state, notes);

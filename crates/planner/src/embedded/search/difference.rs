@@ -181,3 +181,81 @@ impl Bytes<'_> {
         (denominator != 0).then(|| Rational::new(self.take_signed(), denominator))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use elbowroom_num::Rational;
+    use proptest::prelude::*;
+
+    use super::{apply, apply_facts, write};
+    use crate::embedded::state::State;
+
+    fn states() -> impl Strategy<Value = State> {
+        let number = (any::<i64>(), 1_i64..9).prop_map(|(n, d)| Rational::new(n / 2, d));
+        (
+            prop::collection::vec(any::<u64>(), 3),
+            prop::collection::vec(prop::option::of(number.clone()), 4),
+            number,
+            prop::collection::vec(any::<i64>().prop_map(|time| time / 4), 40),
+            (any::<u32>(), -9_i64..9, any::<i64>()),
+        )
+            .prop_map(|(facts, values, cost, annotations, times)| {
+                let mut state = State {
+                    facts,
+                    values,
+                    cost,
+                    annotations,
+                    timed: times.0,
+                    settled_end: times.1,
+                    ..State::default()
+                };
+                state.last.floor = times.2;
+                state
+            })
+    }
+
+    /// Takes some parts of one state and the others of another one.
+    fn mixed(one: &State, other: &State, choices: &[bool]) -> State {
+        let mut mixed = one.clone();
+        let mut choices = choices.iter().cycle();
+        for (place, fact) in mixed.facts.iter_mut().zip(&other.facts) {
+            if *choices.next().expect("endless") {
+                *place = *fact;
+            }
+        }
+        for (place, value) in mixed.values.iter_mut().zip(&other.values) {
+            if *choices.next().expect("endless") {
+                place.clone_from(value);
+            }
+        }
+        for (place, time) in mixed.annotations.iter_mut().zip(&other.annotations) {
+            if *choices.next().expect("endless") {
+                *place = *time;
+            }
+        }
+        if *choices.next().expect("endless") {
+            mixed.cost.clone_from(&other.cost);
+            mixed.timed = other.timed;
+        }
+        mixed
+    }
+
+    proptest! {
+        #[test]
+        fn a_difference_makes_one_state_of_the_other(
+            one in states(),
+            other in states(),
+            choices in prop::collection::vec(any::<bool>(), 50),
+        ) {
+            let new = mixed(&one, &other, &choices);
+            let mut bytes = Vec::new();
+            write(&one, &new, &mut bytes).expect("small numbers");
+            let mut facts = one.facts.clone();
+            prop_assert_eq!(apply_facts(&bytes, &mut facts), new.timed);
+            prop_assert_eq!(&facts, &new.facts);
+            let mut made = one;
+            apply(&bytes, &mut made);
+            prop_assert_eq!(format!("{made:?}"), format!("{new:?}"));
+        }
+    }
+}

@@ -75,7 +75,10 @@ impl Search<'_> {
     /// counts without landmarks, how much of the goal is left.
     pub(super) fn left(&self, parent: u32, state: &State) -> (Vec<u64>, u32) {
         if let SearchLandmarks::Known(landmarks) = &self.landmarks {
-            let notes = self.nodes.get(parent as usize).and_then(|node| node.notes.as_ref());
+            let notes = self
+                .nodes
+                .get(parent as usize)
+                .and_then(|node| node.notes.as_ref());
             let before = notes.map(|notes| &notes.accepted[..]);
             return landmarks.progress(self.compiled, before, state);
         }

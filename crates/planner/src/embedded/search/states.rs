@@ -155,7 +155,9 @@ impl States {
     pub(super) fn whole_or_recent(&self, number: u32) -> Option<&Arc<State>> {
         let mut recent = self.recent.iter().rev();
         let recent = recent.find(|recent| recent.0 == number);
-        recent.map(|recent| &recent.1).or_else(|| self.whole(number))
+        recent
+            .map(|recent| &recent.1)
+            .or_else(|| self.whole(number))
     }
 
     fn whole(&self, number: u32) -> Option<&Arc<State>> {
@@ -165,7 +167,8 @@ impl States {
 
     /// Whether the state has something that is not settled.
     pub(super) fn is_unsettled(&self, number: u32) -> bool {
-        self.unsettled.contains_key(&number) || !self.whole(number).is_none_or(|whole| is_settled(whole))
+        self.unsettled.contains_key(&number)
+            || !self.whole(number).is_none_or(|whole| is_settled(whole))
     }
 
     /// Whether two states have the same facts and have seen as many timed initials. `facts` is overwritten.
@@ -252,3 +255,6 @@ fn copy(from: &State, to: &mut State) {
     to.settled_end = from.settled_end;
     to.last.floor = from.last.floor;
 }
+
+#[cfg(test)]
+mod tests;

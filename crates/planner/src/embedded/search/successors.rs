@@ -4,7 +4,12 @@ use super::super::apply::Step;
 use super::super::compile::NONE;
 use super::super::relaxed::{Estimate, OVERDRAWN};
 use super::super::state::State;
+use super::super::time::NEVER;
+use super::queue::Waiting;
 use super::{Aim, Node, NoveltyOf, Search};
+
+/// An estimate of the memory that a waiting successor takes, in bytes.
+const WAITING_MEMORY: usize = 12;
 
 impl Search<'_> {
     /// Lets the successors wait for their turn.
@@ -31,20 +36,69 @@ impl Search<'_> {
         if number == 0 {
             self.first_estimate = estimate.steps;
         }
-        self.memory += 24 * (estimate.preferred.len() + estimate.applicable.len());
         let rank = self.rank(number, estimate.steps);
         for &step in &estimate.preferred {
-            self.preferred.push(rank, number, step);
+            self.preferred.push(rank, Waiting::step(number, step));
         }
-        for &step in &estimate.applicable {
-            self.generated += 1;
-            self.all.push(rank, number, step);
-        }
-        if self.strategy.is_complete() {
+        self.generated += estimate.applicable.len() as u64;
+        let mut waiting = estimate.preferred.len();
+        if self.is_timeless && !estimate.applicable.is_empty() {
+            // Most of them never have their turn, and they are the same whenever they are listed.
+            self.all.push(rank, Waiting::all_of(number));
+            waiting += 1;
+            if self.strategy.is_complete() {
+                self.oldest.push_back(Waiting::all_of(number));
+                waiting += 1;
+            }
+        } else {
             let steps = estimate.applicable.iter();
-            self.oldest.extend(steps.map(|&step| (number, step)));
-            self.memory += 12 * estimate.applicable.len();
+            let all = steps.map(|&step| Waiting::step(number, step));
+            all.clone().for_each(|step| self.all.push(rank, step));
+            waiting += estimate.applicable.len();
+            if self.strategy.is_complete() {
+                self.oldest.extend(all);
+                waiting += estimate.applicable.len();
+            }
         }
+        self.memory += WAITING_MEMORY * waiting;
+    }
+
+    /// The successor of the lowest rank.
+    pub(super) fn pop_any(&mut self) -> Option<(u32, Step)> {
+        loop {
+            let (rank, waiting) = self.all.pop()?;
+            let parent = waiting.parent;
+            if let Some(step) = waiting.next() {
+                return Some((parent, step));
+            }
+            let steps = self.list(parent);
+            self.all.put_back(rank, parent, &steps);
+        }
+    }
+
+    /// The successor that has waited longest.
+    pub(super) fn pop_oldest(&mut self) -> Option<(u32, Step)> {
+        loop {
+            let waiting = self.oldest.pop_front()?;
+            let parent = waiting.parent;
+            if let Some(step) = waiting.next() {
+                return Some((parent, step));
+            }
+            let steps = self.list(parent);
+            for &step in steps.iter().rev() {
+                self.oldest.push_front(Waiting::step(parent, step));
+            }
+        }
+    }
+
+    /// The successors of a state that was expanded when the search was timeless: as they were then.
+    fn list(&mut self, number: u32) -> Vec<Step> {
+        let state = self.states.get(number);
+        self.relaxed.horizon = NEVER;
+        let estimate = self.relaxed.list(&state);
+        let mut steps = estimate.map_or_else(Vec::new, |estimate| estimate.applicable);
+        self.symmetry.thin_out(&state, true, &mut steps);
+        steps
     }
 
     /// Lets the successors wait for their turn, each by how new it is itself, and then by how much
@@ -70,10 +124,12 @@ impl Search<'_> {
             self.memory += memory;
             let rank = new << 48 | i64::from(worth.0) << 24;
             self.generated += 1;
+            self.memory += WAITING_MEMORY;
             if estimate.preferred.binary_search(&step).is_ok() {
-                self.preferred.push(rank, number, step);
+                self.memory += WAITING_MEMORY;
+                self.preferred.push(rank, Waiting::step(number, step));
             }
-            self.all.push(rank, number, step);
+            self.all.push(rank, Waiting::step(number, step));
         }
         let notes = &mut self.nodes[number as usize].notes;
         notes.get_or_insert_default().progress = Some(progress);
