@@ -74,6 +74,11 @@ impl Network {
         }
     }
 
+    /// An empty network with the same windows.
+    pub(crate) fn emptied(&self) -> Self {
+        Self::with_windows(self.windows.clone())
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }

@@ -20,6 +20,8 @@ mod spread;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
 use elbowroom_num::Rational;
 
 use super::apply::Step;
@@ -37,6 +39,7 @@ pub(crate) use consumables::{Consumable, consumables};
 use deadlines::Deadlines;
 pub(crate) use deadlines::in_windows;
 pub(crate) use graph::Graph;
+use graph::Operator;
 pub(crate) use labels::Labels;
 pub(crate) use plan::OVERDRAWN;
 use resources::Resources;
@@ -88,6 +91,8 @@ pub(crate) struct Relaxed<'a> {
     operator_cost: Vec<u32>,
     /// What each operator counts for.
     own_cost: Vec<u32>,
+    /// What each operator reaches.
+    reaches: Vec<Reaches>,
     is_used: Vec<bool>,
     is_wanted: Vec<bool>,
     gaps: Vec<f64>,
@@ -96,6 +101,8 @@ pub(crate) struct Relaxed<'a> {
     deadlines: Deadlines,
     resources: Resources,
     consumables: Consumables,
+    /// Whether some action starts and ends in different steps.
+    has_single_starts: bool,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
     /// Whether what happens next happens no earlier than what was chosen last.
@@ -137,6 +144,8 @@ impl<'a> Relaxed<'a> {
             missing: Vec::with_capacity(operators),
             operator_cost: vec![0; operators],
             own_cost: own_costs(&graph),
+            reaches: graph.operators.iter().map(Reaches::of).collect(),
+            has_single_starts: graph.has_single_starts(),
             is_used: vec![false; operators],
             is_wanted: vec![false; propositions],
             gaps: vec![0.0; compiled.tests.len()],
@@ -216,7 +225,7 @@ impl<'a> Relaxed<'a> {
             return false;
         }
         self.missing[self.graph.end_of[action as usize] as usize] += 1;
-        self.spread(state);
+        self.spread(state, self.serves_repairs);
         !is_true(&self.cost)
     }
 
@@ -265,7 +274,12 @@ impl<'a> Relaxed<'a> {
             self.buckets.iter_mut().for_each(Vec::clear);
             return None;
         }
-        self.spread(state);
+        // Where no end can be missing, the rest makes no difference to the relaxed plan. What is filled up and
+        // drawn on asks for the costs of other operators.
+        let asks_for_others = self.has_single_starts
+            || !self.resources.is_empty()
+            || !self.consumables.is_empty();
+        self.spread(state, self.serves_repairs || !asks_for_others);
         let mut estimate = Estimate::default();
         for open in &state.open {
             let end = self.graph.end_of[open.action as usize];
@@ -378,6 +392,27 @@ impl<'a> Relaxed<'a> {
             reach(self.graph.running(open.action), cost, buckets);
         }
         is_in_time
+    }
+}
+
+/// The effects of an operator, by their places in the graph: all that is needed for it when it is reached.
+#[derive(Clone, Copy, Debug)]
+struct Reaches {
+    effects: [u32; 2],
+    gains: [u32; 2],
+}
+
+impl Reaches {
+    fn of(operator: &Operator) -> Self {
+        let places = |range: &Range<usize>| [range.start, range.end].map(graph::narrow);
+        Self {
+            effects: places(&operator.effects),
+            gains: places(&operator.gains),
+        }
+    }
+
+    fn range([start, end]: [u32; 2]) -> Range<usize> {
+        start as usize..end as usize
     }
 }
 

@@ -8,12 +8,14 @@
 //! plan will still cost, and drops what cannot become better than the best plan (branch and bound).
 
 mod dead_ends;
+mod difference;
 mod goals;
 mod known;
 mod landmarks;
 mod novelty;
 mod queue;
 mod runaway;
+mod states;
 mod strategy;
 mod successors;
 
@@ -23,7 +25,6 @@ use super::answer::Counts;
 use super::apply::{Step, Stepper};
 use super::bound::MetricBound;
 use super::compile::Compiled;
-use super::hash::Map;
 use super::relaxed::{Consumable, Relaxed, consumables};
 use super::root::root;
 use super::state::{Projection, State};
@@ -34,10 +35,12 @@ use super::tuning::Technique;
 use dead_ends::DeadEnds;
 pub(crate) use goals::is_goal;
 use goals::misses_goal;
+use known::Hashes;
 use landmarks::SearchLandmarks;
 use novelty::{Novelty, Progress};
-use queue::Queue;
+use queue::{Queue, Waiting};
 use runaway::Drift;
+use states::States;
 use strategy::NoveltyOf;
 pub(crate) use strategy::{Aim, Strategy};
 
@@ -52,12 +55,16 @@ pub(crate) struct Search<'a> {
     dead_ends: DeadEnds<'a>,
     has_begun: bool,
     nodes: Vec<Node>,
-    /// The nodes of each discrete hash.
-    known: Map<u64, Vec<u32>>,
+    /// The states of the nodes.
+    states: States,
+    /// The nodes by the discrete hash of their states.
+    known: Hashes,
+    /// A state with which a new one is compared.
+    compared: State,
     all: Queue,
     preferred: Queue,
     /// All successors, first come first served, in a search that has to come by everywhere.
-    oldest: VecDeque<(u32, Step)>,
+    oldest: VecDeque<Waiting>,
     turns: [i64; 2],
     /// The best estimate, and the number of landmarks left where they count.
     best: (u32, u32),
@@ -97,23 +104,57 @@ pub(crate) struct Search<'a> {
     pub(crate) memory: usize,
 }
 
+/// Many nodes are kept, so each is small.
 #[derive(Debug)]
 struct Node {
     parent: u32,
-    step: Step,
-    state: State,
-    /// The part of the unsettled past that matters, in a search that compares it exactly.
-    projection: Option<Box<Projection>>,
-    dead_end: DeadEnd,
-    /// How far the way to it has come, in a search for new states.
-    progress: Option<Box<Progress>>,
-    /// The landmarks accepted on the way to it, where they count.
-    accepted: Vec<u64>,
-    /// How much of the goal is left, or how many landmarks, where that matters.
-    left: u32,
     /// The number of steps that led to it.
     depth: u32,
+    /// How much of the goal is left, or how many landmarks, where that matters.
+    left: u32,
+    dead_end: DeadEnd,
+    step: Step,
+    /// `None` if there is nothing to note.
+    notes: Option<Box<Notes>>,
+}
+
+/// What some searches note about a state.
+#[derive(Debug, Default)]
+struct Notes {
+    /// The part of the unsettled past that matters, in a search that compares it exactly.
+    projection: Option<Box<Projection>>,
+    /// How far the way to it has come, in a search for new states.
+    progress: Option<Progress>,
+    /// The landmarks accepted on the way to it, where they count.
+    accepted: Box<[u64]>,
+    /// Where there are numbers.
     drift: Drift,
+}
+
+impl Notes {
+    fn has_any(&self, compiled: &Compiled) -> bool {
+        self.projection.is_some() || !self.accepted.is_empty() || !compiled.fluents.is_empty()
+    }
+
+    /// An estimate of the memory that they take, in bytes.
+    fn size(&self) -> usize {
+        let projection = self.projection.as_ref();
+        size_of::<Self>()
+            + projection.map_or(0, |projection| projection.size())
+            + 8 * self.accepted.len()
+    }
+}
+
+impl Node {
+    fn progress(&self) -> Option<&Progress> {
+        self.notes.as_ref()?.progress.as_ref()
+    }
+
+    fn drift(&self) -> Drift {
+        self.notes
+            .as_ref()
+            .map_or_else(Drift::default, |notes| notes.drift)
+    }
 }
 
 /// The stronger bound's verdict on a state.
@@ -171,7 +212,9 @@ impl<'a> Search<'a> {
             relaxed,
             has_begun: false,
             nodes: Vec::new(),
-            known: Map::default(),
+            states: States::default(),
+            known: Hashes::default(),
+            compared: State::default(),
             all: Queue::default(),
             preferred: Queue::default(),
             oldest: VecDeque::new(),
@@ -314,13 +357,14 @@ impl<'a> Search<'a> {
         let Some((parent, step)) = entry else {
             return Turn::Over;
         };
-        let latest_end = self.latest_end(&self.nodes[parent as usize].state);
-        if !self.looks_no_later_than(latest_end) || self.is_cut(parent) {
+        let before = self.states.get(parent);
+        let latest_end = self.latest_end(&before);
+        if !self.looks_no_later_than(latest_end) || self.is_cut(parent, &before) {
             return Turn::Nothing;
         }
-        let unsettled = self.nodes[parent as usize].state.network.node_count() as u64;
+        let unsettled = before.network.node_count() as u64;
         self.labour += unsettled * unsettled / (1 + self.size());
-        let Some((step, state)) = self.make(parent, step) else {
+        let Some((step, state)) = self.make(&before, step) else {
             return Turn::Nothing;
         };
         self.visit(parent, step, state)
@@ -333,7 +377,7 @@ impl<'a> Search<'a> {
             .drawn
             .is_multiple_of(self.compiled.tuning.exploration_interval)
             && !self.all.is_empty()
-            && let Some(oldest) = self.oldest.pop_front()
+            && let Some(oldest) = self.pop_oldest()
         {
             return Some(oldest);
         }
@@ -342,11 +386,17 @@ impl<'a> Search<'a> {
             && self.compiled.tuning.uses(Technique::PreferredOperators);
         let queue = usize::from(!is_preferred_turn);
         self.turns[queue] += 1;
-        match queue {
-            0 if self.is_on_plateau() => self.preferred.pop_alternately(),
-            0 => self.preferred.pop(),
-            _ => self.all.pop().or_else(|| self.preferred.pop()),
+        if queue == 1
+            && let Some(next) = self.pop_any()
+        {
+            return Some(next);
         }
+        let (_, waiting) = if queue == 0 && self.is_on_plateau() {
+            self.preferred.pop_alternately()
+        } else {
+            self.preferred.pop()
+        }?;
+        Some((waiting.parent, waiting.next()?))
     }
 
     /// Whether no better estimate was found for a while, in a search where only that decides.
@@ -394,13 +444,6 @@ impl<'a> Search<'a> {
         estimate
             .preferred
             .retain(|step| kept.binary_search(step).is_ok());
-        let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
-        self.known.entry(hash).or_default().push(number);
-        let projection_size = projection
-            .as_ref()
-            .map_or(0, |projection| projection.size());
-        self.memory += state.size() + projection_size + size_of::<Node>() + 64;
-        self.memory += 8 * accepted.len();
         let is_goal = is_goal(self.compiled, &state);
         let due = self.compiled.timed_until_goal.saturating_sub(state.timed);
         if state.symbolic.is_some() && !is_goal {
@@ -413,34 +456,47 @@ impl<'a> Search<'a> {
             }
         }
         let drift = self.drift(parent, &state, estimate.steps);
-        let depth = self
-            .nodes
-            .get(parent as usize)
-            .map_or(0, |parent| parent.depth + 1);
-        self.nodes.push(Node {
-            parent,
-            step,
-            state,
+        let may_be_better = is_goal && self.may_be_better(&state);
+        let notes = Notes {
             projection,
-            dead_end: DeadEnd::Unchecked,
             progress: None,
-            accepted,
-            left,
-            depth,
+            accepted: accepted.into(),
             drift,
-        });
+        };
+        let number = self.add(parent, step, left, state, notes);
+        self.known.push(hash);
         // A state in which the goal holds may still have successors worth looking at: the judge can
         // refuse the plan, and another one can be better.
         self.expand(number, &estimate);
-        if is_goal && self.may_be_better(number) {
+        if may_be_better {
             return Turn::Goal(self.steps_to(number));
         }
         Turn::Nothing
     }
 
+    /// Adds a node, and returns its number.
+    fn add(&mut self, parent: u32, step: Step, left: u32, state: State, notes: Notes) -> u32 {
+        let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
+        let before = self.nodes.get(parent as usize);
+        let depth = before.map_or(0, |parent| parent.depth + 1);
+        let notes = notes.has_any(self.compiled).then(|| Box::new(notes));
+        self.memory += size_of::<Node>() + Hashes::MEMORY_OF_STATE;
+        self.memory += notes.as_ref().map_or(0, |notes| notes.size());
+        self.memory += self.states.push(before.map(|_| parent), state);
+        self.nodes.push(Node {
+            parent,
+            depth,
+            left,
+            dead_end: DeadEnd::Unchecked,
+            step,
+            notes,
+        });
+        number
+    }
+
     /// Whether the stronger bound shows that no plan begins like this. It is asked when the first
     /// successor of a state has its turn.
-    fn is_cut(&mut self, number: u32) -> bool {
+    fn is_cut(&mut self, number: u32, state: &State) -> bool {
         let node = &mut self.nodes[number as usize];
         match node.dead_end {
             DeadEnd::Unproved => return false,
@@ -456,7 +512,7 @@ impl<'a> Search<'a> {
         }
         self.dead_ends.evaluated = self.evaluated;
         self.dead_ends.horizon = self.stepper.horizon;
-        let is_dead_end = self.dead_ends.is_dead_end(&node.state);
+        let is_dead_end = self.dead_ends.is_dead_end(state);
         node.dead_end = if is_dead_end {
             DeadEnd::Proved
         } else {

@@ -193,6 +193,13 @@ impl Graph {
         (self.start_of[action as usize], end)
     }
 
+    /// Whether some action starts and ends in different steps.
+    pub(super) fn has_single_starts(&self) -> bool {
+        self.operators.iter().any(|operator| {
+            matches!(operator.kind, Kind::Start(action) if self.end_of[action as usize] != NONE)
+        })
+    }
+
     /// Where in `needing_list` the operators stand that need the proposition.
     pub(crate) fn needing(&self, proposition: u32) -> Range<usize> {
         let begin = match proposition {
@@ -335,6 +342,6 @@ impl Graph {
     }
 }
 
-fn narrow(number: usize) -> u32 {
+pub(super) fn narrow(number: usize) -> u32 {
     u32::try_from(number).expect("fewer than 2^32 entries")
 }

@@ -2,20 +2,20 @@
 
 use super::super::state::State;
 use super::graph::Kind;
-use super::{MOST, Relaxed};
+use super::{MOST, Reaches, Relaxed};
 
 impl Relaxed<'_> {
-    /// Dijkstra's algorithm from what holds. Serving repairs, it ends once all of the goal, and of what is
+    /// Dijkstra's algorithm from what holds. If it stops early, it ends once all of the goal, and of what is
     /// under way, is reached at no more than the cost that has been done: what has such a cost keeps it and
     /// its achiever, and so does all that they rest on. The relaxed plan is the same then, but that the end
     /// of an action which nothing else needs may be missing.
-    pub(super) fn spread(&mut self, state: &State) {
+    pub(super) fn spread(&mut self, state: &State, stops_early: bool) {
         self.fire_sources(state);
         let mut cost = 0;
         let mut goals_met = 0;
         while cost < self.buckets.len() {
             let Some(proposition) = self.buckets[cost].pop() else {
-                if self.serves_repairs && self.is_goal_within(state, cost, &mut goals_met) {
+                if stops_early && self.is_goal_within(state, cost, &mut goals_met) {
                     self.buckets.iter_mut().for_each(Vec::clear);
                     return;
                 }
@@ -85,13 +85,13 @@ impl Relaxed<'_> {
 
     /// The operator's preconditions are reached.
     fn fire(&mut self, operator: u32) {
-        let data = &self.graph.operators[operator as usize];
         let cost = self.operator_cost[operator as usize];
         let own = self.own_cost[operator as usize];
-        if cost == own && data.is_step {
+        if cost == own && self.graph.operators[operator as usize].is_step {
             self.applicable.push(operator);
         }
-        for position in data.effects.clone() {
+        let Reaches { effects, gains } = self.reaches[operator as usize];
+        for position in Reaches::range(effects) {
             let proposition = self.graph.effects[position];
             Self::lower(
                 &mut self.cost,
@@ -101,7 +101,7 @@ impl Relaxed<'_> {
                 (proposition, operator, cost, 1),
             );
         }
-        for position in data.gains.clone() {
+        for position in Reaches::range(gains) {
             let (test, gain) = self.graph.gains[position];
             let Some(times) = gain.repetitions(self.gaps[test as usize]) else {
                 continue;

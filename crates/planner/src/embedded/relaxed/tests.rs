@@ -22,7 +22,7 @@ fn whole(relaxed: &mut Relaxed<'_>, state: &State) -> Option<Estimate> {
     relaxed.serves_repairs = false;
     let is_in_time = relaxed.prepare(state);
     if is_in_time {
-        relaxed.spread(state);
+        relaxed.spread(state, false);
     }
     relaxed.buckets.iter_mut().for_each(Vec::clear);
     relaxed.serves_repairs = true;

@@ -50,14 +50,15 @@ pub(super) fn misses_goal(compiled: &Compiled, state: &State) -> bool {
 
 impl Search<'_> {
     /// The choices that lead to a state.
-    pub(super) fn steps_to(&self, mut number: u32) -> Vec<Step> {
+    pub(super) fn steps_to(&mut self, mut number: u32) -> Vec<Step> {
         let mut steps = Vec::new();
         while self.nodes[number as usize].parent != ROOT {
             let node = &self.nodes[number as usize];
-            let before = &self.nodes[node.parent as usize].state;
-            let single = node.step.parts(self.compiled, before);
+            let (parent, step) = (node.parent, node.step);
+            let before = self.states.get(parent);
+            let single = step.parts(self.compiled, &before);
             steps.extend(single.into_iter().rev());
-            number = node.parent;
+            number = parent;
         }
         steps.reverse();
         steps
@@ -65,11 +66,10 @@ impl Search<'_> {
 
     /// Whether the metric of a state in which the goal holds may be within the limit. This is for
     /// metrics that do not only grow, and spares the judge.
-    pub(super) fn may_be_better(&self, number: u32) -> bool {
+    pub(super) fn may_be_better(&self, state: &State) -> bool {
         let (Some(limit), Some(metric)) = (&self.limit, &self.compiled.metric) else {
             return true;
         };
-        let state = &self.nodes[number as usize].state;
         let mut to_come = self.compiled.timed[state.timed as usize..].iter();
         if to_come.any(|timed| !timed.assigns.is_empty()) {
             // The metric counts after all timed initials, too.

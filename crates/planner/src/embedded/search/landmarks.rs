@@ -6,7 +6,7 @@ use super::super::relaxed::Labels;
 use super::super::state::State;
 use super::super::tuning::IS_WHOLE;
 use super::novelty::goals_left;
-use super::{ROOT, Search, Turn};
+use super::{Search, Turn};
 
 /// The work of one turn of finding landmarks, for each unit of what an estimate may take.
 const WORK_OF_TURN: u64 = 4;
@@ -75,7 +75,11 @@ impl Search<'_> {
     /// counts without landmarks, how much of the goal is left.
     pub(super) fn left(&self, parent: u32, state: &State) -> (Vec<u64>, u32) {
         if let SearchLandmarks::Known(landmarks) = &self.landmarks {
-            let before = (parent != ROOT).then(|| &self.nodes[parent as usize].accepted[..]);
+            let notes = self
+                .nodes
+                .get(parent as usize)
+                .and_then(|node| node.notes.as_ref());
+            let before = notes.map(|notes| &notes.accepted[..]);
             return landmarks.progress(self.compiled, before, state);
         }
         match self.strategy.novelty {

@@ -33,7 +33,7 @@ pub(super) struct Progress {
     /// The relaxed plan of the last state in which a goal was reached.
     relaxed_plan: u32,
     /// Which of its literals were true since, a bit for each.
-    reached: Vec<u64>,
+    reached: Box<[u64]>,
 }
 
 impl Progress {
@@ -80,7 +80,7 @@ impl Novelty {
         Progress {
             goals_left,
             relaxed_plan: u32::try_from(self.relaxed_plans.len() - 1).unwrap_or(u32::MAX),
-            reached: vec![0; subgoals.len().div_ceil(64)],
+            reached: vec![0; subgoals.len().div_ceil(64)].into(),
         }
     }
 

@@ -4,7 +4,7 @@
 //! further one adds to the rank.
 
 use super::super::state::State;
-use super::Search;
+use super::{Node, Search};
 
 /// The number of such steps that are free.
 const FREE: u32 = 8;
@@ -36,10 +36,10 @@ impl Search<'_> {
         let facts = state.fact_hash();
         let parent = self.nodes.get(parent as usize);
         let grandparent = parent.and_then(|parent| self.nodes.get(parent.parent as usize));
-        let mut before = [parent, grandparent].into_iter().flatten();
-        let similar = before.find(|node| node.drift.facts == facts);
+        let mut before = [parent, grandparent].into_iter().flatten().map(Node::drift);
+        let similar = before.find(|drift| drift.facts == facts);
         let length = match similar {
-            Some(node) if node.drift.estimate <= estimate => node.drift.length + 1,
+            Some(drift) if drift.estimate <= estimate => drift.length + 1,
             _ => 0,
         };
         Drift {

@@ -4,7 +4,12 @@ use super::super::apply::Step;
 use super::super::compile::NONE;
 use super::super::relaxed::{Estimate, OVERDRAWN};
 use super::super::state::State;
+use super::super::time::NEVER;
+use super::queue::Waiting;
 use super::{Aim, Node, NoveltyOf, Search};
+
+/// An estimate of the memory that a waiting successor takes, in bytes.
+const WAITING_MEMORY: usize = 12;
 
 impl Search<'_> {
     /// Lets the successors wait for their turn.
@@ -24,27 +29,76 @@ impl Search<'_> {
             self.idle = 0;
             self.turns[0] -= self.compiled.tuning.boost;
         }
-        if self.nodes[number as usize].drift.penalty() > 0 {
+        if self.nodes[number as usize].drift().penalty() > 0 {
             // The long turn of the preferred successors ends.
             self.turns[0] = self.turns[0].max(self.turns[1]);
         }
         if number == 0 {
             self.first_estimate = estimate.steps;
         }
-        self.memory += 24 * (estimate.preferred.len() + estimate.applicable.len());
         let rank = self.rank(number, estimate.steps);
         for &step in &estimate.preferred {
-            self.preferred.push(rank, number, step);
+            self.preferred.push(rank, Waiting::step(number, step));
         }
-        for &step in &estimate.applicable {
-            self.generated += 1;
-            self.all.push(rank, number, step);
-        }
-        if self.strategy.is_complete() {
+        self.generated += estimate.applicable.len() as u64;
+        let mut waiting = estimate.preferred.len();
+        if self.is_timeless && !estimate.applicable.is_empty() {
+            // Most of them never have their turn, and they are the same whenever they are listed.
+            self.all.push(rank, Waiting::all_of(number));
+            waiting += 1;
+            if self.strategy.is_complete() {
+                self.oldest.push_back(Waiting::all_of(number));
+                waiting += 1;
+            }
+        } else {
             let steps = estimate.applicable.iter();
-            self.oldest.extend(steps.map(|&step| (number, step)));
-            self.memory += 12 * estimate.applicable.len();
+            let all = steps.map(|&step| Waiting::step(number, step));
+            all.clone().for_each(|step| self.all.push(rank, step));
+            waiting += estimate.applicable.len();
+            if self.strategy.is_complete() {
+                self.oldest.extend(all);
+                waiting += estimate.applicable.len();
+            }
         }
+        self.memory += WAITING_MEMORY * waiting;
+    }
+
+    /// The successor of the lowest rank.
+    pub(super) fn pop_any(&mut self) -> Option<(u32, Step)> {
+        loop {
+            let (rank, waiting) = self.all.pop()?;
+            let parent = waiting.parent;
+            if let Some(step) = waiting.next() {
+                return Some((parent, step));
+            }
+            let steps = self.list(parent);
+            self.all.put_back(rank, parent, &steps);
+        }
+    }
+
+    /// The successor that has waited longest.
+    pub(super) fn pop_oldest(&mut self) -> Option<(u32, Step)> {
+        loop {
+            let waiting = self.oldest.pop_front()?;
+            let parent = waiting.parent;
+            if let Some(step) = waiting.next() {
+                return Some((parent, step));
+            }
+            let steps = self.list(parent);
+            for &step in steps.iter().rev() {
+                self.oldest.push_front(Waiting::step(parent, step));
+            }
+        }
+    }
+
+    /// The successors of a state that was expanded when the search was timeless: as they were then.
+    fn list(&mut self, number: u32) -> Vec<Step> {
+        let state = self.states.get(number);
+        self.relaxed.horizon = NEVER;
+        let estimate = self.relaxed.list(&state);
+        let mut steps = estimate.map_or_else(Vec::new, |estimate| estimate.applicable);
+        self.symmetry.thin_out(&state, true, &mut steps);
+        steps
     }
 
     /// Lets the successors wait for their turn, each by how new it is itself, and then by how much
@@ -55,12 +109,13 @@ impl Search<'_> {
         };
         let node = &self.nodes[number as usize];
         let before = self.nodes.get(node.parent as usize);
-        let before = before.and_then(|parent| parent.progress.as_deref());
-        let progress = novelty.progress(&node.state, node.left, before, &estimate.subgoals);
+        let before = before.and_then(Node::progress);
+        let state = self.states.get(number);
+        let progress = novelty.progress(&state, node.left, before, &estimate.subgoals);
         self.memory += progress.size();
         self.weighed += estimate.applicable.len() as u64;
         for &step in &estimate.applicable {
-            let Some((_, next)) = self.make(number, step) else {
+            let Some((_, next)) = self.make(&state, step) else {
                 continue;
             };
             let (_, left) = self.left(number, &next);
@@ -69,12 +124,15 @@ impl Search<'_> {
             self.memory += memory;
             let rank = new << 48 | i64::from(worth.0) << 24;
             self.generated += 1;
+            self.memory += WAITING_MEMORY;
             if estimate.preferred.binary_search(&step).is_ok() {
-                self.preferred.push(rank, number, step);
+                self.memory += WAITING_MEMORY;
+                self.preferred.push(rank, Waiting::step(number, step));
             }
-            self.all.push(rank, number, step);
+            self.all.push(rank, Waiting::step(number, step));
         }
-        self.nodes[number as usize].progress = Some(Box::new(progress));
+        let notes = &mut self.nodes[number as usize].notes;
+        notes.get_or_insert_default().progress = Some(progress);
         self.novelty = Some(novelty);
     }
 
@@ -85,21 +143,21 @@ impl Search<'_> {
             return true;
         }
         let parent = self.nodes.get(parent as usize);
-        let progress = parent.and_then(|parent| parent.progress.as_deref());
+        let progress = parent.and_then(Node::progress);
         progress.is_none_or(|before| before.has_new_goal(left))
     }
 
     /// What a state has used up of what is not filled up, all of it counting as much as the way to
     /// the goal was long in the beginning.
-    fn penalty(&self, number: u32) -> i64 {
+    fn penalty(&mut self, number: u32) -> i64 {
         if self.consumables.is_empty() {
             return 0;
         }
-        let state = &self.nodes[number as usize].state;
+        let state = self.states.get(number);
         let used = self
             .consumables
             .iter()
-            .map(|consumable| consumable.used(state));
+            .map(|consumable| consumable.used(&state));
         let most = used.fold(0.0, f64::max);
         #[allow(clippy::cast_possible_truncation, reason = "the cast saturates")]
         let penalty = (most * f64::from(self.first_estimate)).round() as i64;
@@ -109,9 +167,9 @@ impl Search<'_> {
     /// The rank of a state in the queue of its search; lower ranks come first.
     fn rank(&mut self, number: u32, estimate: u32) -> i64 {
         if let Some(novelty) = &mut self.novelty {
-            let Node { state, left, .. } = &self.nodes[number as usize];
-            let left = *left;
-            let (new, memory) = novelty.of(self.compiled, state, (left, estimate));
+            let left = self.nodes[number as usize].left;
+            let state = self.states.get(number);
+            let (new, memory) = novelty.of(self.compiled, &state, (left, estimate));
             self.memory += memory;
             return new << 48 | i64::from(left) << 24 | i64::from(estimate.min(1 << 23));
         }
@@ -120,7 +178,7 @@ impl Search<'_> {
             let (overdrawn, estimate) = (estimate / OVERDRAWN, estimate % OVERDRAWN);
             return i64::from(overdrawn) << 48 | i64::from(left) << 24 | i64::from(estimate);
         }
-        let drift = self.nodes[number as usize].drift.penalty();
+        let drift = self.nodes[number as usize].drift().penalty();
         let mut estimate = i64::from(estimate) + self.penalty(number) + drift;
         if self.strategy.counts_steps {
             estimate += i64::from(self.nodes[number as usize].depth);
@@ -129,12 +187,11 @@ impl Search<'_> {
         else {
             return estimate;
         };
-        step_costs.spent(self.compiled, &self.nodes[number as usize].state) + factor * estimate
+        step_costs.spent(self.compiled, &self.states.get(number)) + factor * estimate
     }
 
     /// The successor; in a compressing search, one in which what has started is over, if possible.
-    pub(super) fn make(&mut self, parent: u32, step: Step) -> Option<(Step, State)> {
-        let state = &self.nodes[parent as usize].state;
+    pub(super) fn make(&mut self, state: &State, step: Step) -> Option<(Step, State)> {
         if let Step::Start(action) | Step::Compressed(action) = step {
             let data = self.compiled.action(action);
             let runs_already = || {

@@ -1,0 +1,260 @@
+//! The states of a search, kept as differences to the states that they came from.
+//!
+//! A step changes few facts and annotations, while a state may have thousands of both. So what is kept of a
+//! state is what differs from its parent, and after a number of steps from the first state. A state is
+//! restored when its successors have their turns; those used last stay as they are.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::super::hash::Map;
+use super::super::network::{Network, SETTLED};
+use super::super::state::{Joint, Last, Open, State};
+use super::difference;
+
+/// After so many differences in a row the next one is to the first state, so that few have to be followed.
+const MOST_LINKS: u8 = 8;
+
+/// How many states stay as they are.
+const MOST_RECENT: usize = 8;
+
+/// How many bytes of differences are allocated together.
+const CHUNK: usize = 1 << 16;
+
+/// See the module. The first state is number 0.
+#[derive(Debug, Default)]
+pub(super) struct States {
+    kept: Vec<Kept>,
+    /// States that are no differences: the first one, and those whose numbers are large or depend on times.
+    whole: Map<u32, Arc<State>>,
+    /// What is under way in others.
+    unsettled: Map<u32, Box<Unsettled>>,
+    chunks: Vec<Vec<u8>>,
+    /// The states used last, the last one at the end.
+    recent: VecDeque<(u32, Arc<State>)>,
+    /// The difference that is being written.
+    written: Vec<u8>,
+}
+
+/// Where a state is kept.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    /// The state that it differs from; [`WHOLE`] if it is no difference.
+    base: u32,
+    /// The chunk and the place in it, where the number of links and the difference begin.
+    place: u32,
+}
+
+const WHOLE: u32 = u32::MAX;
+
+/// What is under way.
+#[derive(Debug)]
+struct Unsettled {
+    open: Vec<Open>,
+    network: Network,
+    last: Last,
+    joint: Option<Joint>,
+}
+
+impl States {
+    /// Keeps a state that came from `parent`, and returns the memory that it takes, in bytes. The first state
+    /// has no parent.
+    pub(super) fn push(&mut self, parent: Option<u32>, state: State) -> usize {
+        let number = u32::try_from(self.kept.len()).expect("memory is used up long before");
+        let state = Arc::new(state);
+        let memory = size_of::<Kept>() + self.keep(number, parent, &state);
+        self.note(number, state);
+        memory
+    }
+
+    fn keep(&mut self, number: u32, parent: Option<u32>, state: &Arc<State>) -> usize {
+        if let Some(parent) = parent.filter(|_| state.symbolic.is_none()) {
+            let links = match self.kept[parent as usize].base {
+                WHOLE => 0,
+                _ => self.written_at(parent)[0],
+            };
+            let (base, links) = if links < MOST_LINKS {
+                (parent, links + 1)
+            } else {
+                (0, 1)
+            };
+            let from = self.get(base);
+            self.written.clear();
+            self.written.push(links);
+            if difference::write(&from, state, &mut self.written).is_some()
+                && let Some(place) = self.store()
+            {
+                self.kept.push(Kept { base, place });
+                return self.written.len() + self.keep_unsettled(number, state);
+            }
+        }
+        self.kept.push(Kept {
+            base: WHOLE,
+            place: 0,
+        });
+        self.whole.insert(number, Arc::clone(state));
+        state.size() + 32
+    }
+
+    /// Copies what is written into a chunk. `None` if it does not fit.
+    fn store(&mut self) -> Option<u32> {
+        let length = self.written.len();
+        let has_room = |chunk: &Vec<u8>| chunk.len() + length <= CHUNK;
+        if !self.chunks.last().is_some_and(has_room) {
+            self.chunks.push(Vec::new());
+        }
+        let number = self.chunks.len() - 1;
+        let chunk = &mut self.chunks[number];
+        if !has_room(chunk) {
+            return None;
+        }
+        let place = u32::try_from(number * CHUNK + chunk.len()).ok()?;
+        chunk.extend_from_slice(&self.written);
+        Some(place)
+    }
+
+    fn keep_unsettled(&mut self, number: u32, state: &State) -> usize {
+        if is_settled(state) {
+            return 0;
+        }
+        let mut unsettled = Unsettled {
+            open: state.open.clone(),
+            network: state.network.clone(),
+            last: state.last,
+            joint: state.joint,
+        };
+        unsettled.network.shrink();
+        let memory = size_of::<Unsettled>()
+            + size_of::<Open>() * unsettled.open.len()
+            + unsettled.network.size();
+        self.unsettled.insert(number, Box::new(unsettled));
+        memory + 32
+    }
+
+    /// The number of links to the next whole state, and the difference.
+    fn written_at(&self, number: u32) -> &[u8] {
+        let place = self.kept[number as usize].place as usize;
+        &self.chunks[place / CHUNK][place % CHUNK..]
+    }
+
+    /// Returns a state.
+    pub(super) fn get(&mut self, number: u32) -> Arc<State> {
+        if let Some(state) = self.whole_or_recent(number) {
+            let state = Arc::clone(state);
+            self.note(number, Arc::clone(&state));
+            return state;
+        }
+        let mut state = State::default();
+        self.restore(number, &mut state);
+        let state = Arc::new(state);
+        self.note(number, Arc::clone(&state));
+        state
+    }
+
+    /// The state, if it need not be restored.
+    pub(super) fn whole_or_recent(&self, number: u32) -> Option<&Arc<State>> {
+        let mut recent = self.recent.iter().rev();
+        let recent = recent.find(|recent| recent.0 == number);
+        recent
+            .map(|recent| &recent.1)
+            .or_else(|| self.whole(number))
+    }
+
+    fn whole(&self, number: u32) -> Option<&Arc<State>> {
+        let is_whole = self.kept[number as usize].base == WHOLE;
+        is_whole.then(|| &self.whole[&number])
+    }
+
+    /// Whether the state has something that is not settled.
+    pub(super) fn is_unsettled(&self, number: u32) -> bool {
+        self.unsettled.contains_key(&number)
+            || !self.whole(number).is_none_or(|whole| is_settled(whole))
+    }
+
+    /// Whether two states have the same facts and have seen as many timed initials. `facts` is overwritten.
+    pub(super) fn has_facts_of(&self, number: u32, state: &State, facts: &mut Vec<u64>) -> bool {
+        facts.clone_from(&state.facts);
+        let (mut base, mut timed) = (number, None);
+        let whole = loop {
+            if let Some(whole) = self.whole(base) {
+                break whole;
+            }
+            // Changes of facts undo themselves, in any order.
+            let of_link = difference::apply_facts(&self.written_at(base)[1..], facts);
+            timed = timed.or(Some(of_link));
+            base = self.kept[base as usize].base;
+        };
+        *facts == whole.facts && timed.unwrap_or(whole.timed) == state.timed
+    }
+
+    /// Makes the state anew.
+    pub(super) fn restore(&self, number: u32, state: &mut State) {
+        let mut links = Vec::with_capacity(usize::from(MOST_LINKS));
+        let mut base = number;
+        let whole = loop {
+            let whole = if links.len() < 2 {
+                self.whole_or_recent(base)
+            } else {
+                self.whole(base)
+            };
+            if let Some(whole) = whole {
+                break whole;
+            }
+            links.push(base);
+            base = self.kept[base as usize].base;
+        };
+        copy(whole, state);
+        for &link in links.iter().rev() {
+            difference::apply(&self.written_at(link)[1..], state);
+        }
+        if links.is_empty() {
+            state.open.clone_from(&whole.open);
+            state.network = whole.network.clone();
+            (state.last, state.joint) = (whole.last, whole.joint);
+            state.symbolic.clone_from(&whole.symbolic);
+            return;
+        }
+        state.symbolic = None;
+        if let Some(unsettled) = self.unsettled.get(&number) {
+            state.open.clone_from(&unsettled.open);
+            state.network = unsettled.network.clone();
+            (state.last, state.joint) = (unsettled.last, unsettled.joint);
+        } else {
+            state.open.clear();
+            state.network = whole.network.emptied();
+            state.last.node = SETTLED;
+            state.joint = None;
+        }
+    }
+
+    fn note(&mut self, number: u32, state: Arc<State>) {
+        if let Some(place) = self.recent.iter().position(|recent| recent.0 == number) {
+            self.recent.remove(place);
+        } else if self.recent.len() == MOST_RECENT {
+            self.recent.pop_front();
+        }
+        self.recent.push_back((number, state));
+    }
+}
+
+/// Whether all that was chosen has its time, and no action is under way.
+pub(super) fn is_settled(state: &State) -> bool {
+    state.open.is_empty()
+        && state.network.is_empty()
+        && state.joint.is_none()
+        && state.last.node == SETTLED
+}
+
+/// Copies what a difference is about.
+fn copy(from: &State, to: &mut State) {
+    to.facts.clone_from(&from.facts);
+    to.values.clone_from(&from.values);
+    to.annotations.clone_from(&from.annotations);
+    to.cost.clone_from(&from.cost);
+    to.timed = from.timed;
+    to.settled_end = from.settled_end;
+    to.last.floor = from.last.floor;
+}
+
+#[cfg(test)]
+mod tests;

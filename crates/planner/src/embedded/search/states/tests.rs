@@ -1,0 +1,89 @@
+//! States that are kept, beside the states themselves, on random ways through random problems.
+
+use proptest::prelude::*;
+
+use super::{MOST_RECENT, States, is_settled};
+use crate::embedded::apply::Stepper;
+use crate::embedded::compile::Compressibility;
+use crate::embedded::pairs::tests::{Draft, drafts, numeric_drafts};
+use crate::embedded::relaxed::Relaxed;
+use crate::embedded::root::root;
+use crate::embedded::state::State;
+use crate::embedded::testing::{choices, compiled};
+
+/// Keeps states of a problem and reads them back in any order. A state comes from any state before it, mostly from
+/// the last one, so that ways are long.
+fn keep_and_read(draft: &Draft, picks: &[(prop::sample::Index, prop::sample::Index)]) {
+    let task = draft.task();
+    let compiled = compiled(&task);
+    let mut stepper = Stepper::new(&compiled);
+    let mut plain: Vec<State> = vec![root(&compiled)];
+    let mut states = States::default();
+    states.push(None, plain[0].clone());
+    for (number, (parent, choice)) in picks.iter().enumerate() {
+        let parent = if number % 4 == 0 {
+            parent.index(plain.len())
+        } else {
+            plain.len() - 1
+        };
+        let steps = choices(&compiled, &plain[parent]);
+        let nexts = steps.filter_map(|step| stepper.apply(&plain[parent], step));
+        let nexts: Vec<State> = nexts.collect();
+        if nexts.is_empty() {
+            continue;
+        }
+        let next = choice.get(&nexts).clone();
+        states.push(u32::try_from(parent).ok(), next.clone());
+        plain.push(next);
+    }
+    let mut made = State::default();
+    let mut facts = Vec::new();
+    for step in [1, MOST_RECENT + 1] {
+        for place in (0..plain.len()).step_by(step) {
+            let number = u32::try_from(place).expect("few");
+            let expected = format!("{:?}", plain[place]);
+            states.restore(number, &mut made);
+            assert_eq!(format!("{made:?}"), expected);
+            assert_eq!(format!("{:?}", states.get(number)), expected);
+            assert_eq!(states.is_unsettled(number), !is_settled(&plain[place]));
+            for other in &plain {
+                let is_same =
+                    other.facts == plain[place].facts && other.timed == plain[place].timed;
+                assert_eq!(states.has_facts_of(number, other, &mut facts), is_same);
+            }
+        }
+    }
+    list(draft, &plain);
+}
+
+/// What is applicable is the same with an estimate and without one.
+fn list(draft: &Draft, plain: &[State]) {
+    let task = draft.task();
+    let compiled = compiled(&task);
+    for compresses in [None, Some(Compressibility::HoldsResource)] {
+        let mut relaxed = Relaxed::new(&compiled, compresses);
+        for state in plain {
+            let Some(estimate) = relaxed.evaluate(state) else {
+                continue;
+            };
+            let listed = relaxed.list(state).expect("what is under way can end");
+            assert_eq!(listed.applicable, estimate.applicable);
+        }
+    }
+}
+
+fn picks() -> impl Strategy<Value = Vec<(prop::sample::Index, prop::sample::Index)>> {
+    prop::collection::vec(any::<(prop::sample::Index, prop::sample::Index)>(), 60)
+}
+
+proptest! {
+    #[test]
+    fn a_kept_state_is_read_as_it_was(draft in drafts(), picks in picks()) {
+        keep_and_read(&draft, &picks);
+    }
+
+    #[test]
+    fn so_is_one_with_numbers(draft in numeric_drafts(), picks in picks()) {
+        keep_and_read(&draft, &picks);
+    }
+}
