@@ -2,6 +2,11 @@
 
 mod reading;
 
+#[path = "plan_lines/headings.rs"]
+mod headings;
+#[path = "plan_lines/notations.rs"]
+mod notations;
+
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_pddl::{Diagnostic, Diagnostics, Source, read_plan, write_plan};
 use proptest::prelude::*;
@@ -288,6 +293,47 @@ fn name_of_an_action_with_a_number_or_a_bracket_is_an_error_beside_a_plan() {
 }
 
 #[test]
+fn action_in_prose_is_an_error_beside_a_plan() {
+    for line in [
+        "executing: wait",
+        "Executing wait",
+        "then wait.",
+        "start wait",
+        "wait again",
+        "next action: wait for the door",
+        "action=wait name=rest",
+        "-> \"wait\" at once",
+        "|40|jump|hall kitchen|",
+        "|40|jump|hall kitchen|20|",
+        "| 40 | 'jump' | hall | kitchen | 20 |",
+        "| hall | jump | 20 |",
+        "- 'jump' 'hall'",
+    ] {
+        for (text, number) in [
+            (format!("{line}\n0: (wait) [2]"), 1),
+            (format!("0: (wait) [2]\n{line}"), 2),
+        ] {
+            assert!(
+                errors(&text).starts_with(&format!("{number}: ")),
+                "{text}\n{}",
+                errors(&text)
+            );
+        }
+    }
+    for line in [
+        "3. This is the plan of today:",
+        "The robot must not wait for the lift.",
+        "domain 'WAIT' defined",
+        "|F|:14",
+        "| start | action | duration |",
+        "| hall | kitchen | 20 |",
+    ] {
+        let text = format!("{line}\n0: (wait) [2]\n{line}\n");
+        assert_eq!(errors(&text), "none", "{line}");
+    }
+}
+
+#[test]
 fn statistics_of_planners_that_hold_the_name_of_an_action_are_skipped() {
     let names = ["b", "load", "plan", "search", "state", "step"];
     let actions: Vec<_> = names.map(|it| format!("(:action {it})")).into();
@@ -385,37 +431,6 @@ fn comment_begins_at_the_line_or_behind_a_complete_action() {
 }
 
 #[test]
-fn last_plan_of_a_log_is_read_with_a_note() {
-    let log = "; Plan found with metric 9\n0: (wait) [9]\nnoise\n; Plan found with metric 4\n0: (wait) [4]\n";
-    assert_eq!(plan(log), "0.000: (wait) [4.000]");
-    assert_eq!(notes(log), "2 plans in one text");
-    assert_eq!(
-        errors("Found plan: 0: (snap b1)\n1: (wait) [1]")
-            .split(':')
-            .next(),
-        Some("1")
-    );
-}
-
-#[test]
-fn comment_between_two_steps_begins_no_other_plan() {
-    for comment in [
-        "; new plan",
-        ";; plan",
-        "; found plan b",
-        "; solution found",
-    ] {
-        let log = format!("0: (wait) [2]\n{comment}\n7: (snap b1)\n");
-        assert_eq!(
-            plan(&log),
-            "0.000: (wait) [2.000]; 7.000: (snap b1)",
-            "{comment}"
-        );
-        assert_eq!(notes(&log), "", "{comment}");
-    }
-}
-
-#[test]
 fn text_without_an_action_is_no_plan_unless_nothing_has_to_be_done() {
     let no_plan = "1: this is not a plan: it has no action";
     for text in [
@@ -433,124 +448,4 @@ fn text_without_an_action_is_no_plan_unless_nothing_has_to_be_done() {
     let read = |text: &str| read_plan(&Source::new("plan", text), &idle);
     assert!(read("; nothing to do\n").unwrap().0.steps.is_empty());
     assert!(read("no plan was found\n").is_err());
-}
-
-#[test]
-fn plan_of_the_terminal_of_plansys2_is_read() {
-    let text =
-        "> get plan\nplan: \n0\t(walk hall kitchen)\t4\n4.001\t(wait)\t1.5\n5.502\t(snap b1)\t0\n";
-    let same = "0.000: (walk hall kitchen) [4.000]; 4.001: (wait) [1.500]; 5.502: (snap b1)";
-    assert_eq!(plan(text), same);
-    assert!(notes(text).contains("PlanSys2"));
-    assert_eq!(plan("0: (wait) 2"), "0.000: (wait) [2.000]");
-    // A number without a duration may be the number of the action.
-    assert_eq!(errors("1 (snap b1)"), "1: this is not an action of a plan");
-}
-
-#[test]
-fn plan_of_unified_planning_is_read() {
-    let text = "TimeTriggeredPlan:\n    0.0: walk(hall, kitchen) [4.0]\n    4.001: snap(b1)\n    5.0: wait [1.5]";
-    assert_eq!(
-        plan(text),
-        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1); 5.000: (wait) [1.500]"
-    );
-    assert!(notes(text).contains("unified-planning"));
-    let sequence = "SequentialPlan:\n    walk(hall, kitchen)\n    snap(b1)";
-    assert_eq!(
-        plan(sequence),
-        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1)"
-    );
-    let partial = "PartialOrderPlan:\n  actions:\n    0) snap(b1)\n  constraints:\n";
-    assert_eq!(errors(partial).split(':').next(), Some("3"));
-}
-
-#[test]
-fn plan_without_parentheses_is_read() {
-    let text = "0.0: walk hall kitchen [4.0]\n4.001: SNAP B1";
-    assert_eq!(
-        plan(text),
-        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1)"
-    );
-    assert!(notes(text).contains("Aries"));
-    assert_eq!(
-        errors("0: (wait) [2]\n6: launch rocket"),
-        "2: unknown action `launch`\n2: unknown object `rocket`"
-    );
-}
-
-#[test]
-fn steps_of_ff_start_when_the_step_before_has_ended() {
-    let text = "ff: found legal plan as follows\n\nstep    0: WALK HALL KITCHEN\n        1: SNAP B1\n        2: WALK KITCHEN HALL\n     \n\ntime spent:    0.00 seconds instantiating 21 easy, 0 hard action templates\n";
-    assert_eq!(
-        plan(text),
-        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1); 5.001: (walk kitchen hall) [4.000]"
-    );
-    assert!(notes(text).contains("steps of FF"));
-    assert!(!notes(text).contains("Aries"));
-    assert_eq!(
-        errors("step 0: SNAP B1\n     2: SNAP B2"),
-        "2: expected step 1 here"
-    );
-    assert_eq!(
-        errors("step 0: SNAP B1\n1.5: (snap b2)"),
-        "1: an action without a time"
-    );
-}
-
-#[test]
-fn steps_of_contingent_ff_are_read_unless_they_branch() {
-    let rule = "-------------------------------------------------";
-    let text = format!(
-        "ff: found plan as follows\n{rule}\n  0||0 --- WALK HALL KITCHEN --- SON: 1||0\n{rule}\n  1||0 --- SNAP B1 --- SON: 2||-1\n{rule}\n tree layout: 2 levels"
-    );
-    assert_eq!(
-        plan(&text),
-        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1)"
-    );
-    assert!(notes(&text).contains("Contingent-FF"));
-    let branch = "0||0 --- SNAP B1 --- TRUESON: 1||0 --- FALSESON: 1||1\n1||0 --- SNAP B2 --- SON: 2||-1\n1||1 --- WAIT --- SON: 2||-1";
-    assert!(errors(branch).starts_with("1: "), "{}", errors(branch));
-}
-
-#[test]
-fn steps_of_fast_downward_are_read() {
-    let text = "[t=0.003s, 10084 KB] Solution found!\nActual search time: 0.001s\nwalk hall kitchen (1)\nsnap b1 (1)\nPlan length: 2 step(s).\nPlan cost: 2\n";
-    assert_eq!(errors(text), "none");
-    assert_eq!(
-        plan(text),
-        "0.000: (walk hall kitchen) [4.000]; 4.001: (snap b1)"
-    );
-    assert!(notes(text).contains("Fast Downward"));
-}
-
-#[test]
-fn happenings_are_paired() {
-    let text = "0.000: start (wait)\n1: (snap b1)\n2.5: end (wait)\n3: start (walk hall kitchen) #1\n7: end (walk hall kitchen) #1";
-    assert_eq!(
-        plan(text),
-        "0.000: (wait) [2.500]; 1.000: (snap b1); 3.000: (walk hall kitchen) [4.000]"
-    );
-    assert!(notes(text).contains("vscode-pddl"));
-    let overlapping = "0: start (wait) #1\n1: start (wait) #2\n3: end (wait) #1\n5: end (wait) #2";
-    assert_eq!(
-        plan(overlapping),
-        "0.000: (wait) [3.000]; 1.000: (wait) [4.000]"
-    );
-    let ambiguous = overlapping.replace(" #1", "").replace(" #2", "");
-    assert_eq!(
-        errors(&ambiguous),
-        "2: this action starts again before it has ended"
-    );
-    assert_eq!(
-        errors("0: start (wait)"),
-        "1: this action starts, but does not end"
-    );
-    assert_eq!(
-        errors("0: start (wait)\n2: end (wait)\n3: end (wait)"),
-        "3: this action ends, but does not start"
-    );
-    assert_eq!(
-        errors("0: start (wait)\n2: end (wait)\n3: (walk hall kitchen)"),
-        "3: `walk` has no duration here"
-    );
 }

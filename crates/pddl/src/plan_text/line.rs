@@ -32,7 +32,7 @@ impl LineKind {
     pub fn of(text: &str) -> Self {
         match line(text.trim_end(), 0) {
             Line::Blank | Line::Rule => Self::Blank,
-            Line::Heading => Self::Separator,
+            Line::Heading(_) => Self::Separator,
             Line::Noise => Self::Noise,
             Line::Broken(..) => Self::Broken,
             Line::Steps(steps) => match steps.first() {
@@ -50,8 +50,8 @@ impl LineKind {
 pub(super) enum Line<'s> {
     /// Nothing, or a comment that says nothing.
     Blank,
-    /// The line begins another plan of the same log.
-    Heading,
+    /// The line begins another plan of the same log. The place of the heading's own words.
+    Heading(Range<usize>),
     /// A ruler, such as `-----`.
     Rule,
     /// Anything else a planner may say.
@@ -100,7 +100,8 @@ pub(super) fn line(text: &str, start: usize) -> Line<'_> {
     cursor.skip_space();
     if cursor.is_done_or_comment() {
         return if is_heading_comment(text) {
-            Line::Heading
+            let indent = text.len() - text.trim_start().len();
+            Line::Heading(start + indent..start + text.trim_end().len())
         } else {
             Line::Blank
         };
@@ -108,8 +109,10 @@ pub(super) fn line(text: &str, start: usize) -> Line<'_> {
     if is_rule(text) {
         return Line::Rule;
     }
-    if !text.trim_start().starts_with('(') && is_heading(text) {
-        return Line::Heading;
+    if !text.trim_start().starts_with('(')
+        && let Some(own) = heading(text)
+    {
+        return Line::Heading(start + own.start..start + own.end);
     }
     let mut steps: Vec<RawStep<'_>> = Vec::new();
     while !cursor.is_done_or_comment() {
@@ -164,8 +167,9 @@ fn is_heading_comment(text: &str) -> bool {
     matches!(text, ";;;; Solution Found" | "; Plan found") || numbers.any(is_number)
 }
 
-/// Returns `true` if planners print this line, which is no comment, before a plan, or between a plan and a better one.
-fn is_heading(text: &str) -> bool {
+/// Returns the words that planners print before a plan, or between a plan and a better one, relative to the beginning of
+/// `text`, which is no comment. An action may stand beside them: `Solution found: film`.
+fn heading(text: &str) -> Option<Range<usize>> {
     /// Beginnings, behind signs.
     const BEGINNINGS: &[&str] = &[
         "all goal deadlines now no later than",
@@ -183,12 +187,14 @@ fn is_heading(text: &str) -> bool {
     ];
     /// Whole lines, without signs.
     const LINES: &[&str] = &["plan", "rescheduled plan"];
-    let mut text = text.trim();
+    let whole = text.trim_end();
+    let mut text = whole.trim_start();
     // Fast Downward: `[t=0.003s, 10084 KB] Solution found!`.
     if let Some((_, behind)) = text.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
         text = behind;
     }
     let text = text.trim_start_matches(|c: char| !c.is_alphanumeric());
+    let begin = whole.len() - text.len();
     // Steps are longer than all of these words.
     let head: String = text
         .chars()
@@ -196,9 +202,13 @@ fn is_heading(text: &str) -> bool {
         .collect::<String>()
         .to_ascii_lowercase();
     // unified-planning: `plan: TimeTriggeredPlan:`.
-    let head = head.strip_prefix("plan: ").unwrap_or(&head);
-    let whole = head.trim_end_matches(|c: char| !c.is_alphanumeric());
-    BEGINNINGS.iter().any(|words| head.starts_with(words)) || LINES.contains(&whole)
+    let own = head.strip_prefix("plan: ").unwrap_or(&head);
+    let skipped = head.len() - own.len();
+    if let Some(words) = BEGINNINGS.iter().find(|words| own.starts_with(**words)) {
+        return Some(begin..begin + skipped + words.len());
+    }
+    let is_line = LINES.contains(&own.trim_end_matches(|c: char| !c.is_alphanumeric()));
+    is_line.then_some(begin..whole.len())
 }
 
 #[cfg(test)]

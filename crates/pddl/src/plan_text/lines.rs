@@ -10,7 +10,7 @@ use elbowroom_text::{Source, Span};
 
 use super::form::Form;
 use super::line::{Line, RawStep, line};
-use super::near::{classical, known_action, possible_action, single_word};
+use super::near::{action_beside_heading, classical, possible_action, single_word};
 use super::vocabulary::Vocabulary;
 
 /// Steps of the last plan in a text, in their order, and the lines that are not read.
@@ -86,14 +86,14 @@ fn sections<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s
         let range = start + indent..start + shown.len();
         let entry = match line(shown, start) {
             Line::Blank => None,
-            Line::Heading => {
-                sections.push(Vec::new());
-                let place = known_action(&text[range.clone()], vocabulary);
-                let is_comment = shown[indent..].starts_with(';');
-                place
-                    .filter(|_| !is_comment)
-                    .map(|it| possible(&range, &it))
-            }
+            Line::Heading(own) => match classical(shown, start, vocabulary) {
+                // The action `plan` has the same name as a heading.
+                Some(step) => Some(Entry::Steps(vec![step])),
+                None => {
+                    sections.push(Vec::new());
+                    beside_heading(text, &range, &own, vocabulary)
+                }
+            },
             Line::Rule => Some(Entry::Rule(range)),
             Line::Noise => Some(match classical(shown, start, vocabulary) {
                 Some(step) => Entry::Steps(vec![step]),
@@ -132,6 +132,20 @@ fn noise<'s>(text: &'s str, range: Range<usize>, vocabulary: &Vocabulary) -> Ent
         Some(place) => possible(&range, &place),
         None => Entry::Noise(range),
     }
+}
+
+/// An action on the line of a heading, beside the heading's `own` words.
+fn beside_heading<'s>(
+    text: &'s str,
+    line: &Range<usize>,
+    own: &Range<usize>,
+    vocabulary: &Vocabulary,
+) -> Option<Entry<'s>> {
+    let sides = [line.start..own.start, own.end..line.end];
+    sides.into_iter().find_map(|side| {
+        let place = action_beside_heading(&text[side.clone()], vocabulary)?;
+        Some(possible(&side, &place))
+    })
 }
 
 /// A line that may hold an action, at a place relative to the line.

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::form::Form;
-use super::line::{RawStep, Word};
+use super::line::{LineKind, RawStep, Word};
 use super::vocabulary::Vocabulary;
 
 /// Phrases of planners that may hold the name of an action or words in parentheses, in lower case. They
@@ -15,6 +15,7 @@ use super::vocabulary::Vocabulary;
 const HARMLESS: &[&str] = &[
     "(ignoring no-moving-targets-rule)",
     "(real) bound",
+    "as follows",
     "best first search",
     "during search (zero-crossing)",
     "int hash set load factor",
@@ -27,6 +28,51 @@ const HARMLESS: &[&str] = &[
     "search time",
     "state(s)",
     "step(s)",
+    "with cost",
+    "with metric",
+];
+
+/// Words that planners print at the beginning or end of a line of prose, in lower case: `Running search`, `Plan Succeeded`.
+const LOG_WORDS: &[&str] = &[
+    "action",
+    "actions",
+    "best",
+    "complete",
+    "cost",
+    "defined",
+    "done",
+    "end",
+    "failed",
+    "file",
+    "finish",
+    "finished",
+    "found",
+    "goal",
+    "goals",
+    "init",
+    "initial",
+    "limit",
+    "limits",
+    "metric",
+    "no",
+    "none",
+    "number",
+    "plan",
+    "planner",
+    "planning",
+    "problem",
+    "run",
+    "search",
+    "solution",
+    "solved",
+    "start",
+    "state",
+    "states",
+    "step",
+    "steps",
+    "stop",
+    "succeeded",
+    "time",
 ];
 
 /// Opening and closing brackets apart from parentheses.
@@ -46,7 +92,8 @@ enum Piece<'s> {
     },
     Close,
     Bracket,
-    Comma,
+    /// A sign that may separate the arguments of an action: a comma, a bar, a quotation mark.
+    Separator,
     Other,
 }
 
@@ -64,11 +111,13 @@ impl Piece<'_> {
 ///
 /// Possible actions are:
 ///
-/// - an action of the domain ([`known_action`]);
+/// - an action of the domain ([`known`]);
 /// - a line that begins with the name of an action, and has one of the objects, or nothing but numbers;
 /// - words in parentheses on a line with a number;
 /// - a number, words, and a number in brackets;
-/// - words and a whole number in parentheses, or a word and nothing but objects.
+/// - words and a whole number in parentheses, or a word and nothing but objects;
+/// - a row of a table with objects and one other word;
+/// - the name of an action without parameters at the beginning or end of prose, or behind a colon.
 pub(super) fn possible_action(text: &str, vocabulary: &Vocabulary) -> Option<Range<usize>> {
     let text = &without_phrases(text);
     let pieces = pieces(text);
@@ -78,6 +127,28 @@ pub(super) fn possible_action(text: &str, vocabulary: &Vocabulary) -> Option<Ran
         .or_else(|| leading_name(&pieces, vocabulary))
         .or_else(|| words_and_cost(text, &pieces))
         .or_else(|| word_and_objects(&pieces, vocabulary))
+        .or_else(|| table_row(text, &pieces, vocabulary))
+        .or_else(|| name_in_prose(text, &pieces, vocabulary))
+}
+
+/// Returns the place of a possible action in the text before or behind a heading's own words: one that
+/// [`possible_action`] finds by its name or its objects, the name of any action, or an action with a time.
+pub(super) fn action_beside_heading(text: &str, vocabulary: &Vocabulary) -> Option<Range<usize>> {
+    let text = &without_phrases(text);
+    let pieces = pieces(text);
+    let named = pieces.iter().find_map(|piece| match *piece {
+        Piece::Word { text, at } => vocabulary.schema(text).map(|_| at..at + text.len()),
+        _ => None,
+    });
+    let timed = || {
+        let step = text.trim_start_matches(|c: char| !c.is_alphanumeric());
+        matches!(LineKind::of(step), LineKind::Timed | LineKind::Broken)
+            .then_some(text.len() - step.len()..text.trim_end().len())
+    };
+    named
+        .or_else(|| known(&pieces, vocabulary))
+        .or_else(|| word_and_objects(&pieces, vocabulary))
+        .or_else(timed)
 }
 
 /// Returns the place of a text that is a single word, such as the name of an action without arguments.
@@ -90,17 +161,13 @@ pub(super) fn single_word(text: &str) -> Option<Range<usize>> {
     }
 }
 
-/// Returns the place of a possible action of the domain in `text`: the name of an action with a number or
-/// a bracket anywhere on the line, or with as many objects behind it as it has parameters.
-pub(super) fn known_action(text: &str, vocabulary: &Vocabulary) -> Option<Range<usize>> {
-    known(&pieces(&without_phrases(text)), vocabulary)
-}
-
+/// Returns the place of the name of an action that has a number or a bracket anywhere on the line, or as many objects
+/// behind it as it has parameters.
 fn known(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> {
     let is_sign = |piece: &Piece<'_>| match piece {
         Piece::Open { .. } | Piece::Close | Piece::Bracket => true,
         Piece::Word { text, .. } => is_numbered(text, vocabulary),
-        Piece::Comma | Piece::Other => false,
+        Piece::Separator | Piece::Other => false,
     };
     let has_sign = pieces.iter().any(is_sign);
     // Counted once, so that long lines are read in time in proportion to their length.
@@ -171,12 +238,47 @@ fn word_and_objects(pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Ran
     };
     let mut objects = pieces[first + 1..].iter().filter(|piece| {
         let is_bracket = matches!(piece, Piece::Open { .. } | Piece::Close | Piece::Bracket);
-        !is_bracket && !matches!(piece, Piece::Comma)
+        !is_bracket && !matches!(piece, Piece::Separator)
     });
     let is_action = text.starts_with(char::is_alphabetic)
         && objects.clone().next().is_some()
         && objects.all(|piece| piece.is_object(vocabulary));
     is_action.then_some(at..at + text.len())
+}
+
+/// `|40|jump|r1 l2|20|`: apart from numbers, every word but one is an object.
+fn table_row(text: &str, pieces: &[Piece<'_>], vocabulary: &Vocabulary) -> Option<Range<usize>> {
+    let is_row = text.contains('|') && !pieces.iter().any(|it| matches!(it, Piece::Other));
+    if !is_row || !pieces.iter().any(|piece| piece.is_object(vocabulary)) {
+        return None;
+    }
+    let mut others = pieces.iter().filter_map(|piece| match *piece {
+        Piece::Word { text, at } if !is_number(text) && !piece.is_object(vocabulary) => {
+            Some(at..at + text.len())
+        }
+        _ => None,
+    });
+    others.next().filter(|_| others.next().is_none())
+}
+
+/// `executing: film`, `then film`, `film again`
+fn name_in_prose(
+    text: &str,
+    pieces: &[Piece<'_>],
+    vocabulary: &Vocabulary,
+) -> Option<Range<usize>> {
+    let words = || pieces.iter().filter(|piece| piece.is_word());
+    let last = words().count().checked_sub(1)?;
+    words().enumerate().find_map(|(index, piece)| {
+        let &Piece::Word { text: name, at } = piece else {
+            return None;
+        };
+        let is_behind_sign = || text[..at].trim_end().ends_with([':', '=', '>']);
+        let is_action = vocabulary.parameters(name) == Some(0)
+            && (index == 0 || index == last || is_behind_sign())
+            && !LOG_WORDS.contains(&name.to_ascii_lowercase().as_str());
+        (last > 0 && is_action).then_some(at..at + name.len())
+    })
 }
 
 /// Words in parentheses on a line with a number.
@@ -202,7 +304,7 @@ fn words_and_number(text: &str, pieces: &[Piece<'_>]) -> Option<Range<usize>> {
                 }
             }
             Piece::Word { text, .. } => has_number |= is_number(text),
-            Piece::Close | Piece::Bracket | Piece::Comma | Piece::Other => {}
+            Piece::Close | Piece::Bracket | Piece::Separator | Piece::Other => {}
         }
     }
     group.filter(|_| has_number)
@@ -315,7 +417,7 @@ fn pieces(text: &str) -> Vec<Piece<'_>> {
         match character {
             '(' => pieces.push(Piece::Open { at, is_attached }),
             ')' => pieces.push(Piece::Close),
-            ',' => pieces.push(Piece::Comma),
+            ',' | '|' | '"' | '\'' | '`' => pieces.push(Piece::Separator),
             _ if BRACKETS.contains(character) => pieces.push(Piece::Bracket),
             _ if character.is_whitespace() => {}
             _ => pieces.push(Piece::Other),

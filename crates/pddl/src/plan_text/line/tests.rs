@@ -17,6 +17,7 @@ fn shown(text: &str) -> String {
             })
             .collect::<Vec<_>>()
             .join(", "),
+        Line::Heading(_) => "Heading".to_owned(),
         other => format!("{other:?}"),
     }
 }
