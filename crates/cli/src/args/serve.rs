@@ -99,6 +99,8 @@ pub(crate) struct CtlArgs {
 pub(crate) enum CtlCommand {
     /// Print how things stand: what it does and why, goals, what is under way, facts and numbers
     State,
+    /// Print the goals: those that are pursued or set aside, and the last ones that were closed
+    Goals,
     /// Print the plan, and what became of its actions
     Plan,
     /// Print what is still guaranteed, and how far each quantity may deviate

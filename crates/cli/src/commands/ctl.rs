@@ -5,8 +5,8 @@ use std::io::{self, ErrorKind};
 
 use elbowroom::answers::exact::{INFINITY, MINUS_INFINITY};
 use elbowroom::executive::documents::{
-    GivenNumber, GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow, PlanNow, Refusal,
-    State, StepNow, Taken,
+    GivenNumber, GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow, PlanNow,
+    Refusal, State, StepNow, Taken,
 };
 use elbowroom::num::End;
 use serde::Serialize;
@@ -25,21 +25,22 @@ use elbowroom_executive::messages::{counted, escape_control, plain};
 
 /// Asks, and prints the answer.
 pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
-    let queue = RequestQueue { arguments };
+    let client = Client { arguments };
     match &arguments.what {
-        CtlCommand::State => queue.show(output, "/v1/state", state),
-        CtlCommand::Plan => queue.show(output, "/v1/plan", plan),
-        CtlCommand::Guarantee => queue.show(output, "/v1/guarantee", guarantee),
-        CtlCommand::Next => queue.show(output, "/v1/next", next),
-        CtlCommand::Events { after } => queue.events(*after),
+        CtlCommand::State => client.show(output, "/v1/state", state),
+        CtlCommand::Goals => client.show(output, "/v1/goals", goals),
+        CtlCommand::Plan => client.show(output, "/v1/plan", plan),
+        CtlCommand::Guarantee => client.show(output, "/v1/guarantee", guarantee),
+        CtlCommand::Next => client.show(output, "/v1/next", next),
+        CtlCommand::Events { after } => client.events(*after),
         CtlCommand::Openapi => {
-            let (document, _) = queue.ask::<Value>(("GET", "/v1/openapi.json"), None)?;
+            let (document, _) = client.ask::<Value>(("GET", "/v1/openapi.json"), None)?;
             output.json(&document)?;
             Ok(Exit::Yes)
         }
         CtlCommand::Goal { goal, name } => {
             let (goal, name) = (goal.clone(), name.clone());
-            queue.change(output, ("POST", "/v1/goals"), Some(&NewGoal { name, goal }))
+            client.change(output, ("POST", "/v1/goals"), Some(&NewGoal { name, goal }))
         }
         CtlCommand::Cancel { name } => {
             let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
@@ -49,11 +50,11 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
                     "`elbowroom ctl state` lists the goals with their names",
                 ));
             }
-            queue.change(output, ("DELETE", &format!("/v1/goals/{name}")), NOTHING)
+            client.change(output, ("DELETE", &format!("/v1/goals/{name}")), NOTHING)
         }
         CtlCommand::Fact { fact, becomes } => {
             let (fact, becomes) = (fact.clone(), *becomes);
-            queue.change(
+            client.change(
                 output,
                 ("POST", "/v1/facts"),
                 Some(&NewFact { fact, becomes }),
@@ -61,7 +62,7 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
         }
         CtlCommand::Number { fluent, value } => {
             let (fluent, value) = (fluent.clone(), GivenNumber(value.clone()));
-            queue.change(
+            client.change(
                 output,
                 ("POST", "/v1/numbers"),
                 Some(&NewNumber { fluent, value }),
@@ -69,27 +70,27 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
         }
         CtlCommand::Problem { file } => {
             let problem = crate::input::source(file, "problem")?.text().to_owned();
-            queue.change(
+            client.change(
                 output,
                 ("PUT", "/v1/problem"),
                 Some(&NewProblem { problem }),
             )
         }
-        CtlCommand::Pause => queue.change(output, ("POST", "/v1/pause"), NOTHING),
-        CtlCommand::Resume => queue.change(output, ("POST", "/v1/resume"), NOTHING),
-        CtlCommand::Stop => queue.change(output, ("POST", "/v1/stop"), NOTHING),
+        CtlCommand::Pause => client.change(output, ("POST", "/v1/pause"), NOTHING),
+        CtlCommand::Resume => client.change(output, ("POST", "/v1/resume"), NOTHING),
+        CtlCommand::Stop => client.change(output, ("POST", "/v1/stop"), NOTHING),
     }
 }
 
 /// No body.
 const NOTHING: Option<&NewFact> = None;
 
-/// Where an executive is asked.
-struct RequestQueue<'a> {
+/// A client of an executive.
+struct Client<'a> {
     arguments: &'a CtlArgs,
 }
 
-impl RequestQueue<'_> {
+impl Client<'_> {
     fn unreachable(&self, error: &io::Error) -> Failure {
         if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) {
             return Failure::new(
@@ -231,6 +232,27 @@ impl RequestQueue<'_> {
     }
 }
 
+fn goals(goals: &GoalsNow) -> String {
+    let mut text = String::new();
+    for goal in &goals.goals {
+        let name = escape_control(&goal.name);
+        let state = styled(STRONG, &goal.state.replace('-', " "));
+        let since = nearest(&goal.since.0);
+        let mut line = format!(
+            "{name}: {state} since {since}: {}",
+            escape_control(&goal.goal)
+        );
+        if let Some(why) = &goal.why {
+            let _ = write!(line, "; {}", escape_control(why));
+        }
+        let _ = writeln!(text, "{}", wrapped(&line, Look::of_stdout().width, 2));
+    }
+    if text.is_empty() {
+        text.push_str("there is no goal\n");
+    }
+    text
+}
+
 fn state(state: &State) -> String {
     let mut text = format!(
         "{} at {}, plan {}",
@@ -249,12 +271,12 @@ fn state(state: &State) -> String {
         let _ = writeln!(text, "{}", wrapped(&why, Look::of_stdout().width, 2));
     }
     for goal in &state.goals {
-        let _ = writeln!(
-            text,
-            "  goal {}: {}",
-            escape_control(&goal.name),
-            escape_control(&goal.goal)
-        );
+        let (name, pddl) = (escape_control(&goal.name), escape_control(&goal.goal));
+        let aside = goal.aside.as_ref();
+        let aside = aside.map_or(String::new(), |why| {
+            format!("; set aside: {}", escape_control(why))
+        });
+        let _ = writeln!(text, "  goal {name}: {pddl}{aside}");
     }
     for running in &state.running {
         let _ = write!(

@@ -162,6 +162,28 @@ documents! {
         pub aside: Option<String>,
     }
 
+    /// The goals: those that are open, and the last ones that were closed.
+    pub struct GoalsNow {
+        /// The goals, in the order in which they were given; first those that were closed.
+        pub goals: Vec<GoalNow>,
+    }
+
+    /// A goal and what has become of it.
+    pub struct GoalNow {
+        /// Its name; that of the problem's own goal is `problem`.
+        pub name: String,
+        /// The goal, in PDDL.
+        pub goal: String,
+        /// `pursued`, `set-aside` while others are pursued, `achieved` or `cancelled`.
+        pub state: String,
+        /// When it was given, by the world's clock; none if an earlier segment of the journal has it.
+        pub given: Option<Exact>,
+        /// Since when it is in this state.
+        pub since: Exact,
+        /// Why it is set aside or cancelled.
+        pub why: Option<String>,
+    }
+
     /// An action under way.
     pub struct Running {
         /// The number of its start.

@@ -3,7 +3,8 @@
 use serde_json::{Map, Value, json};
 
 use super::documents::{
-    GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow, PlanNow, Refusal, State, Taken,
+    GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow, PlanNow, Refusal,
+    State, Taken,
 };
 use super::schema::Described;
 
@@ -61,6 +62,11 @@ const fn change(
 /// Everything that can be asked of an executive.
 pub const METHODS: &[Method] = &[
     get("/v1/state", "How things stand", Answer::Json(State::schema)),
+    get(
+        "/v1/goals",
+        "The goals: those that are open, and the last ones that were closed",
+        Answer::Json(GoalsNow::schema),
+    ),
     get(
         "/v1/plan",
         "The plan, and what became of its actions",

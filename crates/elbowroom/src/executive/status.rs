@@ -1,12 +1,14 @@
 //! How a run stands, for those who ask while it goes on.
 
+mod goals;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::run::{FIRST_GOAL, TimeoutRule, Verdict};
 use elbowroom_execution::{
-    Cause, Command, Decided, Decision, Doubt, Entry, Event, GoalChange, Mission, Observation,
-    Progression, Promise, Request, StepId, Ticket, WarningCause,
+    Cause, Command, Decided, Decision, Doubt, Entry, Event, Mission, Observation, Progression,
+    Promise, Request, StepId, Ticket, WarningCause,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Task};
@@ -16,8 +18,10 @@ use elbowroom_plan::{ParameterId, ParameterKind};
 use elbowroom_report::exact::Exact;
 use elbowroom_report::trace::SnapshotLine;
 
+use goals::GoalList;
+
 use super::documents::{
-    Activity, GuaranteeNow, InDoubt, LowerEnd, NextNow, NumberNow, OpenGoal, PlanNow, Room,
+    Activity, GoalsNow, GuaranteeNow, InDoubt, LowerEnd, NextNow, NumberNow, PlanNow, Room,
     Running, State, StepNow, UpperEnd,
 };
 
@@ -37,7 +41,7 @@ struct Known {
     rest: Option<String>,
     /// Why a plan is made.
     why: Option<String>,
-    goals: Vec<OpenGoal>,
+    goals: GoalList,
     running: BTreeMap<u64, Running>,
     /// Of these, those that were seen to start.
     started: BTreeSet<u64>,
@@ -54,15 +58,9 @@ struct Known {
 impl Status {
     /// Of a run of this task that has not begun, and whose actions time out by that rule.
     pub fn new(task: &Task, timeout: TimeoutRule) -> Self {
-        let goal = goal_text(task);
-        let mut goals = Vec::new();
+        let mut goals = GoalList::default();
         if !task.problem().goal.is_trivial() {
-            let name = FIRST_GOAL.to_owned();
-            goals.push(OpenGoal {
-                name,
-                goal,
-                aside: None,
-            });
+            goals.give(FIRST_GOAL, &goal_text(task), &Rational::ZERO);
         }
         let known = Known {
             timeout,
@@ -95,8 +93,13 @@ impl Status {
 
     /// The names of the open goals.
     pub fn goals(&self) -> Vec<String> {
-        let known = self.known();
-        known.goals.iter().map(|goal| goal.name.clone()).collect()
+        let goals = self.known().goals.open();
+        goals.into_iter().map(|goal| goal.name).collect()
+    }
+
+    /// Returns the open goals, and the last ones that were closed.
+    pub fn all_goals(&self) -> GoalsNow {
+        self.known().goals.all()
     }
 
     /// Returns the present state. Its facts and numbers are those at the present time: timed initials and
@@ -247,7 +250,7 @@ impl Known {
             unanswered: None,
             why: self.rest.clone().or_else(|| self.why.clone()),
             activity,
-            goals: self.goals.clone(),
+            goals: self.goals.open(),
             running: self.running.values().cloned().collect(),
             plans: self.plans,
             facts: Vec::new(),
@@ -259,20 +262,9 @@ impl Known {
     fn begin_at(&mut self, snapshot: &SnapshotLine) {
         self.now.clone_from(snapshot.now());
         self.is_paused = snapshot.paused;
-        let of_the_problem = std::mem::take(&mut self.goals);
-        let goals = snapshot.goals.iter().map(|line| {
-            let own = of_the_problem.first().map(|it| it.goal.clone());
-            let goal = line.goal.clone().or(own).unwrap_or_default();
-            let name = line.name.clone();
-            OpenGoal {
-                name,
-                goal,
-                aside: line.aside.clone(),
-            }
-        });
-        self.goals = goals.collect();
+        self.goals = self.goals.at(snapshot);
         if snapshot.plan.is_none() {
-            let why = if self.goals.is_empty() {
+            let why = if self.goals.open().is_empty() {
                 NO_GOAL
             } else {
                 BEFORE
@@ -333,11 +325,7 @@ impl Known {
                 }
             }
             Entry::Kept { .. } | Entry::Interrupted { .. } => {}
-            Entry::Goal { name, change, .. } => match change {
-                GoalChange::Achieved => self.goals.retain(|known| known.name != *name),
-                GoalChange::SetAside { why } => self.set_aside(name, Some((*why).to_owned())),
-                GoalChange::Pursued => self.set_aside(name, None),
-            },
+            Entry::Goal { now, name, change } => self.goals.change(name, *change, now),
             Entry::Resting {
                 now,
                 verdict,
@@ -356,7 +344,7 @@ impl Known {
                 self.rest = Some(match verdict {
                     None => NO_GOAL.to_owned(),
                     Some(Verdict::GoalReached) => {
-                        self.goals.clear();
+                        self.goals.close_all(now);
                         format!("reached: {goals}")
                     }
                     Some(verdict) => {
@@ -535,23 +523,13 @@ impl Known {
         }
     }
 
-    fn set_aside(&mut self, name: &str, why: Option<String>) {
-        if let Some(goal) = self.goals.iter_mut().find(|known| known.name == name) {
-            goal.aside = why;
-        }
-    }
-
     fn asked(&mut self, request: &Request) {
         match request {
             Request::Pursue { name, goal } => {
-                self.goals.retain(|known| known.name != *name);
-                self.goals.push(OpenGoal {
-                    name: name.clone(),
-                    goal: goal.clone(),
-                    aside: None,
-                });
+                self.goals.cancel(name, "replaced", &self.now);
+                self.goals.give(name, goal, &self.now);
             }
-            Request::Abandon { name } => self.goals.retain(|known| known.name != *name),
+            Request::Abandon { name } => self.goals.cancel(name, "abandoned", &self.now),
             Request::Pause => self.is_paused = true,
             Request::Resume => self.is_paused = false,
         }

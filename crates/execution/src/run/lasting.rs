@@ -5,7 +5,7 @@
 //!
 //! | asked or observed | what comes of it |
 //! | --- | --- |
-//! | a goal | all open goals together are the goal from then on. If the rest of the plan, begun now, reaches this, too, it is kept; else a plan is made from here |
+//! | a goal | all open goals together are the goal from then on, except those that are [set aside](super::choosing). If the rest of the plan, begun now, reaches this, too, it is kept; else a plan is made from here |
 //! | a goal of a name that is open | it takes the place of the earlier one; a plan is made from here |
 //! | a goal is abandoned | a plan is made for the others; without others, nothing more is started |
 //! | a fact or value | believed; the plan goes on while it works with it, and else a plan is made from here |

@@ -248,6 +248,7 @@ impl ApiRouter {
             }
             ("GET", "/v1/openapi.json") => respond(stream, 200, JSON, &text(&openapi())),
             ("GET", "/v1/state") => respond(stream, 200, JSON, &text(&self.state())),
+            ("GET", "/v1/goals") => respond(stream, 200, JSON, &text(&self.run()?.0.all_goals())),
             ("GET", "/v1/plan") => respond(stream, 200, JSON, &text(&self.run()?.0.plan())),
             ("GET", "/v1/guarantee") => {
                 respond(stream, 200, JSON, &text(&self.run()?.0.guarantee()))

@@ -202,6 +202,13 @@ impl Watcher for ReplayWatcher<'_> {
         self.inner.elapsed()
     }
 
+    fn notice(&mut self, event: &elbowroom::answers::Event<'_>) {
+        // The recorded part of the run was reported when it happened.
+        if self.replay.is_over() {
+            self.inner.notice(event);
+        }
+    }
+
     fn flow(&mut self) -> ControlFlow<Halt> {
         let is_to_end = self.replay.is_to_end.load(Ordering::SeqCst) || self.health.has_failed();
         match () {

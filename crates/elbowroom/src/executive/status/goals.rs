@@ -1,0 +1,122 @@
+//! The goals of a lasting run, and what has become of them.
+
+use std::collections::VecDeque;
+
+use elbowroom_execution::GoalChange;
+use elbowroom_num::Rational;
+use elbowroom_report::exact::Exact;
+use elbowroom_report::trace::SnapshotLine;
+
+use super::super::documents::{GoalNow, GoalsNow, OpenGoal};
+
+/// The greatest number of closed goals that are remembered.
+const MOST_CLOSED: usize = 1000;
+
+const PURSUED: &str = "pursued";
+const SET_ASIDE: &str = "set-aside";
+const ACHIEVED: &str = "achieved";
+const CANCELLED: &str = "cancelled";
+
+/// The open goals, and the last ones that were closed.
+#[derive(Clone, Debug, Default)]
+pub(super) struct GoalList {
+    open: Vec<GoalNow>,
+    closed: VecDeque<GoalNow>,
+}
+
+impl GoalList {
+    /// Adds an open goal.
+    pub(super) fn give(&mut self, name: &str, goal: &str, now: &Rational) {
+        self.open.push(GoalNow {
+            name: name.to_owned(),
+            goal: goal.to_owned(),
+            state: PURSUED.to_owned(),
+            given: Some(Exact(now.clone())),
+            since: Exact(now.clone()),
+            why: None,
+        });
+    }
+
+    /// Returns the open goals.
+    pub(super) fn open(&self) -> Vec<OpenGoal> {
+        let open = self.open.iter().map(|goal| OpenGoal {
+            name: goal.name.clone(),
+            goal: goal.goal.clone(),
+            aside: goal.why.clone(),
+        });
+        open.collect()
+    }
+
+    /// Returns all goals that are remembered.
+    pub(super) fn all(&self) -> GoalsNow {
+        let goals = self.closed.iter().chain(&self.open).cloned().collect();
+        GoalsNow { goals }
+    }
+
+    /// Returns the goals of a run that begins there. The goal of the problem has its text from this list.
+    pub(super) fn at(&self, snapshot: &SnapshotLine) -> Self {
+        let own = self.open.first().map(|goal| &goal.goal);
+        let open = snapshot.goals.iter().map(|line| GoalNow {
+            name: line.name.clone(),
+            goal: line.goal.as_ref().or(own).cloned().unwrap_or_default(),
+            state: state(line.aside.is_some()),
+            given: None,
+            since: Exact(snapshot.now().clone()),
+            why: line.aside.clone(),
+        });
+        Self {
+            open: open.collect(),
+            closed: VecDeque::new(),
+        }
+    }
+
+    /// Changes an open goal.
+    pub(super) fn change(&mut self, name: &str, change: GoalChange<'_>, now: &Rational) {
+        let why = match change {
+            GoalChange::Achieved => {
+                self.close(now, ACHIEVED, None, |goal| goal.name == name);
+                return;
+            }
+            GoalChange::SetAside { why } => Some(why.to_owned()),
+            GoalChange::Pursued => None,
+        };
+        if let Some(goal) = self.open.iter_mut().find(|goal| goal.name == name) {
+            goal.state = state(why.is_some());
+            goal.since = Exact(now.clone());
+            goal.why = why;
+        }
+    }
+
+    /// Closes an open goal that nobody wants any more.
+    pub(super) fn cancel(&mut self, name: &str, why: &str, now: &Rational) {
+        self.close(now, CANCELLED, Some(why), |goal| goal.name == name);
+    }
+
+    /// Closes all open goals, which are achieved.
+    pub(super) fn close_all(&mut self, now: &Rational) {
+        self.close(now, ACHIEVED, None, |_| true);
+    }
+
+    fn close(
+        &mut self,
+        now: &Rational,
+        state: &str,
+        why: Option<&str>,
+        is_it: impl Fn(&GoalNow) -> bool,
+    ) {
+        for goal in self.open.extract_if(.., |goal| is_it(goal)) {
+            self.closed.push_back(GoalNow {
+                state: state.to_owned(),
+                since: Exact(now.clone()),
+                why: why.map(str::to_owned),
+                ..goal
+            });
+        }
+        let surplus = self.closed.len().saturating_sub(MOST_CLOSED);
+        self.closed.drain(..surplus);
+    }
+}
+
+fn state(is_aside: bool) -> String {
+    if is_aside { SET_ASIDE } else { PURSUED }.to_owned()
+}
