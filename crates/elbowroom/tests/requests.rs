@@ -51,7 +51,7 @@ struct Noted {
     begins: Option<Rational>,
     /// The present plan, with times from its beginning.
     plan: TimeTriggeredPlan,
-    /// How often in a row this plan was abandoned for lack of time.
+    /// The number of times in a row that this plan was abandoned for lack of time.
     abandoned: usize,
     is_lacking_time: bool,
     /// The number of plans that were begun after they were abandoned twice, and the times with a guarantee.

@@ -23,7 +23,7 @@ const GUARANTEED: usize = 2;
 pub(super) struct Repetition {
     /// The present plan, with times from its beginning.
     plan: TimeTriggeredPlan,
-    /// How often it was abandoned for lack of time, or after an untimely end.
+    /// The number of times that it was abandoned for lack of time, or after an untimely end.
     abandoned: usize,
     /// `true` if the present attempt was abandoned so.
     is_over: bool,
