@@ -276,9 +276,8 @@ impl<'a> Relaxed<'a> {
         }
         // Where no end can be missing, the rest makes no difference to the relaxed plan. What is filled up and
         // drawn on asks for the costs of other operators.
-        let asks_for_others = self.has_single_starts
-            || !self.resources.is_empty()
-            || !self.consumables.is_empty();
+        let asks_for_others =
+            self.has_single_starts || !self.resources.is_empty() || !self.consumables.is_empty();
         self.spread(state, self.serves_repairs || !asks_for_others);
         let mut estimate = Estimate::default();
         for open in &state.open {

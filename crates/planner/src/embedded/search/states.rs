@@ -8,8 +8,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::super::hash::Map;
-use super::super::network::{Network, SETTLED};
-use super::super::state::{Joint, Last, Open, State};
+use super::super::network::SETTLED;
+use super::super::state::State;
 use super::difference;
 
 /// After so many differences in a row the next one is to the first state, so that few have to be followed.
@@ -25,10 +25,9 @@ const CHUNK: usize = 1 << 16;
 #[derive(Debug, Default)]
 pub(super) struct States {
     kept: Vec<Kept>,
-    /// States that are no differences: the first one, and those whose numbers are large or depend on times.
+    /// States that are no differences: the first one, and those in which something is not settled, or whose
+    /// numbers are large or depend on times.
     whole: Map<u32, Arc<State>>,
-    /// What is under way in others.
-    unsettled: Map<u32, Box<Unsettled>>,
     chunks: Vec<Vec<u8>>,
     /// The states used last, the last one at the end.
     recent: VecDeque<(u32, Arc<State>)>,
@@ -47,15 +46,6 @@ struct Kept {
 
 const WHOLE: u32 = u32::MAX;
 
-/// What is under way.
-#[derive(Debug)]
-struct Unsettled {
-    open: Vec<Open>,
-    network: Network,
-    last: Last,
-    joint: Option<Joint>,
-}
-
 impl States {
     /// Keeps a state that came from `parent`, and returns the memory that it takes, in bytes. The first state
     /// has no parent.
@@ -68,7 +58,7 @@ impl States {
     }
 
     fn keep(&mut self, number: u32, parent: Option<u32>, state: &Arc<State>) -> usize {
-        if let Some(parent) = parent.filter(|_| state.symbolic.is_none()) {
+        if let Some(parent) = parent.filter(|_| is_settled(state)) {
             let links = match self.kept[parent as usize].base {
                 WHOLE => 0,
                 _ => self.written_at(parent)[0],
@@ -85,7 +75,7 @@ impl States {
                 && let Some(place) = self.store()
             {
                 self.kept.push(Kept { base, place });
-                return self.written.len() + self.keep_unsettled(number, state);
+                return self.written.len();
             }
         }
         self.kept.push(Kept {
@@ -111,24 +101,6 @@ impl States {
         let place = u32::try_from(number * CHUNK + chunk.len()).ok()?;
         chunk.extend_from_slice(&self.written);
         Some(place)
-    }
-
-    fn keep_unsettled(&mut self, number: u32, state: &State) -> usize {
-        if is_settled(state) {
-            return 0;
-        }
-        let mut unsettled = Unsettled {
-            open: state.open.clone(),
-            network: state.network.clone(),
-            last: state.last,
-            joint: state.joint,
-        };
-        unsettled.network.shrink();
-        let memory = size_of::<Unsettled>()
-            + size_of::<Open>() * unsettled.open.len()
-            + unsettled.network.size();
-        self.unsettled.insert(number, Box::new(unsettled));
-        memory + 32
     }
 
     /// The number of links to the next whole state, and the difference.
@@ -167,8 +139,7 @@ impl States {
 
     /// Whether the state has something that is not settled.
     pub(super) fn is_unsettled(&self, number: u32) -> bool {
-        self.unsettled.contains_key(&number)
-            || !self.whole(number).is_none_or(|whole| is_settled(whole))
+        self.whole(number).is_some_and(|whole| !is_settled(whole))
     }
 
     /// Whether two states have the same facts and have seen as many timed initials. `facts` is overwritten.
@@ -214,17 +185,11 @@ impl States {
             state.symbolic.clone_from(&whole.symbolic);
             return;
         }
+        state.open.clear();
+        state.network = whole.network.emptied();
+        state.last.node = SETTLED;
+        state.joint = None;
         state.symbolic = None;
-        if let Some(unsettled) = self.unsettled.get(&number) {
-            state.open.clone_from(&unsettled.open);
-            state.network = unsettled.network.clone();
-            (state.last, state.joint) = (unsettled.last, unsettled.joint);
-        } else {
-            state.open.clear();
-            state.network = whole.network.emptied();
-            state.last.node = SETTLED;
-            state.joint = None;
-        }
     }
 
     fn note(&mut self, number: u32, state: Arc<State>) {
@@ -243,6 +208,7 @@ pub(super) fn is_settled(state: &State) -> bool {
         && state.network.is_empty()
         && state.joint.is_none()
         && state.last.node == SETTLED
+        && state.symbolic.is_none()
 }
 
 /// Copies what a difference is about.
