@@ -91,7 +91,7 @@ pub(crate) struct Relaxed<'a> {
     operator_cost: Vec<u32>,
     /// What each operator counts for.
     own_cost: Vec<u32>,
-    /// What each operator reaches.
+    /// The effects of each operator.
     reaches: Vec<Reaches>,
     is_used: Vec<bool>,
     is_wanted: Vec<bool>,
@@ -101,7 +101,7 @@ pub(crate) struct Relaxed<'a> {
     deadlines: Deadlines,
     resources: Resources,
     consumables: Consumables,
-    /// Whether some action starts and ends in different steps.
+    /// `true` if an action starts and ends in different steps.
     has_single_starts: bool,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
@@ -274,8 +274,8 @@ impl<'a> Relaxed<'a> {
             self.buckets.iter_mut().for_each(Vec::clear);
             return None;
         }
-        // Where no end can be missing, the rest makes no difference to the relaxed plan. What is filled up and
-        // drawn on asks for the costs of other operators.
+        // Without separate ends, costs above those of the goal do not change the relaxed plan. Resources and
+        // consumables need the costs of other operators.
         let asks_for_others =
             self.has_single_starts || !self.resources.is_empty() || !self.consumables.is_empty();
         self.spread(state, self.serves_repairs || !asks_for_others);

@@ -59,7 +59,7 @@ pub(crate) struct Search<'a> {
     states: States,
     /// The nodes by the discrete hash of their states.
     known: Hashes,
-    /// A state with which a new one is compared.
+    /// Buffer for known states, for comparison with a new one.
     compared: State,
     all: Queue,
     preferred: Queue,
@@ -110,7 +110,7 @@ struct Node {
     parent: u32,
     /// The number of steps that led to it.
     depth: u32,
-    /// How much of the goal is left, or how many landmarks, where that matters.
+    /// The number of goals or landmarks left, where that matters.
     left: u32,
     dead_end: DeadEnd,
     step: Step,
@@ -118,7 +118,7 @@ struct Node {
     notes: Option<Box<Notes>>,
 }
 
-/// What some searches note about a state.
+/// Notes about a state, for some searches.
 #[derive(Debug, Default)]
 struct Notes {
     /// The part of the unsettled past that matters, in a search that compares it exactly.
@@ -127,7 +127,7 @@ struct Notes {
     progress: Option<Progress>,
     /// The landmarks accepted on the way to it, where they count.
     accepted: Box<[u64]>,
-    /// Where there are numbers.
+    /// For problems with numbers.
     drift: Drift,
 }
 

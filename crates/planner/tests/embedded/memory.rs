@@ -52,7 +52,7 @@ fn the_search_that_takes_most_gives_way_to_one_that_finds_a_plan() {
 }
 
 /// How many reports there are at most.
-const MOST_REPORTS: usize = 50;
+const MOST_REPORTS: usize = 200;
 
 /// How many reports there are about better plans of a shop, what the searches took at most, and why it ended.
 fn better_plans(max_memory: usize) -> (usize, usize, Stopped) {

@@ -193,7 +193,7 @@ impl Graph {
         (self.start_of[action as usize], end)
     }
 
-    /// Whether some action starts and ends in different steps.
+    /// Returns `true` if an action starts and ends in different steps.
     pub(super) fn has_single_starts(&self) -> bool {
         self.operators.iter().any(|operator| {
             matches!(operator.kind, Kind::Start(action) if self.end_of[action as usize] != NONE)

@@ -1,4 +1,4 @@
-//! The difference between two states in what is settled, as a short sequence of bytes.
+//! The difference between two settled states, as a short sequence of bytes.
 //!
 //! Numbers are written in groups of seven bits, small ones first. Of lists, only what changed is written: the
 //! distance from the last place that changed, and the change; 0 ends the list.
@@ -35,7 +35,7 @@ pub(super) fn write(base: &State, state: &State, bytes: &mut Vec<u8>) -> Option<
     Some(())
 }
 
-/// How many annotations are compared at once.
+/// The number of annotations that are compared at once.
 const BLOCK: usize = 16;
 
 fn put_annotations(bytes: &mut Vec<u8>, base: &State, state: &State) {
@@ -58,7 +58,7 @@ fn put_annotations(bytes: &mut Vec<u8>, base: &State, state: &State) {
     put(bytes, 0);
 }
 
-/// Makes `state`, which is as the base was, what was written.
+/// Turns a copy of the base into the state that was written.
 pub(super) fn apply(bytes: &[u8], state: &mut State) {
     let mut bytes = Bytes(bytes);
     state.timed = bytes.take_timed();
@@ -134,7 +134,7 @@ fn put_number(bytes: &mut Vec<u8>, number: Option<&Rational>) -> Option<()> {
     Some(())
 }
 
-/// What is left to read.
+/// The bytes that have not been read.
 struct Bytes<'a>(&'a [u8]);
 
 impl Bytes<'_> {

@@ -81,7 +81,6 @@ impl Search<'_> {
         let only_facts_count = self.is_timeless
             && self.step_costs.is_none()
             && state.values.is_empty()
-            && state.symbolic.is_none()
             && is_settled(state);
         let mut variants = 0;
         for number in self.known.like(hash) {

@@ -12,7 +12,7 @@ pub(super) struct Waiting {
     step: u32,
 }
 
-/// How many bits the kind of a step takes.
+/// The number of bits for the kind of a step.
 const KIND_BITS: u32 = 3;
 
 impl Waiting {

@@ -1,34 +1,32 @@
 //! The states of a search, kept as differences to the states that they came from.
 //!
-//! A step changes few facts and annotations, while a state may have thousands of both. So what is kept of a
-//! state is what differs from its parent, and after a number of steps from the first state. A state is
-//! restored when its successors have their turns; those used last stay as they are.
+//! A step changes few facts and annotations, while a state may have thousands of both. So a state is stored as
+//! the difference to its parent, or, after a number of steps, to the first state. It is restored when its
+//! successors have their turns. A small cache has the states used last.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::super::hash::Map;
-use super::super::network::{Network, SETTLED};
-use super::super::state::{Joint, Last, Open, State};
+use super::super::network::SETTLED;
+use super::super::state::State;
 use super::difference;
 
-/// After so many differences in a row the next one is to the first state, so that few have to be followed.
+/// The longest chain of differences. The next one is to the first state, so that restoring takes few steps.
 const MOST_LINKS: u8 = 8;
 
-/// How many states stay as they are.
+/// The number of states in the cache.
 const MOST_RECENT: usize = 8;
 
-/// How many bytes of differences are allocated together.
+/// The number of bytes that are allocated together.
 const CHUNK: usize = 1 << 16;
 
 /// See the module. The first state is number 0.
 #[derive(Debug, Default)]
 pub(super) struct States {
     kept: Vec<Kept>,
-    /// States that are no differences: the first one, and those whose numbers are large or depend on times.
-    whole: Map<u32, Arc<State>>,
-    /// What is under way in others.
-    unsettled: Map<u32, Box<Unsettled>>,
+    /// Complete states: the first one, unsettled ones, and those with large numbers or numbers that depend on
+    /// times.
+    whole: Vec<Arc<State>>,
     chunks: Vec<Vec<u8>>,
     /// The states used last, the last one at the end.
     recent: VecDeque<(u32, Arc<State>)>,
@@ -36,25 +34,17 @@ pub(super) struct States {
     written: Vec<u8>,
 }
 
-/// Where a state is kept.
+/// The place of a state.
 #[derive(Clone, Copy, Debug)]
 struct Kept {
     /// The state that it differs from; [`WHOLE`] if it is no difference.
     base: u32,
-    /// The chunk and the place in it, where the number of links and the difference begin.
+    /// The chunk and the place in it, where the number of links and the difference begin; or the place among
+    /// whole states.
     place: u32,
 }
 
 const WHOLE: u32 = u32::MAX;
-
-/// What is under way.
-#[derive(Debug)]
-struct Unsettled {
-    open: Vec<Open>,
-    network: Network,
-    last: Last,
-    joint: Option<Joint>,
-}
 
 impl States {
     /// Keeps a state that came from `parent`, and returns the memory that it takes, in bytes. The first state
@@ -62,13 +52,15 @@ impl States {
     pub(super) fn push(&mut self, parent: Option<u32>, state: State) -> usize {
         let number = u32::try_from(self.kept.len()).expect("memory is used up long before");
         let state = Arc::new(state);
-        let memory = size_of::<Kept>() + self.keep(number, parent, &state);
-        self.note(number, state);
+        let memory = size_of::<Kept>() + self.keep(parent, &state);
+        if self.whole(number).is_none() {
+            self.note(number, state);
+        }
         memory
     }
 
-    fn keep(&mut self, number: u32, parent: Option<u32>, state: &Arc<State>) -> usize {
-        if let Some(parent) = parent.filter(|_| state.symbolic.is_none()) {
+    fn keep(&mut self, parent: Option<u32>, state: &Arc<State>) -> usize {
+        if let Some(parent) = parent.filter(|_| is_settled(state)) {
             let links = match self.kept[parent as usize].base {
                 WHOLE => 0,
                 _ => self.written_at(parent)[0],
@@ -85,18 +77,18 @@ impl States {
                 && let Some(place) = self.store()
             {
                 self.kept.push(Kept { base, place });
-                return self.written.len() + self.keep_unsettled(number, state);
+                return self.written.len();
             }
         }
         self.kept.push(Kept {
             base: WHOLE,
-            place: 0,
+            place: u32::try_from(self.whole.len()).expect("fewer than there are states"),
         });
-        self.whole.insert(number, Arc::clone(state));
+        self.whole.push(Arc::clone(state));
         state.size() + 32
     }
 
-    /// Copies what is written into a chunk. `None` if it does not fit.
+    /// Copies the new difference into a chunk. `None` if it does not fit.
     fn store(&mut self) -> Option<u32> {
         let length = self.written.len();
         let has_room = |chunk: &Vec<u8>| chunk.len() + length <= CHUNK;
@@ -113,24 +105,6 @@ impl States {
         Some(place)
     }
 
-    fn keep_unsettled(&mut self, number: u32, state: &State) -> usize {
-        if is_settled(state) {
-            return 0;
-        }
-        let mut unsettled = Unsettled {
-            open: state.open.clone(),
-            network: state.network.clone(),
-            last: state.last,
-            joint: state.joint,
-        };
-        unsettled.network.shrink();
-        let memory = size_of::<Unsettled>()
-            + size_of::<Open>() * unsettled.open.len()
-            + unsettled.network.size();
-        self.unsettled.insert(number, Box::new(unsettled));
-        memory + 32
-    }
-
     /// The number of links to the next whole state, and the difference.
     fn written_at(&self, number: u32) -> &[u8] {
         let place = self.kept[number as usize].place as usize;
@@ -141,7 +115,9 @@ impl States {
     pub(super) fn get(&mut self, number: u32) -> Arc<State> {
         if let Some(state) = self.whole_or_recent(number) {
             let state = Arc::clone(state);
-            self.note(number, Arc::clone(&state));
+            if self.whole(number).is_none() {
+                self.note(number, Arc::clone(&state));
+            }
             return state;
         }
         let mut state = State::default();
@@ -153,25 +129,24 @@ impl States {
 
     /// The state, if it need not be restored.
     pub(super) fn whole_or_recent(&self, number: u32) -> Option<&Arc<State>> {
-        let mut recent = self.recent.iter().rev();
-        let recent = recent.find(|recent| recent.0 == number);
-        recent
-            .map(|recent| &recent.1)
-            .or_else(|| self.whole(number))
+        self.whole(number).or_else(|| {
+            let mut recent = self.recent.iter().rev();
+            let recent = recent.find(|recent| recent.0 == number)?;
+            Some(&recent.1)
+        })
     }
 
     fn whole(&self, number: u32) -> Option<&Arc<State>> {
-        let is_whole = self.kept[number as usize].base == WHOLE;
-        is_whole.then(|| &self.whole[&number])
+        let kept = self.kept[number as usize];
+        (kept.base == WHOLE).then(|| &self.whole[kept.place as usize])
     }
 
-    /// Whether the state has something that is not settled.
+    /// Returns `true` if something in the state is not settled.
     pub(super) fn is_unsettled(&self, number: u32) -> bool {
-        self.unsettled.contains_key(&number)
-            || !self.whole(number).is_none_or(|whole| is_settled(whole))
+        self.whole(number).is_some_and(|whole| !is_settled(whole))
     }
 
-    /// Whether two states have the same facts and have seen as many timed initials. `facts` is overwritten.
+    /// Returns `true` if facts and number of timed initials are the same in both states. `facts` is a buffer.
     pub(super) fn has_facts_of(&self, number: u32, state: &State, facts: &mut Vec<u64>) -> bool {
         facts.clone_from(&state.facts);
         let (mut base, mut timed) = (number, None);
@@ -187,7 +162,7 @@ impl States {
         *facts == whole.facts && timed.unwrap_or(whole.timed) == state.timed
     }
 
-    /// Makes the state anew.
+    /// Restores the state.
     pub(super) fn restore(&self, number: u32, state: &mut State) {
         let mut links = Vec::with_capacity(usize::from(MOST_LINKS));
         let mut base = number;
@@ -214,17 +189,11 @@ impl States {
             state.symbolic.clone_from(&whole.symbolic);
             return;
         }
+        state.open.clear();
+        state.network = whole.network.emptied();
+        state.last.node = SETTLED;
+        state.joint = None;
         state.symbolic = None;
-        if let Some(unsettled) = self.unsettled.get(&number) {
-            state.open.clone_from(&unsettled.open);
-            state.network = unsettled.network.clone();
-            (state.last, state.joint) = (unsettled.last, unsettled.joint);
-        } else {
-            state.open.clear();
-            state.network = whole.network.emptied();
-            state.last.node = SETTLED;
-            state.joint = None;
-        }
     }
 
     fn note(&mut self, number: u32, state: Arc<State>) {
@@ -237,12 +206,13 @@ impl States {
     }
 }
 
-/// Whether all that was chosen has its time, and no action is under way.
+/// Returns `true` if all happenings have their times, and no action is under way.
 pub(super) fn is_settled(state: &State) -> bool {
     state.open.is_empty()
         && state.network.is_empty()
         && state.joint.is_none()
         && state.last.node == SETTLED
+        && state.symbolic.is_none()
 }
 
 /// Copies what a difference is about.

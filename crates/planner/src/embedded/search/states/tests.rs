@@ -56,7 +56,7 @@ fn keep_and_read(draft: &Draft, picks: &[(prop::sample::Index, prop::sample::Ind
     list(draft, &plain);
 }
 
-/// What is applicable is the same with an estimate and without one.
+/// Compares the applicable steps of estimates and of lists.
 fn list(draft: &Draft, plain: &[State]) {
     let task = draft.task();
     let compiled = compiled(&task);
