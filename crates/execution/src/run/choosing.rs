@@ -70,7 +70,7 @@ impl Run<'_> {
         }
         let (achieved, left): (Vec<_>, Vec<_>) = lasting.goals.drain(..).partition(is_achieved);
         lasting.goals = left;
-        lasting.has_closed_goals = self.search.is_some();
+        self.lost.has_closed_goals = self.search.is_some();
         self.record_achieved(&achieved);
         self.set_goal();
     }
@@ -164,10 +164,7 @@ impl Run<'_> {
 
     /// Tries again if goals were closed since the plan was requested: there may be one for the others.
     fn choose_after_closing(&mut self) -> bool {
-        let Some(lasting) = &mut self.lasting else {
-            return false;
-        };
-        let has_closed = std::mem::take(&mut lasting.has_closed_goals);
+        let has_closed = std::mem::take(&mut self.lost.has_closed_goals);
         if has_closed {
             self.turn("some are reached".to_owned(), true);
         }

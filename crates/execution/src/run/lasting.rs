@@ -81,8 +81,6 @@ pub(super) struct Lasting<'a> {
     pub(super) change: Option<Turn>,
     /// The selection among the goals that is under way.
     pub(super) choosing: Option<Choosing>,
-    /// `true` if goals were closed while the last search for a plan was under way.
-    pub(super) has_closed_goals: bool,
     /// The plan that is executed, on the world's clock.
     pub(super) plan: Option<TimeTriggeredPlan>,
     /// The names of the goals that it is for.
@@ -130,7 +128,6 @@ impl<'a> Run<'a> {
             is_paused: false,
             change: None,
             choosing: None,
-            has_closed_goals: false,
             plan: None,
             planned_goals: BTreeSet::new(),
             rests_since: None,
@@ -356,7 +353,6 @@ impl<'a> Run<'a> {
         if let Some(lasting) = &mut self.lasting {
             lasting.plan = Some(plan.clone());
             lasting.rests_since = None;
-            lasting.has_closed_goals = false;
             let pursued = goals.open.iter().filter(|it| it.aside.is_none());
             lasting.planned_goals = pursued.map(|it| it.name.clone()).collect();
             self.choose_after_success();
@@ -474,7 +470,6 @@ impl<'a> Run<'a> {
         };
         lasting.rests_since = Some(self.now.clone());
         lasting.is_unsolvable = verdict == Some(&Verdict::Unsolvable);
-        lasting.has_closed_goals = false;
         let goals: Vec<String> = lasting.goals.iter().map(|it| it.name.clone()).collect();
         let is_reached = verdict == Some(&Verdict::GoalReached);
         if is_reached {
