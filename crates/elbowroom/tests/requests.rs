@@ -1,4 +1,5 @@
-//! No plan is rejected in the situation for which it was made, and no plan is requested twice for the same situation.
+//! No plan is rejected in the situation for which it was made, no plan is requested twice for the same situation, and
+//! the default executor begins no plan a third time with a guarantee that durations have broken twice.
 //!
 //! The tests cover all cases, random problems, and the benchmark plans if their folder is next to the repository: one plan of
 //! each family, or as many as `ELBOWROOM_REQUEST_PLANS` says.
@@ -19,7 +20,7 @@ use std::sync::{Arc, Mutex};
 
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom::execution::run::{PlanningTime, RunSettings};
-use elbowroom::execution::{Decision, Entry, Recorder};
+use elbowroom::execution::{About, Cause, Decided, Decision, Entry, Mission, Promise, Recorder};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl;
@@ -33,6 +34,10 @@ const WORLD: &str = "format = \"elbowroom-world\"\nversion = 1
 [[duration]]\naction = \"*\"\nuniform = { from = 0.7, to = 1.3 }\nrelative = true
 [[failure]]\naction = \"*\"\nprobability = 0.1\n";
 
+/// All actions take less than planned, by the same share. The same plans are made again and again.
+const SHORT_WORLD: &str = "format = \"elbowroom-world\"\nversion = 1
+[[duration]]\naction = \"*\"\nconstant = 0.8\nrelative = true\n";
+
 /// The requests of a run.
 #[derive(Clone, Default)]
 struct Requests(Arc<Mutex<Noted>>);
@@ -44,6 +49,52 @@ struct Noted {
     faults: Vec<String>,
     /// The beginning of the present plan, until something is observed.
     begins: Option<Rational>,
+    /// The present plan, with times from its beginning.
+    plan: TimeTriggeredPlan,
+    /// The number of times in a row that this plan was abandoned for lack of time.
+    abandoned: usize,
+    is_lacking_time: bool,
+    /// The number of plans that were begun after they were abandoned twice, and the times with a guarantee.
+    third_attempts: usize,
+    third_with_guarantee: Vec<Rational>,
+}
+
+impl Noted {
+    fn note_mission(&mut self, mission: &Mission) {
+        if !self.is_lacking_time || self.plan != mission.time_triggered {
+            self.abandoned = 0;
+        }
+        self.is_lacking_time = false;
+        self.plan = mission.time_triggered.clone();
+        self.begins = Some(mission.origin.clone());
+    }
+
+    fn note_decided(&mut self, now: &Rational, decided: &Decided) {
+        let reason = &decided.reason;
+        match decided.decision {
+            Decision::Replan => {
+                let begins = self.begins.take();
+                if begins.is_some_and(|begins| *now <= begins + Rational::new(1, 1000)) {
+                    self.faults.push(format!("rejected at {now}: {reason}"));
+                }
+                self.is_lacking_time = matches!(
+                    reason.cause,
+                    Cause::OutsideInterval | Cause::Outlived | Cause::Failed
+                ) || matches!(reason.about, Some(About::TooLittleTime));
+                self.abandoned += usize::from(self.is_lacking_time);
+            }
+            Decision::Start(_) if self.abandoned == 2 => {
+                self.third_attempts += 1;
+                if reason
+                    .promise
+                    .is_some_and(|promise| promise < Promise::Luck)
+                {
+                    self.third_with_guarantee.push(now.clone());
+                }
+            }
+            _ => {}
+        }
+    }
 }
 
 impl Recorder for Requests {
@@ -56,15 +107,9 @@ impl Recorder for Requests {
                     noted.faults.push(format!("requested again at {now}"));
                 }
             }
-            Entry::Mission(mission) => noted.begins = Some(mission.origin.clone()),
+            Entry::Mission(mission) => noted.note_mission(mission),
             Entry::Taken { .. } => noted.begins = None,
-            Entry::Decided { now, decided } if decided.decision == Decision::Replan => {
-                let begins = noted.begins.take();
-                if begins.is_some_and(|begins| **now <= begins + Rational::new(1, 1000)) {
-                    let fault = format!("rejected at {now}: {}", decided.reason);
-                    noted.faults.push(fault);
-                }
-            }
+            Entry::Decided { now, decided } => noted.note_decided(now, decided),
             _ => {}
         }
     }
@@ -72,33 +117,103 @@ impl Recorder for Requests {
 
 /// Runs the plan with each executor, and returns the number of requests.
 fn requests(label: &str, task: &Arc<Task>, plan: &TimeTriggeredPlan, seeds: u64) -> usize {
-    let source = pddl::Source::new("world", WORLD);
-    let model = WorldModel::read(source, task.problem()).expect("a correct test");
     let mut count = 0;
     for executor in EXECUTORS {
         for seed in 0..seeds {
-            let requests = Requests::default();
-            let mut world = SimWorld::new(Arc::clone(task), &model, seed);
-            Execution::of(task)
-                .beginning_with(plan.clone())
-                .by(executor.parse().expect("an executor that there is"))
-                .with_settings(RunSettings {
-                    planning_time: PlanningTime::Seconds(Rational::ZERO),
-                    ..RunSettings::default()
-                })
-                .planned_by(Embedded {
-                    most_states: 200,
-                    improve_states: 0,
-                    ..Embedded::default()
-                })
-                .recorded_by(requests.clone())
-                .run_in(&mut world);
-            let noted = requests.0.lock().expect("no thread has panicked");
-            assert_eq!(noted.faults, [""; 0], "{label}, {executor}, seed {seed}");
-            count += noted.count;
+            count += run(label, task, plan, executor, WORLD, seed).count;
         }
+        count += run(label, task, plan, executor, SHORT_WORLD, 0).count;
     }
     count
+}
+
+/// Runs the plan once, and returns the notes about its requests, which have no fault.
+fn run(
+    label: &str,
+    task: &Arc<Task>,
+    plan: &TimeTriggeredPlan,
+    executor: &str,
+    world: &str,
+    seed: u64,
+) -> Noted {
+    let source = pddl::Source::new("world", world);
+    let model = WorldModel::read(source, task.problem()).expect("a correct test");
+    let requests = Requests::default();
+    let mut simulated = SimWorld::new(Arc::clone(task), &model, seed);
+    Execution::of(task)
+        .beginning_with(plan.clone())
+        .by(executor.parse().expect("an executor that there is"))
+        .with_settings(RunSettings {
+            planning_time: PlanningTime::Seconds(Rational::ZERO),
+            ..RunSettings::default()
+        })
+        .planned_by(Embedded {
+            most_states: 200,
+            improve_states: 0,
+            ..Embedded::default()
+        })
+        .recorded_by(requests.clone())
+        .run_in(&mut simulated);
+    let is_short = world == SHORT_WORLD;
+    let noted = std::mem::take(&mut *requests.0.lock().expect("no thread has panicked"));
+    assert_eq!(noted.faults, [""; 0], "{label}, {executor}, seed {seed}");
+    // There, nothing fails but for its duration. The other executors repeat a plan with its guarantee.
+    if is_short && executor == "live" {
+        assert_eq!(noted.third_with_guarantee, [], "{label}");
+    }
+    noted
+}
+
+/// Three actions: the end of the first one lies in the second, the end of the second one in the third.
+fn nested(least: [i64; 3]) -> Arc<Task> {
+    let [a, b, c] = least;
+    let domain = format!(
+        "(define (domain nested) (:requirements :durative-actions :duration-inequalities)
+        (:predicates (first) (second) (third) (first-done) (second-done) (third-done))
+        (:durative-action a :parameters ()
+          :duration (and (>= ?duration {a}) (<= ?duration {}))
+          :condition (at end (second))
+          :effect (and (at start (first)) (at end (not (first))) (at end (first-done))))
+        (:durative-action b :parameters ()
+          :duration (and (>= ?duration {b}) (<= ?duration {}))
+          :condition (and (at start (first)) (at end (third)))
+          :effect (and (at start (second)) (at end (not (second))) (at end (second-done))))
+        (:durative-action c :parameters ()
+          :duration (and (>= ?duration {c}) (<= ?duration {}))
+          :condition (at start (second))
+          :effect (and (at start (third)) (at end (not (third))) (at end (third-done)))))",
+        4 * a,
+        2 * b + 1,
+        20 * c,
+    );
+    let problem = "(define (problem p) (:domain nested) (:init)
+        (:goal (and (first-done) (second-done) (third-done))))";
+    let domain = pddl::Source::new("domain", domain);
+    let problem = pddl::Source::new("problem", problem);
+    let problem = pddl::read_problem(&domain, &problem).expect("a correct test");
+    Arc::new(Task::new(problem.0))
+}
+
+#[test]
+fn plan_that_short_durations_have_broken_twice_is_begun_without_a_guarantee() {
+    let mut count = 0;
+    for least in [[3, 4, 2], [3, 5, 2], [2, 3, 1], [4, 5, 2], [5, 6, 4]] {
+        let task = nested(least);
+        let [a, b, _] = least.map(Rational::from);
+        let text = format!(
+            "0: (a) [{a}]\n{}: (b) [{b}]\n{}: (c) [{b}]",
+            &a - Rational::new(1, 500),
+            &a + Rational::new(1, 1000)
+        );
+        let source = pddl::Source::new("plan", text);
+        let (plan, _) = pddl::read_plan(&source, &task).expect("a plan");
+        for world in [WORLD, SHORT_WORLD] {
+            let noted = run(&format!("{least:?}"), &task, &plan, "live", world, 0);
+            count += noted.third_attempts;
+        }
+    }
+    println!("{count} third attempts");
+    assert!(count > 1, "{count}");
 }
 
 #[test]

@@ -278,3 +278,37 @@ fn open_duration_is_not_begun_at_the_end_of_its_interval() {
     assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
     assert_eq!(report.replans, 0, "{report:#?}");
 }
+
+/// Three actions: the end of the first one lies in the second, the end of the second one in the third.
+const NESTED: &str = "(define (domain nested)
+    (:requirements :durative-actions :duration-inequalities)
+    (:predicates (first) (second) (third) (first-done) (second-done) (third-done))
+    (:durative-action a :parameters () :duration (and (>= ?duration 3) (<= ?duration 12))
+      :condition (at end (second))
+      :effect (and (at start (first)) (at end (not (first))) (at end (first-done))))
+    (:durative-action b :parameters () :duration (and (>= ?duration 4) (<= ?duration 9))
+      :condition (and (at start (first)) (at end (third)))
+      :effect (and (at start (second)) (at end (not (second))) (at end (second-done))))
+    (:durative-action c :parameters () :duration (and (>= ?duration 2) (<= ?duration 40))
+      :condition (at start (second))
+      :effect (and (at start (third)) (at end (not (third))) (at end (third-done)))))";
+
+#[test]
+fn plan_that_was_abandoned_twice_is_executed_by_its_orderings() {
+    let problem = "(define (problem p) (:domain nested) (:init)
+        (:goal (and (first-done) (second-done) (third-done))))";
+    for plan in [
+        "0: (a) [3]\n1: (b) [4]\n4.9: (c) [2]",
+        "0: (a) [3]\n2.998: (b) [4]\n3.001: (c) [4]",
+    ] {
+        for watches_room in [false, true] {
+            let mut scene = Scene::new(NESTED, problem, Some(plan));
+            scene.settings.watches_room = watches_room;
+            // All actions are shorter than the domain permits, so that the first one ends before the others begin.
+            let world = "[[duration]]\naction = \"*\"\nconstant = 0.8\nrelative = true\n";
+            let report = scene.run("live", &scene.world(world), 0);
+            assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+            assert!(report.replans <= 6, "{report:#?}");
+        }
+    }
+}

@@ -4,6 +4,7 @@ mod alternative;
 mod carrying_on;
 mod inside;
 mod limits;
+mod repetition;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -14,6 +15,7 @@ use elbowroom_plan::{Bound, InstanceId, ParameterId, ParametrizedPlan, Valuation
 use inside::Inside;
 
 use self::carrying_on::{CarriedOn, Hope};
+use self::repetition::Repetition;
 use super::{Registered, esterel, promise};
 use crate::dispatch::{Bounds, Dispatch, replan};
 use crate::event::Measured;
@@ -33,7 +35,8 @@ pub(super) const REGISTERED: Registered = Registered {
               with the observed values fixed, and replans only when the rest does not work even if \
               nothing deviates any more. Where time is lacking or numbers fall short, and no other \
               plan is found, it carries on by the plan's orderings, without a guarantee, as \
-              `esterel` does. With a \
+              `esterel` does; likewise with a plan that is made again after durations have broken \
+              it twice. With a \
               number, it also replans while no action is running and another plan is more likely \
               to succeed, by at least that number of percentage points, in the world that the \
               world file describes.",
@@ -47,6 +50,7 @@ pub(super) const REGISTERED: Registered = Registered {
             state: None,
             hope: Hope::None,
             carried_on: None,
+            repetition: Repetition::default(),
         })
     },
 };
@@ -61,6 +65,7 @@ struct Live {
     hope: Hope,
     /// A plan that is executed without a guarantee.
     carried_on: Option<CarriedOn>,
+    repetition: Repetition,
 }
 
 /// A plan, and what is known of its open quantities.
@@ -97,34 +102,25 @@ impl Executor for Live {
     }
 
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
-        let plan = &mission.plan;
-        let (dispatch, promise) = promise::begin(mission)?;
-        let reads_more_than_facts = plan.reads_more_than_facts(&mission.task);
-        let mut rest = Rest {
-            dispatch,
-            promise,
-            sought_at: promise,
-            mission: Arc::new(mission.clone()),
-            amounts: Vec::new(),
-            reads_more_than_facts,
-            durations_move_numbers: reads_more_than_facts && plan.durations_move_numbers(),
-            limits: BTreeMap::new(),
-            ignores_deadlines: false,
-            inside: Inside::default(),
-            in_constraints: in_constraints(plan),
-            values: plan.nominal(),
-            durations: duration_parameters(plan)
-                .map(|(parameter, instance)| (instance, parameter))
-                .collect(),
+        let region = self.region.as_mut();
+        self.repetition.note_adopted(&mission.time_triggered);
+        let by_orderings = self.repetition.is_by_orderings();
+        let by_orderings = by_orderings.then(|| Rest::by_orderings(mission, region));
+        let (rest, carried_on) = match by_orderings.flatten() {
+            Some((rest, carried_on)) => (rest, Some(carried_on)),
+            None => (Rest::new(mission, region)?, None),
         };
-        rest.begin(self.region.as_mut());
         self.state = Some(rest);
         self.hope = Hope::None;
-        self.carried_on = None;
+        self.carried_on = carried_on;
         Ok(())
     }
 
     fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        let rest = self.state.as_ref();
+        if rest.is_some_and(|rest| rest.has_untimely_end(moment.news)) {
+            self.repetition.note_untimely_end();
+        }
         let decided = match (&mut self.carried_on, &mut self.state) {
             (Some(carried_on), Some(rest)) => {
                 rest.decide_carried_on(moment, carried_on, self.region.as_mut())
@@ -132,6 +128,9 @@ impl Executor for Live {
             _ => self.decide_by_guarantee(moment),
         };
         let is_abandoned = decided.decision == Decision::Replan;
+        if is_abandoned {
+            self.repetition.note_abandoned(&decided.reason);
+        }
         let rest = self.state.as_ref().filter(|_| is_abandoned);
         let hope = rest.map(|rest| rest.hope(&decided.reason, moment.now));
         self.hope = hope.unwrap_or_default();
@@ -193,6 +192,7 @@ impl Executor for Live {
             state: self.state.clone(),
             hope: self.hope,
             carried_on,
+            repetition: self.repetition.clone(),
         }))
     }
 }
@@ -234,6 +234,32 @@ impl Live {
 }
 
 impl Rest {
+    /// Begins with a plan.
+    fn new(mission: &Mission, region: &mut dyn Region) -> Result<Self, Box<Reason>> {
+        let plan = &mission.plan;
+        let (dispatch, promise) = promise::begin(mission)?;
+        let reads_more_than_facts = plan.reads_more_than_facts(&mission.task);
+        let mut rest = Self {
+            dispatch,
+            promise,
+            sought_at: promise,
+            mission: Arc::new(mission.clone()),
+            amounts: Vec::new(),
+            reads_more_than_facts,
+            durations_move_numbers: reads_more_than_facts && plan.durations_move_numbers(),
+            limits: BTreeMap::new(),
+            ignores_deadlines: false,
+            inside: Inside::default(),
+            in_constraints: in_constraints(plan),
+            values: plan.nominal(),
+            durations: duration_parameters(plan)
+                .map(|(parameter, instance)| (instance, parameter))
+                .collect(),
+        };
+        rest.begin(region);
+        Ok(rest)
+    }
+
     /// Something was not as promised, or other times follow from what was observed: makes the most of what is left.
     fn weaken(
         &mut self,

@@ -86,14 +86,15 @@ fn sections<'s>(source: &'s Source, vocabulary: &Vocabulary) -> Vec<Vec<Entry<'s
         let range = start + indent..start + shown.len();
         let entry = match line(shown, start) {
             Line::Blank => None,
-            Line::Heading(own) => match classical(shown, start, vocabulary) {
+            Line::Heading(own) => {
                 // The action `plan` has the same name as a heading.
-                Some(step) => Some(Entry::Steps(vec![step])),
-                None => {
+                if let Some(step) = classical(shown, start, vocabulary) {
+                    Some(Entry::Steps(vec![step]))
+                } else {
                     sections.push(Vec::new());
                     beside_heading(text, &range, &own, vocabulary)
                 }
-            },
+            }
             Line::Rule => Some(Entry::Rule(range)),
             Line::Noise => Some(match classical(shown, start, vocabulary) {
                 Some(step) => Entry::Steps(vec![step]),

@@ -1,0 +1,122 @@
+//! Plans that are made again after durations have broken them.
+//!
+//! The planner answers with the same plan in the same state, however often the world's durations have broken it. Where
+//! they deviate in the same way each time, its guarantee is of no use: every other attempt after the second is executed
+//! by the plan's orderings, without a guarantee.
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::{Step, TimeTriggeredPlan};
+use elbowroom_plan::{InstanceId, Node, ParameterKind};
+
+use super::carrying_on::{CarriedOn, Hope};
+use super::{Rest, promise};
+use crate::executor::{Mission, News, StepId};
+use crate::preparation::Region;
+use crate::reason::Reason;
+
+/// The number of attempts with a guarantee before the first one without.
+const GUARANTEED: usize = 2;
+
+/// The attempts in a row to execute the same plan.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Repetition {
+    /// The present plan, with times from its beginning.
+    plan: TimeTriggeredPlan,
+    /// The number of times that it was abandoned for lack of time, or after an untimely end.
+    abandoned: usize,
+    /// `true` if the present attempt was abandoned so.
+    is_over: bool,
+    /// `true` if an action of the present attempt has ended earlier or later than planned.
+    is_untimely: bool,
+}
+
+impl Repetition {
+    /// A plan is adopted.
+    pub(super) fn note_adopted(&mut self, plan: &TimeTriggeredPlan) {
+        if !self.is_over || self.plan != *plan {
+            *self = Self {
+                plan: plan.clone(),
+                ..Self::default()
+            };
+        }
+        self.is_over = false;
+        self.is_untimely = false;
+    }
+
+    /// An action has ended earlier or later than planned. Others may fail for that reason.
+    pub(super) fn note_untimely_end(&mut self) {
+        self.is_untimely = true;
+    }
+
+    /// The present plan is abandoned.
+    pub(super) fn note_abandoned(&mut self, reason: &Reason) {
+        if !self.is_over && (self.is_untimely || promise::lacks_time(reason)) {
+            self.abandoned += 1;
+            self.is_over = true;
+        }
+    }
+
+    /// Returns whether the present plan is to be executed by its orderings alone.
+    pub(super) fn is_by_orderings(&self) -> bool {
+        self.abandoned
+            .checked_sub(GUARANTEED)
+            .is_some_and(|more| more.is_multiple_of(2))
+    }
+}
+
+impl Rest {
+    /// Returns whether an action that has started ends earlier or later than planned.
+    pub(super) fn has_untimely_end(&self, news: &[News]) -> bool {
+        news.iter().any(|news| {
+            let News::Ended { step, time, .. } = news else {
+                return false;
+            };
+            let [start, _] = self.dispatch.nodes_of(step.instance());
+            let planned = self.dispatch.planned(*step, true).unwrap_or_default();
+            let is_early = planned.earliest.is_some_and(|earliest| *time < earliest);
+            let is_late = planned.latest.is_some_and(|latest| *time > latest);
+            self.dispatch.happened(start).is_some() && (is_early || is_late)
+        })
+    }
+
+    /// Begins with a plan by its orderings, as it was planned. Durations that the preparation has chosen in place of the
+    /// planned ones served the guarantee.
+    pub(super) fn by_orderings(
+        mission: &Mission,
+        region: &mut dyn Region,
+    ) -> Option<(Self, CarriedOn)> {
+        let mut rest = Self::new(&as_planned(mission), region).ok()?;
+        let carried_on = rest.carry_on(Hope::Fair, &mission.now, region)?;
+        Some((rest, carried_on))
+    }
+}
+
+/// Returns the mission with the planner's times and durations.
+fn as_planned(mission: &Mission) -> Mission {
+    let mut planned = mission.clone();
+    let steps = mission.instances.iter().zip(&mission.time_triggered.steps);
+    let steps: BTreeMap<InstanceId, &Step> = steps
+        .map(|(id, step)| (*id, step))
+        .filter(|(id, _)| !mission.running.contains_key(&StepId::from(*id)))
+        .collect();
+    for (node, what) in mission.plan.plan.nodes() {
+        let step = |id: InstanceId| steps.get(&id);
+        let time = match what {
+            Node::Start(id) | Node::Instant(id) => step(id).map(|step| step.start.clone()),
+            Node::End(id) => step(id).map(|step| step.end()),
+            _ => None,
+        };
+        if let Some(time) = time {
+            planned.nominal[node] = time;
+        }
+    }
+    for parameter in &mut planned.plan.parameters {
+        if let ParameterKind::Duration(id) = parameter.kind
+            && let Some(duration) = steps.get(&id).and_then(|step| step.duration.as_ref())
+        {
+            parameter.nominal.clone_from(duration);
+        }
+    }
+    planned
+}
