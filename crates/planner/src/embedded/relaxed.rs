@@ -101,8 +101,6 @@ pub(crate) struct Relaxed<'a> {
     deadlines: Deadlines,
     resources: Resources,
     consumables: Consumables,
-    /// `true` if an action starts and ends in different steps.
-    has_single_starts: bool,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
     /// Whether what happens next happens no earlier than what was chosen last.
@@ -145,7 +143,6 @@ impl<'a> Relaxed<'a> {
             operator_cost: vec![0; operators],
             own_cost: own_costs(&graph),
             reaches: graph.operators.iter().map(Reaches::of).collect(),
-            has_single_starts: graph.has_single_starts(),
             is_used: vec![false; operators],
             is_wanted: vec![false; propositions],
             gaps: vec![0.0; compiled.tests.len()],
@@ -276,8 +273,9 @@ impl<'a> Relaxed<'a> {
         }
         // Without separate ends, costs above those of the goal do not change the relaxed plan. Resources and
         // consumables need the costs of other operators.
-        let asks_for_others =
-            self.has_single_starts || !self.resources.is_empty() || !self.consumables.is_empty();
+        let asks_for_others = self.graph.has_single_starts
+            || !self.resources.is_empty()
+            || !self.consumables.is_empty();
         self.spread(state, self.serves_repairs || !asks_for_others);
         let mut estimate = Estimate::default();
         for open in &state.open {

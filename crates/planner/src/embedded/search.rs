@@ -12,6 +12,7 @@ mod difference;
 mod goals;
 mod known;
 mod landmarks;
+mod node;
 mod novelty;
 mod queue;
 mod runaway;
@@ -27,7 +28,7 @@ use super::bound::MetricBound;
 use super::compile::Compiled;
 use super::relaxed::{Consumable, Relaxed, consumables};
 use super::root::root;
-use super::state::{Projection, State};
+use super::state::State;
 use super::step_costs::StepCosts;
 use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
@@ -37,9 +38,9 @@ pub(crate) use goals::is_goal;
 use goals::misses_goal;
 use known::Hashes;
 use landmarks::SearchLandmarks;
-use novelty::{Novelty, Progress};
+use node::{DeadEnd, Node, Notes};
+use novelty::Novelty;
 use queue::{Queue, Waiting};
-use runaway::Drift;
 use states::States;
 use strategy::NoveltyOf;
 pub(crate) use strategy::{Aim, Strategy};
@@ -102,70 +103,6 @@ pub(crate) struct Search<'a> {
     /// The states that were made again, in vain: see [`waste`](Search::waste).
     wasted: u64,
     pub(crate) memory: usize,
-}
-
-/// Many nodes are kept, so each is small.
-#[derive(Debug)]
-struct Node {
-    parent: u32,
-    /// The number of steps that led to it.
-    depth: u32,
-    /// The number of goals or landmarks left, where that matters.
-    left: u32,
-    dead_end: DeadEnd,
-    step: Step,
-    /// `None` if there is nothing to note.
-    notes: Option<Box<Notes>>,
-}
-
-/// Notes about a state, for some searches.
-#[derive(Debug, Default)]
-struct Notes {
-    /// The part of the unsettled past that matters, in a search that compares it exactly.
-    projection: Option<Box<Projection>>,
-    /// How far the way to it has come, in a search for new states.
-    progress: Option<Progress>,
-    /// The landmarks accepted on the way to it, where they count.
-    accepted: Box<[u64]>,
-    /// For problems with numbers.
-    drift: Drift,
-}
-
-impl Notes {
-    fn has_any(&self, compiled: &Compiled) -> bool {
-        self.projection.is_some() || !self.accepted.is_empty() || !compiled.fluents.is_empty()
-    }
-
-    /// An estimate of the memory that they take, in bytes.
-    fn size(&self) -> usize {
-        let projection = self.projection.as_ref();
-        size_of::<Self>()
-            + projection.map_or(0, |projection| projection.size())
-            + 8 * self.accepted.len()
-    }
-}
-
-impl Node {
-    fn progress(&self) -> Option<&Progress> {
-        self.notes.as_ref()?.progress.as_ref()
-    }
-
-    fn drift(&self) -> Drift {
-        self.notes
-            .as_ref()
-            .map_or_else(Drift::default, |notes| notes.drift)
-    }
-}
-
-/// The stronger bound's verdict on a state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum DeadEnd {
-    /// It was not asked.
-    Unchecked,
-    /// There may be a plan, or such checks have been given up.
-    Unproved,
-    /// No plan goes through the state.
-    Proved,
 }
 
 const ROOT: u32 = u32::MAX;

@@ -80,6 +80,8 @@ pub(crate) struct Graph {
     pub(crate) is_free_test: Vec<bool>,
     needing_ends: Vec<u32>,
     pub(crate) needing_list: Vec<u32>,
+    /// `true` if an action starts and ends in different steps.
+    pub(crate) has_single_starts: bool,
     first_test: u32,
     first_running: u32,
     tests_of_fluent: Vec<Vec<u32>>,
@@ -134,6 +136,9 @@ impl Graph {
         graph.goal = graph.propositions(&compiled.goal);
         graph.follow_up_assignments(compiled.tests.len());
         graph.stays = stays.list;
+        graph.has_single_starts = graph.operators.iter().any(|operator| {
+            matches!(operator.kind, Kind::Start(action) if graph.end_of[action as usize] != NONE)
+        });
         graph.index();
         graph.kept_out = if compiled.tuning.uses(Technique::Exclusions) {
             graph.find_kept_out(compiled)
@@ -191,13 +196,6 @@ impl Graph {
     pub(crate) fn operators_of(&self, action: u32) -> (u32, u32) {
         let end = self.end_of[action as usize];
         (self.start_of[action as usize], end)
-    }
-
-    /// Returns `true` if an action starts and ends in different steps.
-    pub(super) fn has_single_starts(&self) -> bool {
-        self.operators.iter().any(|operator| {
-            matches!(operator.kind, Kind::Start(action) if self.end_of[action as usize] != NONE)
-        })
     }
 
     /// Where in `needing_list` the operators stand that need the proposition.

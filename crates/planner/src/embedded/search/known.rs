@@ -64,7 +64,8 @@ impl Hashes {
 }
 
 fn half(hash: u64) -> u32 {
-    (hash ^ hash >> 32) as u32
+    let [a, b, c, d, ..] = hash.to_le_bytes();
+    u32::from_le_bytes([a, b, c, d])
 }
 
 impl Search<'_> {
