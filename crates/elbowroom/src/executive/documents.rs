@@ -158,17 +158,17 @@ documents! {
         pub name: String,
         /// The goal, in PDDL.
         pub goal: String,
-        /// Why it is set aside while other goals are pursued; none if it is pursued.
+        /// The reason for which it is set aside while other goals are pursued; none if it is pursued.
         pub aside: Option<String>,
     }
 
     /// The goals: those that are open, and the last ones that were closed.
     pub struct GoalsNow {
-        /// The goals, in the order in which they were given; first those that were closed.
+        /// The goals: first those that were closed, then the open ones, each in their order.
         pub goals: Vec<GoalNow>,
     }
 
-    /// A goal and what has become of it.
+    /// A goal and its state.
     pub struct GoalNow {
         /// Its name; that of the problem's own goal is `problem`.
         pub name: String,
@@ -180,7 +180,7 @@ documents! {
         pub given: Option<Exact>,
         /// Since when it is in this state.
         pub since: Exact,
-        /// Why it is set aside or cancelled.
+        /// The reason for which it is set aside or cancelled.
         pub why: Option<String>,
     }
 

@@ -224,7 +224,7 @@ impl Run<'_> {
         }
     }
 
-    /// A plan was taken up: continues a choice that was waiting for it.
+    /// A plan begins: continues a choice that was waiting for it.
     pub(super) fn choose_after_success(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;

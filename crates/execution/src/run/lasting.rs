@@ -5,7 +5,7 @@
 //!
 //! | asked or observed | what comes of it |
 //! | --- | --- |
-//! | a goal | all open goals together are the goal from then on, except those that are [set aside](super::choosing). If the rest of the plan, begun now, reaches this, too, it is kept; else a plan is made from here |
+//! | a goal | all open goals together are the goal from then on, except those that are [set aside](super::choosing). If the rest of the plan, begun now, reaches this, it is kept; otherwise a plan is made from here |
 //! | a goal of a name that is open | it takes the place of the earlier one; a plan is made from here |
 //! | a goal is abandoned | a plan is made for the others; without others, nothing more is started |
 //! | a fact or value | believed; the plan goes on while it works with it, and else a plan is made from here |
@@ -79,7 +79,7 @@ pub(super) struct Lasting<'a> {
     pub(super) is_paused: bool,
     /// How the goals have changed since the present plan was made.
     pub(super) change: Option<Turn>,
-    /// The selection among the goals that is under way.
+    /// The selection among the goals, while it lasts.
     pub(super) choosing: Option<Choosing>,
     /// The plan that is executed, on the world's clock.
     pub(super) plan: Option<TimeTriggeredPlan>,
@@ -348,7 +348,7 @@ impl<'a> Run<'a> {
         });
     }
 
-    /// A plan for these goals is taken up.
+    /// A plan for these goals begins.
     pub(super) fn note_plan(&mut self, plan: &TimeTriggeredPlan, goals: &Goals) {
         if let Some(lasting) = &mut self.lasting {
             lasting.plan = Some(plan.clone());

@@ -147,7 +147,7 @@ pub(super) struct Lost {
     pub(super) in_vain: Option<(Rational, Verdict)>,
     /// `true` if a search for a better plan has used up its budget. No other one begins until there is a new plan.
     pub(super) sought_in_vain: bool,
-    /// `true` if goals were closed while the last search was under way.
+    /// `true` if goals were closed during the last search.
     pub(super) has_closed_goals: bool,
     /// How many plans in a row were outdated when they came.
     outdated: usize,

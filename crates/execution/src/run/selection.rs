@@ -8,7 +8,7 @@
 
 use std::collections::BTreeSet;
 
-/// The greatest number of goals of which a largest set is selected.
+/// The greatest number of goals for which the largest set is selected.
 const MOST_EXACT: usize = 5;
 
 /// The goals, by position in the order of preference.
@@ -17,7 +17,7 @@ pub(super) type Set = BTreeSet<usize>;
 /// The state of a selection.
 #[derive(Clone, Debug)]
 pub(super) enum Selection {
-    /// Sets without a plan, among so many goals.
+    /// The number of goals, and the sets without a plan.
     Exact { count: usize, failed: Vec<Set> },
     /// See [`Growth`].
     Growth(Growth),

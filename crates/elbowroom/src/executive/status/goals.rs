@@ -1,4 +1,4 @@
-//! The goals of a lasting run, and what has become of them.
+//! The goals of a lasting run, and their states.
 
 use std::collections::VecDeque;
 
@@ -87,7 +87,7 @@ impl GoalList {
         }
     }
 
-    /// Closes an open goal that nobody wants any more.
+    /// Closes an open goal that is not achieved.
     pub(super) fn cancel(&mut self, name: &str, why: &str, now: &Rational) {
         self.close(now, CANCELLED, Some(why), |goal| goal.name == name);
     }
