@@ -296,7 +296,14 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
             asked(100, Request::Resume),
             asked(105, Request::Pause),
             asked(200, Request::Resume),
-            asked(205, Request::Pursue { name, goal }),
+            asked(
+                205,
+                Request::Pursue {
+                    name,
+                    goal,
+                    value: Rational::ONE,
+                },
+            ),
         ],
         ..Toy::default()
     };
@@ -625,7 +632,11 @@ fn two_robots_do_two_things_at_once_and_goals_come_while_they_do() {
     let mut world = Toy {
         coming: vec![Observation {
             time: Rational::from(2),
-            event: Event::Asked(Request::Pursue { name, goal }),
+            event: Event::Asked(Request::Pursue {
+                name,
+                goal,
+                value: Rational::ONE,
+            }),
         }],
         ..Toy::default()
     };

@@ -114,6 +114,9 @@ pub enum Request {
         name: String,
         /// The goal, as the domain's language writes it.
         goal: String,
+        /// Its value, a positive number: if not all goals can be reached together, those with the greatest sum of values
+        /// are pursued.
+        value: Rational,
     },
     /// To reach the goal of that name no more.
     Abandon {

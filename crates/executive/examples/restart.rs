@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::execution::Request;
+use elbowroom::num::Rational;
 use elbowroom_executive::request_queue::ExternalRequest;
 use elbowroom_executive::{Executive, ExecutiveSettings};
 
@@ -44,7 +45,8 @@ fn first_run(journal: &Path) -> Result<(), Box<dyn Error>> {
         scope.spawn(|| executive.run());
         wait_for(&executive, "(lies parcel office)");
         let (name, goal) = ("home".to_owned(), GOAL.to_owned());
-        let request = ExternalRequest::Request(Request::Pursue { name, goal });
+        let value = Rational::ONE;
+        let request = ExternalRequest::Request(Request::Pursue { name, goal, value });
         executive.submit(request, Duration::from_secs(10))?;
         std::process::abort()
     })

@@ -43,6 +43,7 @@ fn pursue(goal: &str) -> ExternalRequest {
     ExternalRequest::Request(Request::Pursue {
         name: "next".to_owned(),
         goal: goal.to_owned(),
+        value: Rational::ONE,
     })
 }
 

@@ -360,6 +360,9 @@ pub enum ObservationLine {
         name: String,
         /// The goal, in PDDL.
         goal: String,
+        /// Its value, if it is not 1.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        value: Option<Exact>,
         /// The time.
         time: Exact,
     },

@@ -332,7 +332,7 @@ impl<'a> Validation<'a> {
 
     fn asked(&mut self, request: &Request) {
         match request {
-            Request::Pursue { name, goal } => {
+            Request::Pursue { name, goal, .. } => {
                 let Some(condition) = self.read(goal) else {
                     return;
                 };

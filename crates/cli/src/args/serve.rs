@@ -121,6 +121,10 @@ pub(crate) enum CtlCommand {
         /// Its name; the goal of the same name is replaced
         #[arg(long, value_name = "NAME")]
         name: Option<String>,
+        /// Its value, a positive number [default: 1]; if not all goals can be reached together, those with the greatest sum of
+        /// values are pursued
+        #[arg(long, value_name = "V")]
+        value: Option<Rational>,
     },
     /// Abandon a goal
     Cancel {

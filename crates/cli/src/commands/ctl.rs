@@ -38,9 +38,13 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
             output.json(&document)?;
             Ok(Exit::Yes)
         }
-        CtlCommand::Goal { goal, name } => {
-            let (goal, name) = (goal.clone(), name.clone());
-            client.change(output, ("POST", "/v1/goals"), Some(&NewGoal { name, goal }))
+        CtlCommand::Goal { goal, name, value } => {
+            let new = NewGoal {
+                name: name.clone(),
+                goal: goal.clone(),
+                value: value.clone().map(GivenNumber),
+            };
+            client.change(output, ("POST", "/v1/goals"), Some(&new))
         }
         CtlCommand::Cancel { name } => {
             let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);

@@ -174,13 +174,16 @@ documents! {
         pub name: String,
         /// The goal, in PDDL.
         pub goal: String,
-        /// `pursued`, `set-aside` while others are pursued, `achieved` or `cancelled`.
+        /// Its value, a positive number.
+        pub value: Exact,
+        /// `pursued`; `set-aside` while others are pursued; `impossible` if no plan exists, or `unplanned` if none was found,
+        /// from where the executive rests; `achieved` or `cancelled`.
         pub state: String,
         /// When it was given, by the world's clock; none if an earlier segment of the journal has it.
         pub given: Option<Exact>,
         /// Since when it is in this state.
         pub since: Exact,
-        /// The reason for which it is set aside or cancelled.
+        /// The reason for a state other than `pursued` and `achieved`, if it is known.
         pub why: Option<String>,
     }
 
@@ -293,6 +296,10 @@ documents! {
         pub name: Option<String>,
         /// The goal, in PDDL, as it stands behind `:goal`.
         pub goal: String,
+        /// Its value, a positive number; 1 by default. If not all goals can be reached together, those with the greatest sum of
+        /// values are pursued.
+        [optional serde(default)]
+        pub value: Option<GivenNumber>,
     }
 
     /// A fact as it is from now on.

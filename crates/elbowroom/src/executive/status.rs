@@ -60,7 +60,12 @@ impl Status {
     pub fn new(task: &Task, timeout: TimeoutRule) -> Self {
         let mut goals = GoalList::default();
         if !task.problem().goal.is_trivial() {
-            goals.give(FIRST_GOAL, &goal_text(task), &Rational::ZERO);
+            goals.give(
+                FIRST_GOAL,
+                &goal_text(task),
+                &Rational::ONE,
+                &Rational::ZERO,
+            );
         }
         let known = Known {
             timeout,
@@ -302,6 +307,7 @@ impl Known {
             } => self.observe(observation, remark.is_some()),
             Entry::Planning { reason, .. } => {
                 self.is_planning = true;
+                self.goals.try_again();
                 self.rest = None;
                 self.why = Some(match reason.cause {
                     // For the record, a run begins as where a plan has come.
@@ -348,6 +354,8 @@ impl Known {
                         format!("reached: {goals}")
                     }
                     Some(verdict) => {
+                        let is_certain = **verdict == Verdict::Unsolvable;
+                        self.goals.give_up(is_certain, &reasons.join("; "), now);
                         let why = verdict.why().map(str::to_owned).into_iter().chain(reasons);
                         let why: Vec<String> = why.collect();
                         let words = in_words(verdict);
@@ -525,9 +533,9 @@ impl Known {
 
     fn asked(&mut self, request: &Request) {
         match request {
-            Request::Pursue { name, goal } => {
+            Request::Pursue { name, goal, value } => {
                 self.goals.cancel(name, "replaced", &self.now);
-                self.goals.give(name, goal, &self.now);
+                self.goals.give(name, goal, value, &self.now);
             }
             Request::Abandon { name } => self.goals.cancel(name, "abandoned", &self.now),
             Request::Pause => self.is_paused = true,

@@ -8,6 +8,8 @@
 
 use std::collections::BTreeSet;
 
+use elbowroom_num::Rational;
+
 use super::dead_end::hopeless_conditions;
 use super::goals::OpenGoal;
 use super::search::Lost;
@@ -29,13 +31,20 @@ pub(super) struct Choosing {
 
 impl Choosing {
     /// All these goals are tried.
-    fn all(names: Vec<String>, selection: impl FnOnce(usize) -> Selection) -> Self {
-        let count = names.len();
+    fn all(names: Vec<String>, selection: Selection) -> Self {
         Self {
+            selection,
+            tried: (0..names.len()).collect(),
             names,
-            selection: selection(count),
-            tried: (0..count).collect(),
         }
+    }
+
+    /// A choice among all these goals, which are tried. Goals of greater value are preferred, and then those that were
+    /// given first.
+    fn among(mut goals: Vec<(String, Rational)>) -> Self {
+        goals.sort_by(|(_, value), (_, other)| other.cmp(value));
+        let (names, values) = goals.into_iter().unzip();
+        Self::all(names, Selection::among(values))
     }
 
     fn position(&self, name: &str) -> Option<usize> {
@@ -108,18 +117,30 @@ impl Run<'_> {
         };
         let (mut planned, mut new) = (Vec::new(), Vec::new());
         for goal in &mut lasting.goals {
+            let known = (goal.name.clone(), goal.value.clone());
             if lasting.planned_goals.contains(&goal.name) {
-                planned.push(goal.name.clone());
+                planned.push(known);
             } else if !goal.is_announced {
                 goal.aside = None;
-                new.push(goal.name.clone());
+                new.push(known);
             }
         }
-        lasting.choosing = (!planned.is_empty()).then(|| {
-            let selected = planned.len();
-            let names = [planned, new].concat();
-            Choosing::all(names, |count| Selection::grown(selected, count))
-        });
+        let greatest = new.iter().map(|(_, value)| value).max();
+        let least = planned.iter().map(|(_, value)| value).min();
+        lasting.choosing = match (least, greatest) {
+            (None, _) => None,
+            // Those of the plan may have to give way.
+            (Some(least), Some(greatest)) if greatest > least => {
+                Some(Choosing::among([planned, new].concat()))
+            }
+            _ => {
+                let count = planned.len();
+                let names: Vec<String> =
+                    [planned, new].concat().into_iter().map(|it| it.0).collect();
+                let selection = Selection::grown(count, names.len());
+                Some(Choosing::all(names, selection))
+            }
+        };
     }
 
     /// Continues with other goals where the run would otherwise rest with this verdict. Returns `false` if there are
@@ -186,8 +207,7 @@ impl Run<'_> {
         }
         let tried = lasting.goals.iter().filter(|goal| goal.is_pursued());
         let tried: BTreeSet<String> = tried.map(|goal| goal.name.clone()).collect();
-        let names = self.set_hopeless_goals_aside();
-        let mut choosing = Choosing::all(names, Selection::among);
+        let mut choosing = Choosing::among(self.set_hopeless_goals_aside());
         let positions = tried.iter().map(|name| choosing.position(name));
         let step = match positions.collect::<Option<Set>>() {
             Some(tried) => choosing.selection.after_failure(tried),
@@ -197,15 +217,15 @@ impl Run<'_> {
         self.follow(choosing, step, true)
     }
 
-    /// Sets those open goals aside that can never become true. Returns the names of the others.
-    fn set_hopeless_goals_aside(&mut self) -> Vec<String> {
+    /// Sets those open goals aside that can never become true. Returns the names and values of the others.
+    fn set_hopeless_goals_aside(&mut self) -> Vec<(String, Rational)> {
         self.pursue_all();
         self.note_hopeless_goals();
         let mut others = Vec::new();
         for goal in self.lasting.iter_mut().flat_map(|it| &mut it.goals) {
             goal.aside.clone_from(&goal.hopeless);
             if goal.is_pursued() {
-                others.push(goal.name.clone());
+                others.push((goal.name.clone(), goal.value.clone()));
             }
         }
         others
@@ -255,8 +275,7 @@ impl Run<'_> {
             return false;
         };
         let has_plan = lasting.plan.is_some();
-        let grows = |choosing: &mut Choosing| matches!(choosing.selection, Selection::Growth(_));
-        let Some(mut choosing) = lasting.choosing.take_if(|it| has_plan && grows(it)) else {
+        let Some(mut choosing) = lasting.choosing.take_if(|_| has_plan) else {
             return false;
         };
         self.note_hopeless_goals();

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use elbowroom_model::ground::Condition;
 use elbowroom_model::{Task, problem};
+use elbowroom_num::Rational;
 
 use super::Run;
 use super::lasting::{FIRST_GOAL, Turn};
@@ -16,7 +17,9 @@ pub(super) struct OpenGoal {
     /// As it was given; `None` for that of the problem.
     pub(super) text: Option<String>,
     pub(super) condition: problem::Condition,
-    /// The same, grounded.
+    /// Its value, a positive number.
+    pub(super) value: Rational,
+    /// The same condition, grounded.
     pub(super) ground: Condition,
     /// The reason for which it can never become true, if that is known.
     pub(super) hopeless: Option<String>,
@@ -39,6 +42,7 @@ impl OpenGoal {
             text,
             ground: task.with_goal(condition.clone()).goal().clone(),
             condition,
+            value: Rational::ONE,
             hopeless: None,
             aside: None,
             is_announced: false,
@@ -126,6 +130,7 @@ impl Run<'_> {
                 }
             };
             Some(OpenGoal {
+                value: given.value.clone(),
                 aside: given.aside.clone(),
                 is_announced: given.aside.is_some(),
                 ..goal

@@ -159,12 +159,16 @@ impl<'a> Run<'a> {
             Request::Pursue { .. } if lasting.at_rest != AtRest::Waits => {
                 Some("this run takes no other goals; nothing was made of it")
             }
-            Request::Pursue { name, goal } => {
+            Request::Pursue { value, .. } if !value.is_positive() => {
+                Some("the value of a goal is not positive; nothing was made of it")
+            }
+            Request::Pursue { name, goal, value } => {
                 let Ok(condition) = lasting.reader.read(&self.task, goal) else {
                     return Some("it is no goal of this problem; nothing was made of it");
                 };
                 let text = Some(goal.clone());
-                let given = OpenGoal::new(&self.task, name.clone(), text, condition);
+                let mut given = OpenGoal::new(&self.task, name.clone(), text, condition);
+                given.value.clone_from(value);
                 let known = lasting.goals.iter_mut().find(|known| known.name == *name);
                 let is_new = known.is_none();
                 match known {

@@ -1,14 +1,16 @@
 //! Selection of the goals to pursue if there is no plan for all of them (oversubscription planning).
 //!
 //! The only source of knowledge is the planner: whether it finds a plan for a set of goals. Up to [`MOST_EXACT`] goals,
-//! the sets are tried in order of size, and sets of equal size in order of preference, so that the first set with a plan is
-//! a largest one. A set that contains a set without a plan is not tried. With more goals, the selection grows: by one goal
-//! first, after each success by twice as many as before, after each failure by half as many. It is maximal in the
+//! the sets are tried in order of value, the sum of the values of their goals, and sets of equal value in order of size and
+//! preference. So the first set with a plan is one of the greatest value. A set that contains a set without a plan is not tried.
+//! With more goals, the selection grows: by one goal first, after each success by twice as many as before, after each failure by half as many. It is maximal in the
 //! end, and each plan on the way there is executed at once.
 
 use std::collections::BTreeSet;
 
-/// The greatest number of goals for which the largest set is selected.
+use elbowroom_num::Rational;
+
+/// The greatest number of goals for which a set of the greatest value is selected.
 const MOST_EXACT: usize = 5;
 
 /// The goals, by position in the order of preference.
@@ -17,8 +19,11 @@ pub(super) type Set = BTreeSet<usize>;
 /// The state of a selection.
 #[derive(Clone, Debug)]
 pub(super) enum Selection {
-    /// The number of goals, and the sets without a plan.
-    Exact { count: usize, failed: Vec<Set> },
+    /// The values of the goals, and the sets without a plan.
+    Exact {
+        values: Vec<Rational>,
+        failed: Vec<Set>,
+    },
     /// See [`Growth`].
     Growth(Growth),
 }
@@ -44,13 +49,13 @@ pub(super) enum Step {
 }
 
 impl Selection {
-    /// Selects among goals for which there is no plan if all are pursued.
-    pub(super) fn among(count: usize) -> Self {
-        if count <= MOST_EXACT {
+    /// Selects among goals with these values, for which there is no plan if all are pursued.
+    pub(super) fn among(values: Vec<Rational>) -> Self {
+        if values.len() <= MOST_EXACT {
             let failed = Vec::new();
-            return Self::Exact { count, failed };
+            return Self::Exact { values, failed };
         }
-        Self::Growth(Growth::new(Set::new(), count))
+        Self::Growth(Growth::new(Set::new(), values.len()))
     }
 
     /// Adds goals to the first `selected` ones, for which there is a plan.
@@ -72,11 +77,10 @@ impl Selection {
     /// Returns the next step after no plan was found for this set.
     pub(super) fn after_failure(&mut self, set: Set) -> Step {
         match self {
-            Self::Exact { count, failed } => {
+            Self::Exact { values, failed } => {
                 failed.push(set);
                 let is_open = |set: &Set| !failed.iter().any(|failed| failed.is_subset(set));
-                let mut sizes = (1..*count).rev();
-                let next = sizes.find_map(|size| subsets(*count, size).into_iter().find(is_open));
+                let next = sets(values).into_iter().find(is_open);
                 next.map_or_else(|| Step::Select(Set::new()), Step::Try)
             }
             Self::Growth(growth) => {
@@ -132,14 +136,27 @@ impl Growth {
     }
 }
 
-/// The sets of `size` goals among `count`, those with preferred goals first.
-fn subsets(count: usize, size: usize) -> Vec<Set> {
-    let all = (0_u32..1 << count).filter(|bits| bits.count_ones() as usize == size);
-    let set = |bits: u32| -> Vec<usize> { (0..count).filter(|it| bits >> it & 1 == 1).collect() };
-    let mut sets: Vec<Vec<usize>> = all.map(set).collect();
-    sets.sort_unstable();
+/// All sets of goals with these values, the first ones to be tried first.
+fn sets(values: &[Rational]) -> Vec<Set> {
+    let all = 1_u32..1 << values.len();
+    let set = |bits: u32| -> Vec<usize> {
+        let positions = 0..values.len();
+        positions.filter(|it| bits >> it & 1 == 1).collect()
+    };
+    let mut sets: Vec<(Rational, Vec<usize>)> = all
+        .map(|bits| {
+            let set = set(bits);
+            (set.iter().map(|it| &values[*it]).sum(), set)
+        })
+        .collect();
+    sets.sort_by(|(value, set), (other_value, other)| {
+        let by_value = other_value.cmp(value);
+        by_value
+            .then(other.len().cmp(&set.len()))
+            .then(set.cmp(other))
+    });
     sets.into_iter()
-        .map(|set| set.into_iter().collect())
+        .map(|(_, set)| set.into_iter().collect())
         .collect()
 }
 
@@ -147,12 +164,19 @@ fn subsets(count: usize, size: usize) -> Vec<Set> {
 mod tests {
     use proptest::prelude::*;
 
+    use elbowroom_num::Rational;
+
     use super::{MOST_EXACT, Selection, Set, Step};
 
-    /// Runs a selection among `count` goals to its end. Returns the selected set and the number of questions.
-    fn select(count: usize, has_plan: impl Fn(&Set) -> bool) -> (Set, usize) {
-        let all: Set = (0..count).collect();
-        let mut selection = Selection::among(count);
+    /// Goals of equal value.
+    fn equal(count: usize) -> Vec<Rational> {
+        vec![Rational::ONE; count]
+    }
+
+    /// Runs a selection among goals of these values to its end. Returns the selected set and the number of questions.
+    fn select(values: &[Rational], has_plan: impl Fn(&Set) -> bool) -> (Set, usize) {
+        let all: Set = (0..values.len()).collect();
+        let mut selection = Selection::among(values.to_vec());
         let mut step = selection.after_failure(all);
         for questions in 1.. {
             step = match step {
@@ -164,34 +188,42 @@ mod tests {
         unreachable!("a selection ends")
     }
 
-    /// The size of a largest set without a conflict: all sets are tried.
-    fn largest(count: usize, conflicts: &[Set]) -> usize {
+    fn value(values: &[Rational], set: &Set) -> Rational {
+        set.iter().map(|it| &values[*it]).sum()
+    }
+
+    /// The greatest value of a set without a conflict: all sets are tried.
+    fn greatest(values: &[Rational], conflicts: &[Set]) -> Rational {
+        let count = values.len();
         let sets = (0_u32..1 << count)
             .map(|bits| -> Set { (0..count).filter(|it| bits >> it & 1 == 1).collect() });
         let fits = |set: &Set| !conflicts.iter().any(|conflict| conflict.is_subset(set));
-        sets.filter(fits).map(|set| set.len()).max().unwrap_or(0)
+        let fitting = sets.filter(fits).map(|set| value(values, &set));
+        fitting.max().unwrap_or_default()
     }
 
     proptest! {
         #[test]
-        fn selections_are_maximal_and_small_ones_are_largest(
-            count in 1_usize..12,
+        fn selections_are_maximal_and_small_ones_have_the_greatest_value(
+            values in prop::collection::vec(1_i64..9, 1..12),
             conflicts in prop::collection::vec(prop::collection::btree_set(0_usize..12, 1..4), 0..6),
         ) {
+            let values: Vec<Rational> = values.into_iter().map(Rational::from).collect();
+            let count = values.len();
             let all: Set = (0..count).collect();
             let mut conflicts: Vec<Set> = conflicts.into_iter().filter(|it| it.is_subset(&all)).collect();
             if conflicts.is_empty() {
                 conflicts.push(all);
             }
             let fits = |set: &Set| !conflicts.iter().any(|conflict| conflict.is_subset(set));
-            let (selected, _) = select(count, fits);
+            let (selected, _) = select(&values, fits);
             prop_assert!(fits(&selected));
             for other in 0..count {
                 let mut more = selected.clone();
                 prop_assert!(!more.insert(other) || !fits(&more), "{selected:?} and {other}");
             }
             if count <= MOST_EXACT {
-                prop_assert_eq!(selected.len(), largest(count, &conflicts));
+                prop_assert_eq!(value(&values, &selected), greatest(&values, &conflicts));
             }
         }
     }
@@ -199,16 +231,16 @@ mod tests {
     #[test]
     fn preferred_goals_stay() {
         let conflict: Set = [0, 1].into();
-        let (selected, _) = select(3, |set| !conflict.is_subset(set));
+        let (selected, _) = select(&equal(3), |set| !conflict.is_subset(set));
         assert_eq!(selected, [0, 2].into());
         let conflict: Set = [3, 8].into();
-        let (selected, _) = select(10, |set| !conflict.is_subset(set));
+        let (selected, _) = select(&equal(10), |set| !conflict.is_subset(set));
         assert_eq!(selected, (0..10).filter(|it| *it != 8).collect());
     }
 
     #[test]
     fn one_impossible_goal_among_many_costs_few_questions() {
-        let (selected, questions) = select(200, |set| !set.contains(&77));
+        let (selected, questions) = select(&equal(200), |set| !set.contains(&77));
         assert_eq!(selected.len(), 199);
         assert!(questions < 30, "{questions}");
     }

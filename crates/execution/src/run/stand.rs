@@ -100,6 +100,8 @@ pub struct GivenGoal {
     pub name: String,
     /// Its text in PDDL; `None` for the goal of the problem.
     pub text: Option<String>,
+    /// Its value, a positive number.
+    pub value: Rational,
     /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
     pub aside: Option<String>,
 }
@@ -109,6 +111,7 @@ impl GivenGoal {
         Self {
             name: goal.name.clone(),
             text: goal.text.clone(),
+            value: goal.value.clone(),
             aside: goal.aside.clone(),
         }
     }

@@ -14,6 +14,7 @@ use elbowroom::executive::documents::{
 use elbowroom::executive::goal_text;
 use elbowroom::model::ground::{Change, FactId};
 use elbowroom::model::{Problem, Task};
+use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use serde::de::DeserializeOwned;
 
@@ -113,9 +114,19 @@ impl ApiRouter {
         let name = given.name.map(checked_name).transpose()?;
         let name = name.unwrap_or_else(|| self.new_name(&status.goals()));
         let goal = given.goal.trim().to_owned();
+        let value = given.value.map_or(Rational::ONE, |value| value.0);
+        if !value.is_positive() {
+            let help = "give a positive number, such as 2.5";
+            return Err(ApiError::new(
+                422,
+                "the value of a goal is not positive",
+                help,
+            ));
+        }
         let request = Request::Pursue {
             name: name.clone(),
             goal,
+            value,
         };
         self.submit(vec![ExternalRequest::Request(request)], Some(name))
     }
@@ -264,7 +275,12 @@ fn requests_for(new: &Task, task: &Task, state: &State) -> Vec<ExternalRequest> 
         requests.push(ExternalRequest::Request(Request::Abandon { name }));
     }
     let (name, goal) = (FIRST_GOAL.to_owned(), goal_text(new));
-    requests.push(ExternalRequest::Request(Request::Pursue { name, goal }));
+    let value = Rational::ONE;
+    requests.push(ExternalRequest::Request(Request::Pursue {
+        name,
+        goal,
+        value,
+    }));
     requests
 }
 

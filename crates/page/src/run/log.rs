@@ -254,9 +254,9 @@ fn observation<'a>(observation: &'a ObservationLine, bars: &Bars) -> (&'a Ration
             value,
             time,
         } => (&time.0, format!("{fluent} = {}", nearest(&value.0))),
-        ObservationLine::Goal { name, goal, time } => {
-            (&time.0, format!("asked for: {name}: {goal}"))
-        }
+        ObservationLine::Goal {
+            name, goal, time, ..
+        } => (&time.0, format!("asked for: {name}: {goal}")),
         ObservationLine::Abandon { name, time } => (&time.0, format!("asked to abandon: {name}")),
         ObservationLine::Pause { time } => (&time.0, "asked to pause".to_owned()),
         ObservationLine::Resume { time } => (&time.0, "asked to go on".to_owned()),

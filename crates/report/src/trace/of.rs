@@ -258,9 +258,10 @@ impl ObservationLine {
 impl ObservationLine {
     fn asked(request: &Request, time: Exact) -> Self {
         match request {
-            Request::Pursue { name, goal } => Self::Goal {
+            Request::Pursue { name, goal, value } => Self::Goal {
                 name: name.clone(),
                 goal: goal.clone(),
+                value: (*value != Rational::ONE).then(|| exact(value)),
                 time,
             },
             Request::Abandon { name } => Self::Abandon {
@@ -282,9 +283,15 @@ impl ObservationLine {
             return Some((Event::PlanReady, &time.0));
         }
         let (request, time) = match self {
-            Self::Goal { name, goal, time } => {
+            Self::Goal {
+                name,
+                goal,
+                value,
+                time,
+            } => {
                 let (name, goal) = (name.clone(), goal.clone());
-                (Request::Pursue { name, goal }, time)
+                let value = value.as_ref().map_or(Rational::ONE, |it| it.0.clone());
+                (Request::Pursue { name, goal, value }, time)
             }
             Self::Abandon { name, time } => {
                 let name = name.clone();

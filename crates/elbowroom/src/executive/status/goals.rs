@@ -14,6 +14,8 @@ const MOST_CLOSED: usize = 1000;
 
 const PURSUED: &str = "pursued";
 const SET_ASIDE: &str = "set-aside";
+const IMPOSSIBLE: &str = "impossible";
+const UNPLANNED: &str = "unplanned";
 const ACHIEVED: &str = "achieved";
 const CANCELLED: &str = "cancelled";
 
@@ -26,10 +28,11 @@ pub(super) struct GoalList {
 
 impl GoalList {
     /// Adds an open goal.
-    pub(super) fn give(&mut self, name: &str, goal: &str, now: &Rational) {
+    pub(super) fn give(&mut self, name: &str, goal: &str, value: &Rational, now: &Rational) {
         self.open.push(GoalNow {
             name: name.to_owned(),
             goal: goal.to_owned(),
+            value: Exact(value.clone()),
             state: PURSUED.to_owned(),
             given: Some(Exact(now.clone())),
             since: Exact(now.clone()),
@@ -42,7 +45,7 @@ impl GoalList {
         let open = self.open.iter().map(|goal| OpenGoal {
             name: goal.name.clone(),
             goal: goal.goal.clone(),
-            aside: goal.why.clone(),
+            aside: goal.why.clone().filter(|_| goal.state == SET_ASIDE),
         });
         open.collect()
     }
@@ -59,6 +62,7 @@ impl GoalList {
         let open = snapshot.goals.iter().map(|line| GoalNow {
             name: line.name.clone(),
             goal: line.goal.as_ref().or(own).cloned().unwrap_or_default(),
+            value: line.value.clone().unwrap_or(Exact(Rational::ONE)),
             state: state(line.aside.is_some()),
             given: None,
             since: Exact(snapshot.now().clone()),
@@ -84,6 +88,26 @@ impl GoalList {
             goal.state = state(why.is_some());
             goal.since = Exact(now.clone());
             goal.why = why;
+        }
+    }
+
+    /// No plan reaches the open goals that are pursued; none exists if it `is_certain`.
+    pub(super) fn give_up(&mut self, is_certain: bool, why: &str, now: &Rational) {
+        let state = if is_certain { IMPOSSIBLE } else { UNPLANNED };
+        for goal in self.open.iter_mut().filter(|goal| goal.state == PURSUED) {
+            state.clone_into(&mut goal.state);
+            goal.since = Exact(now.clone());
+            goal.why = (!why.is_empty()).then(|| why.to_owned());
+        }
+    }
+
+    /// Another plan is requested for the open goals.
+    pub(super) fn try_again(&mut self) {
+        for goal in &mut self.open {
+            if [IMPOSSIBLE, UNPLANNED].contains(&goal.state.as_str()) {
+                PURSUED.clone_into(&mut goal.state);
+                goal.why = None;
+            }
         }
     }
 

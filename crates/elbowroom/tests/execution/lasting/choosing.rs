@@ -5,7 +5,7 @@ use std::sync::Arc;
 use elbowroom::model::Task;
 use elbowroom::pddl::{self, Source};
 
-use super::scripted::{abandon, assert_has, has, pursue, run, task};
+use super::scripted::{abandon, assert_has, has, pursue, pursue_with_value, run, task};
 
 const NEVER: &str = "because (not (here book)) can never become true";
 
@@ -105,6 +105,31 @@ fn goals_that_exclude_each_other_are_reached_one_after_the_other() {
             "10: `ward` pursued again",
             "start (move lab ward)",
             "rest: goal-reached ward",
+        ],
+    );
+}
+
+#[test]
+fn a_goal_of_greater_value_takes_the_place_of_those_of_the_plan() {
+    let script = vec![
+        (0, pursue_with_value("ward", "(at ward)", 5)),
+        (50, pursue("home", "(at home)")),
+        (50, pursue_with_value("lab", "(at lab)", 2)),
+        (50, pursue_with_value("back", "(at ward)", 3)),
+    ];
+    let told = run(&rooms("(at lab)"), 100, script);
+    assert_has(
+        &told,
+        &[
+            "0: `problem` set aside, because no plan reaches it together with `ward`",
+            "`ward` achieved",
+            "`problem` pursued again",
+            "rest: goal-reached problem",
+            "50: `home` set aside, because no plan reaches it",
+            "50: `lab` set aside, because no plan reaches it",
+            "`back` achieved",
+            "`lab` achieved",
+            "rest: goal-reached home",
         ],
     );
 }

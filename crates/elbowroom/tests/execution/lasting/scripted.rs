@@ -259,8 +259,12 @@ pub(super) fn scripted(
 }
 
 pub(crate) fn pursue(name: &str, goal: &str) -> Event {
-    let (name, goal) = (name.to_owned(), goal.to_owned());
-    Event::Asked(Request::Pursue { name, goal })
+    pursue_with_value(name, goal, 1)
+}
+
+pub(crate) fn pursue_with_value(name: &str, goal: &str, value: i64) -> Event {
+    let (name, goal, value) = (name.to_owned(), goal.to_owned(), Rational::from(value));
+    Event::Asked(Request::Pursue { name, goal, value })
 }
 
 pub(crate) fn abandon(name: &str) -> Event {

@@ -3,7 +3,7 @@
 use elbowroom_execution::run::{GivenGoal, Goals, KnownStart, TakesUp};
 use elbowroom_execution::{Guards, News, Ticket};
 use elbowroom_model::{RunningAction, Situation, State, Task};
-use elbowroom_num::Interval;
+use elbowroom_num::{Interval, Rational};
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
@@ -72,6 +72,9 @@ pub struct GoalLine {
     /// As it was given; none if it is that of the problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal: Option<String>,
+    /// Its value, if it is not 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<Exact>,
     /// The reason for which it is set aside while others are pursued; none if it is pursued.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aside: Option<String>,
@@ -103,6 +106,7 @@ pub(super) fn goal_lines(goals: &Goals) -> Vec<GoalLine> {
     let lines = goals.open.iter().map(|given| GoalLine {
         name: given.name.clone(),
         goal: given.text.clone(),
+        value: (given.value != Rational::ONE).then(|| exact(&given.value)),
         aside: given.aside.clone(),
     });
     lines.collect()
@@ -112,6 +116,7 @@ pub(super) fn goals_of(lines: &[GoalLine]) -> Vec<GivenGoal> {
     let goals = lines.iter().map(|line| GivenGoal {
         name: line.name.clone(),
         text: line.goal.clone(),
+        value: line.value.as_ref().map_or(Rational::ONE, |it| it.0.clone()),
         aside: line.aside.clone(),
     });
     goals.collect()
