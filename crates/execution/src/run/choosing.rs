@@ -327,7 +327,7 @@ impl Run<'_> {
         if is_last && !is_to_plan {
             self.set_goal();
         } else {
-            self.turn(format!("{list} are pursued"), true);
+            self.turn(format!("now pursued: {list}"), true);
         }
         true
     }

@@ -122,13 +122,11 @@ fn a_goal_of_greater_value_takes_the_place_of_those_of_the_plan() {
         &told,
         &[
             "0: `problem` set aside, because no plan reaches it together with `ward`",
-            "`ward` achieved",
-            "`problem` pursued again",
-            "rest: goal-reached problem",
-            "50: `home` set aside, because no plan reaches it",
-            "50: `lab` set aside, because no plan reaches it",
-            "`back` achieved",
-            "`lab` achieved",
+            "10: `problem` achieved",
+            "20: rest: goal-reached ward",
+            "50: `back` achieved",
+            "50: `home` set aside, because no plan reaches it together with `lab`",
+            "60: `lab` achieved",
             "rest: goal-reached home",
         ],
     );
