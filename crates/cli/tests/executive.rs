@@ -13,6 +13,8 @@ mod doubts;
 mod faults;
 #[path = "executive/first.rs"]
 mod first;
+#[path = "executive/goals.rs"]
+mod goals;
 #[path = "executive/hostile.rs"]
 mod hostile;
 #[path = "executive/killed.rs"]

@@ -125,6 +125,10 @@ pub(crate) enum CtlCommand {
         /// values are pursued
         #[arg(long, value_name = "V")]
         value: Option<Rational>,
+        /// Wait until the goal is closed, or impossible from where the executive rests: exit code 0 if it is achieved, 1
+        /// if it is cancelled or impossible, 3 if the executive rests because no plan was found
+        #[arg(long)]
+        wait: bool,
     },
     /// Abandon a goal
     Cancel {

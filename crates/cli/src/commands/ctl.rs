@@ -2,13 +2,15 @@
 
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind};
+use std::time::Duration;
 
 use elbowroom::answers::exact::{INFINITY, MINUS_INFINITY};
 use elbowroom::executive::documents::{
-    GivenNumber, GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow, PlanNow,
-    Refusal, State, StepNow, Taken,
+    GivenNumber, GoalNow, GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow,
+    PlanNow, Refusal, State, StepNow, Taken,
 };
 use elbowroom::num::End;
+use elbowroom::report::exact::Exact;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -38,12 +40,20 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
             output.json(&document)?;
             Ok(Exit::Yes)
         }
-        CtlCommand::Goal { goal, name, value } => {
+        CtlCommand::Goal {
+            goal,
+            name,
+            value,
+            wait,
+        } => {
             let new = NewGoal {
                 name: name.clone(),
                 goal: goal.clone(),
                 value: value.clone().map(GivenNumber),
             };
+            if *wait {
+                return client.give_and_wait(output, &new);
+            }
             client.change(output, ("POST", "/v1/goals"), Some(&new))
         }
         CtlCommand::Cancel { name } => {
@@ -85,6 +95,9 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
         CtlCommand::Stop => client.change(output, ("POST", "/v1/stop"), NOTHING),
     }
 }
+
+/// Interval between two questions about the goal for which `ctl goal --wait` waits.
+const GOAL_POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 /// No body.
 const NOTHING: Option<&NewFact> = None;
@@ -203,6 +216,41 @@ impl Client<'_> {
             )
         })?;
         Ok(Exit::Yes)
+    }
+
+    /// Gives a goal, and waits until it is closed or the executive rests without a plan for it.
+    fn give_and_wait(&self, output: &mut Output, new: &NewGoal) -> Answer {
+        let (before, _) = self.ask::<State>(("GET", "/v1/state"), None)?;
+        let body = serde_json::to_string(new).ok();
+        let (taken, _) = self.ask::<Taken>(("POST", "/v1/goals"), body.as_deref())?;
+        let name = taken.name.unwrap_or_default();
+        loop {
+            let (all, _) = self.ask::<GoalsNow>(("GET", "/v1/goals"), None)?;
+            let is_it = |goal: &GoalNow| {
+                let is_later = |given: &Exact| given.0 >= before.now.0;
+                goal.name == name && goal.given.as_ref().is_some_and(is_later)
+            };
+            // The newest one of this name is the last one.
+            let Some(goal) = all.goals.into_iter().rev().find(is_it) else {
+                std::thread::sleep(GOAL_POLL_INTERVAL);
+                continue;
+            };
+            let exit = match goal.state.as_str() {
+                "achieved" => Exit::Yes,
+                "cancelled" | "impossible" => Exit::No,
+                "unplanned" => Exit::Limit,
+                _ => {
+                    std::thread::sleep(GOAL_POLL_INTERVAL);
+                    continue;
+                }
+            };
+            if self.arguments.json {
+                output.json(&serde_json::to_value(&goal).unwrap_or_default())?;
+            } else {
+                output::print(&goals(&GoalsNow { goals: vec![goal] }))?;
+            }
+            return Ok(exit);
+        }
     }
 
     /// Prints each line as it comes.

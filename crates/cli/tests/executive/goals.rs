@@ -1,0 +1,53 @@
+//! Several goals at once, and clients that wait for one.
+
+use serde_json::{Value, json};
+
+use super::client::Executive;
+use super::{ctl, simulated};
+
+/// Gives a goal with `ctl goal --wait`. Returns the exit code and the state of the goal.
+fn wait_for(own: &Executive, name: &str, goal: &str) -> (Option<i32>, Value) {
+    let (token, address) = (own.token(), own.address());
+    let executive = ["--token", &token, "--to", &address, "--json"];
+    let told = ctl(&[&executive[..], &["goal", goal, "--name", name, "--wait"]].concat());
+    let text = String::from_utf8_lossy(&told.stdout).into_owned();
+    let goal: Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{told:?}"));
+    (told.status.code(), goal["state"].clone())
+}
+
+#[test]
+fn each_goal_has_a_state_and_can_be_waited_for() {
+    let own = simulated("goals");
+    let never = json!({"goal": "(not (done nothing))", "name": "never"});
+    assert_eq!(own.post("/v1/goals", &never).0, 200);
+    let more = wait_for(&own, "more", "(done b2)");
+    assert_eq!(more, (Some(0), json!("achieved")));
+    own.await_state(|state| state["activity"] == "resting");
+    let (status, all) = own.get("/v1/goals");
+    assert_eq!(status, 200, "{all}");
+    let goals = all["goals"].as_array().expect("goals");
+    let state = |name: &str| {
+        let goal = goals.iter().find(|goal| goal["name"] == name);
+        goal.map_or(Value::Null, |goal| goal["state"].clone())
+    };
+    assert_eq!(state("problem"), "achieved", "{all}");
+    assert_eq!(state("never"), "impossible", "{all}");
+    let nor = wait_for(&own, "nor", "(not (open a1))");
+    assert_eq!(nor.0, Some(1), "{nor:?}");
+    let told = ctl(&["--to", &own.address(), "goals"]);
+    let text = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(text.contains("never: impossible since"), "{text}");
+}
+
+#[test]
+fn values_are_positive_numbers() {
+    let own = simulated("values");
+    own.await_state(|state| state["activity"] == "resting");
+    for value in [json!(0), json!(-1), json!("0"), json!("much"), json!([])] {
+        let goal = json!({"goal": "(done a1)", "value": value});
+        let (status, refusal) = own.post("/v1/goals", &goal);
+        assert_eq!(status, 422, "{value}: {refusal}");
+    }
+    let goal = json!({"goal": "(done a1)", "value": "5/2"});
+    assert_eq!(own.post("/v1/goals", &goal).0, 200);
+}
