@@ -9,7 +9,7 @@ use elbowroom::executive::documents::{
     GivenNumber, GoalNow, GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow,
     PlanNow, Refusal, State, StepNow, Taken,
 };
-use elbowroom::num::End;
+use elbowroom::num::{End, Rational};
 use elbowroom::report::exact::Exact;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -290,8 +290,12 @@ fn goals(goals: &GoalsNow) -> String {
         let name = escape_control(&goal.name);
         let state = styled(STRONG, &goal.state.replace('-', " "));
         let since = nearest(&goal.since.0);
+        let value = match &goal.value.0 {
+            value if *value == Rational::ONE => String::new(),
+            value => format!(", value {}", nearest(value)),
+        };
         let mut line = format!(
-            "{name}: {state} since {since}: {}",
+            "{name}{value}: {state} since {since}: {}",
             escape_control(&goal.goal)
         );
         if let Some(why) = &goal.why {

@@ -82,6 +82,10 @@ impl Run<'_> {
         self.lost.has_closed_goals = self.search.is_some();
         self.record_achieved(&achieved);
         self.set_goal();
+        if self.search.is_none() && self.is_choosing_goals() {
+            // What was not possible with those may be possible without them.
+            self.choose_anew(false);
+        }
     }
 
     fn record_achieved(&mut self, goals: &[OpenGoal]) {
@@ -110,17 +114,26 @@ impl Run<'_> {
         }
     }
 
-    /// Goals were given while a plan is executed: if no plan reaches these as well, the present plan continues.
+    /// Goals were given. If a plan is executed and none reaches these as well, the present plan continues.
     pub(super) fn add_to_choice(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;
         };
+        if lasting.planned_goals.is_empty() {
+            if lasting.choosing.is_some() {
+                self.choose_anew(true);
+            }
+            return;
+        }
+        let choosing = lasting.choosing.take();
+        let candidates = choosing.map(|choosing| choosing.names);
+        let candidates = candidates.unwrap_or_default();
         let (mut planned, mut new) = (Vec::new(), Vec::new());
         for goal in &mut lasting.goals {
             let known = (goal.name.clone(), goal.value.clone());
             if lasting.planned_goals.contains(&goal.name) {
                 planned.push(known);
-            } else if !goal.is_announced {
+            } else if goal.is_pursued() || candidates.contains(&goal.name) {
                 goal.aside = None;
                 new.push(known);
             }
@@ -186,10 +199,31 @@ impl Run<'_> {
     /// Tries again if goals were closed since the plan was requested: there may be one for the others.
     fn choose_after_closing(&mut self) -> bool {
         let has_closed = std::mem::take(&mut self.lost.has_closed_goals);
-        if has_closed {
+        if has_closed && !(self.is_choosing_goals() && self.choose_anew(false)) {
             self.turn("some are reached".to_owned(), true);
         }
         has_closed
+    }
+
+    /// Begins a choice among all open goals that can become true. `is_tried` is `true` if no plan was found for all of
+    /// them; all of many goals are not tried together. Returns `false` if no goal can become true.
+    fn choose_anew(&mut self, is_tried: bool) -> bool {
+        let mut choosing = Choosing::among(self.set_hopeless_goals_aside());
+        let all = choosing.tried.clone();
+        let is_tried = is_tried || matches!(choosing.selection, Selection::Growth(_));
+        let step = if is_tried {
+            choosing.selection.after_failure(all)
+        } else {
+            Step::Try(all)
+        };
+        self.follow(choosing, step, true)
+    }
+
+    /// No plan was found for goals to which others were added since: chooses among all of them.
+    pub(super) fn choose_after_more_goals(&mut self) {
+        if self.has_given_up_goals() == Some(false) && !self.is_choosing_goals() {
+            self.choose_after_failure();
+        }
     }
 
     /// No plan was found for the goals that are pursued: chooses others.
@@ -310,18 +344,21 @@ impl Run<'_> {
         let candidates = lasting.goals.iter_mut();
         for goal in candidates.filter(|goal| choosing.names.contains(&goal.name)) {
             let is_aside = !pursued.contains(&goal.name);
-            let is_alone = choosing.position(&goal.name);
-            let is_alone = is_alone.is_some_and(|it| choosing.selection.is_excluded(it));
+            let position = choosing.position(&goal.name).unwrap_or_default();
             let why = || match &goal.hopeless {
                 Some(why) => why.clone(),
-                None if is_alone => "no plan reaches it".to_owned(),
+                None if choosing.selection.is_excluded(position) => "no plan reaches it".to_owned(),
+                None if choosing.selection.is_untried(position) => {
+                    format!("a plan for {list} is found first")
+                }
                 None => format!("no plan reaches it together with {list}"),
             };
             goal.aside = is_aside.then(why);
         }
         choosing.tried = set;
+        let is_lengthy = matches!(choosing.selection, Selection::Growth(_));
         lasting.choosing = (!is_last).then_some(choosing);
-        if is_last {
+        if is_last || is_lengthy {
             self.announce_goals();
         }
         if is_last && !is_to_plan {

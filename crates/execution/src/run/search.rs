@@ -504,7 +504,12 @@ impl Run<'_> {
                 Ok(())
             }
             // Another plan is needed anyway.
-            _ if self.is_to_turn() => Ok(()),
+            _ if self.is_to_turn() => {
+                if search.course == Goes::UnderWay {
+                    self.choose_after_more_goals();
+                }
+                Ok(())
+            }
             // There was none from there; from here, there may be.
             _ if search.is_overtaken => self.search_again(&search.reason),
             _ if search.course != Goes::UnderWay && self.leave_out_new_goals() => Ok(()),

@@ -74,6 +74,14 @@ impl Selection {
         }
     }
 
+    /// Returns `true` if no set with this goal was tried since the selected ones became more.
+    pub(super) fn is_untried(&self, goal: usize) -> bool {
+        match self {
+            Self::Exact { .. } => false,
+            Self::Growth(growth) => growth.rest.contains(&goal),
+        }
+    }
+
     /// Returns the next step after no plan was found for this set.
     pub(super) fn after_failure(&mut self, set: Set) -> Step {
         match self {
