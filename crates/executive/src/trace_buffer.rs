@@ -189,7 +189,7 @@ impl TraceBuffer {
         Ok(text)
     }
 
-    /// Returns the page of the run so far as HTML.
+    /// Returns the page of the run up to now as HTML.
     ///
     /// # Errors
     /// When the page cannot be made from the trace.

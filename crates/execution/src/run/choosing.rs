@@ -83,7 +83,7 @@ impl Run<'_> {
         self.record_achieved(&achieved);
         self.set_goal();
         if self.search.is_none() && self.is_choosing_goals() {
-            // What was not possible with those may be possible without them.
+            // Sets that had no plan because of the closed goals may have one now.
             self.choose_anew(false);
         }
     }
@@ -219,7 +219,7 @@ impl Run<'_> {
         self.follow(choosing, step, true)
     }
 
-    /// No plan was found for goals to which others were added since: chooses among all of them.
+    /// No plan was found, and goals were added since the request: chooses among all of them.
     pub(super) fn choose_after_more_goals(&mut self) {
         if self.has_given_up_goals() == Some(false) && !self.is_choosing_goals() {
             self.choose_after_failure();

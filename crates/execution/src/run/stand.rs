@@ -87,7 +87,7 @@ pub struct TakesUp {
 /// Goals that are open, as they were given.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Goals {
-    /// The goals, in the order in which they were given.
+    /// The goals in the order of their requests.
     pub open: Vec<GivenGoal>,
     /// Whether they are not, or no longer, those of the problem.
     pub are_others: bool,
