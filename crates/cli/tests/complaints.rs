@@ -302,6 +302,7 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
                     name,
                     goal,
                     value: Rational::ONE,
+                    deadline: None,
                 },
             ),
         ],
@@ -636,6 +637,7 @@ fn two_robots_do_two_things_at_once_and_goals_come_while_they_do() {
                 name,
                 goal,
                 value: Rational::ONE,
+                deadline: None,
             }),
         }],
         ..Toy::default()

@@ -7,6 +7,7 @@
 mod action_sets;
 mod analyst;
 mod candidates;
+mod deadlines;
 mod execution;
 mod external;
 mod facts_only;
@@ -28,6 +29,7 @@ mod vary;
 pub use action_sets::ActionSets;
 pub use analyst::{Analyst, WholeRegion};
 pub use candidates::{Candidate, Candidates, Limits, Pace};
+pub use deadlines::obstacle_to_deadline;
 pub use execution::{Execution, Listener, execute, read_goal};
 pub use external::External;
 pub(crate) use facts_only::as_timed;

@@ -20,6 +20,11 @@ pub enum GoalChange<'a> {
     },
     /// The goal is pursued again.
     Pursued,
+    /// The goal is closed, and was not achieved by its deadline.
+    Failed {
+        /// The reason.
+        why: &'a str,
+    },
 }
 
 /// The cause of a warning.

@@ -323,6 +323,7 @@ impl<'a> Run<'a> {
     fn decide_and_follow(&mut self) -> Result<(), Stop> {
         self.heed()?;
         self.close_achieved_goals();
+        self.close_late_goals();
         if self.tend_search()? || self.attend()? {
             return Ok(());
         }
@@ -434,7 +435,8 @@ impl<'a> Run<'a> {
 
     /// The executor takes the goal for reached. The world may look; then it is, or it is not.
     fn goal_reached(&mut self) {
-        let mut footprint = Footprint::of_condition(&self.task, self.task.goal());
+        let task = self.belief.task();
+        let mut footprint = Footprint::of_condition(task, task.goal());
         self.asked = Some(Next::Look {
             facts: std::mem::take(&mut footprint.reads).into_iter().collect(),
             fluents: footprint.reads_fluents.into_iter().collect(),

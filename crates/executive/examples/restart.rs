@@ -46,7 +46,12 @@ fn first_run(journal: &Path) -> Result<(), Box<dyn Error>> {
         wait_for(&executive, "(lies parcel office)");
         let (name, goal) = ("home".to_owned(), GOAL.to_owned());
         let value = Rational::ONE;
-        let request = ExternalRequest::Request(Request::Pursue { name, goal, value });
+        let request = ExternalRequest::Request(Request::Pursue {
+            name,
+            goal,
+            value,
+            deadline: None,
+        });
         executive.submit(request, Duration::from_secs(10))?;
         std::process::abort()
     })

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use elbowroom::answers::{Halt, Watcher};
-use elbowroom::execute::{RunSpec, misfit, read_goal};
+use elbowroom::execute::{RunSpec, misfit, obstacle_to_deadline, read_goal};
 use elbowroom::execution::Request;
 use elbowroom::execution::run::PlanningTime;
 use elbowroom::executive::Status;
@@ -179,11 +179,15 @@ impl Executive {
     fn check(&self, request: &ExternalRequest) -> Result<(), Error> {
         let task = &self.checks;
         match request {
-            ExternalRequest::Request(Request::Pursue { goal, .. }) => {
+            ExternalRequest::Request(Request::Pursue { goal, deadline, .. }) => {
                 let help = "write a condition as in the section :goal, such as (at rover base)";
                 let read = read_goal(task, goal).map_err(|why| Error::new(why, help))?;
-                match misfit(task.problem(), &read) {
-                    Some(why) => Err(Error::new(why, help)),
+                if let Some(why) = misfit(task.problem(), &read) {
+                    return Err(Error::new(why, help));
+                }
+                let obstacle = deadline.as_ref().and(obstacle_to_deadline(task, &read));
+                match obstacle {
+                    Some(why) => Err(Error::new(why, "give the goal without a deadline")),
                     None => Ok(()),
                 }
             }

@@ -44,6 +44,7 @@ fn pursue(goal: &str) -> ExternalRequest {
         name: "next".to_owned(),
         goal: goal.to_owned(),
         value: Rational::ONE,
+        deadline: None,
     })
 }
 

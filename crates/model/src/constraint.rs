@@ -138,6 +138,9 @@ pub struct Constraints {
     pub soft: Vec<SoftConstraint>,
     /// Whether the states before the task's beginning count, and are not known.
     pub(crate) is_past_lost: bool,
+    /// Whether no state before the task's beginning counts: the constraints are deadlines of goals that are not
+    /// achieved yet ([`Task::with_deadlines`](crate::Task::with_deadlines)).
+    pub(crate) begin_now: bool,
 }
 
 /// One instance of a preference among a task's constraints.
@@ -156,8 +159,29 @@ impl Constraints {
         self.is_past_lost
     }
 
+    /// Returns whether the constraints apply to the states from any situation on as they do from the beginning:
+    /// no state before it counts.
+    pub fn begin_now(&self) -> bool {
+        self.begin_now
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.hard.is_empty() && self.soft.is_empty()
+    }
+
+    /// Returns the constraints that remain in mid-execution at this time, on a clock that reads 0 then.
+    pub(crate) fn from(&self, time: &Rational) -> Self {
+        let mut rest = self.clone();
+        if !self.begin_now {
+            rest.is_past_lost = !self.is_empty();
+            return rest;
+        }
+        for modal in &mut rest.hard {
+            if let Modal::Within(deadline, _) = modal {
+                *deadline -= time;
+            }
+        }
+        rest
     }
 }

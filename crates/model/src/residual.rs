@@ -19,8 +19,8 @@ impl Situation {
     /// It begins in the situation's state, and its timed initials are those to come, moved. Facts
     /// and fluents keep their numbers. What is running is no part of it; a plan takes that along,
     /// see [`Situation::rest_of_plan`]. [`Task::problem`] still is the whole problem: its initial
-    /// facts and times are those of the beginning. Constraints on the course of the whole plan
-    /// cannot be judged from here: the judge says so.
+    /// facts and times are those of the beginning. Constraints on the course of the whole plan, other than
+    /// [deadlines](Task::with_deadlines), cannot be judged from here: the validator says so.
     #[must_use]
     pub fn rest_of_task(&self, task: &Task) -> Task {
         let to_come = |timed: &&TimedHappening| timed.time > self.time;
@@ -32,7 +32,7 @@ impl Situation {
         rest.timed = task.timed.iter().filter(to_come).map(moved).collect();
         rest.initial = self.state.clone();
         if !rest.constraints.is_empty() {
-            Arc::make_mut(&mut rest.constraints).is_past_lost = true;
+            rest.constraints = Arc::new(rest.constraints.from(&self.time));
         }
         rest
     }

@@ -6,7 +6,7 @@ use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 use elbowroom_num::Rational;
 
 use crate::autonomous::Autonomous;
-use crate::constraint::Constraints;
+use crate::constraint::{Constraints, Modal};
 use crate::derivation::{Derivation, Rules};
 use crate::domains::Domains;
 use crate::ground::{Change, Condition, FactId, FluentId};
@@ -45,12 +45,22 @@ impl Task {
     /// The task of a problem: its initial state, timed happenings and goal, made ground; ε is
     /// 0.001.
     pub fn new(problem: impl Into<Arc<Problem>>) -> Self {
-        let problem = problem.into();
+        Self::of(problem.into(), Arc::default())
+    }
+
+    /// The task of a problem that extends this task's: with the same objects, and with further predicates, functions
+    /// and actions after its own. Facts and fluents keep their numbers.
+    #[must_use]
+    pub fn extended(&self, problem: impl Into<Arc<Problem>>) -> Self {
+        Self::of(problem.into(), Arc::clone(&self.table)).with_epsilon(self.epsilon.clone())
+    }
+
+    fn of(problem: Arc<Problem>, table: Arc<RwLock<Table>>) -> Self {
         let mut task = Self {
             problem: Arc::clone(&problem),
             epsilon: Self::default_epsilon(),
             domains: Arc::new(Domains::of(&problem)),
-            table: Arc::default(),
+            table,
             initial: State::default(),
             timed: Vec::new(),
             goal: Condition::TRUE,
@@ -165,6 +175,29 @@ impl Task {
         let mut problem = (*self.problem).clone();
         problem.goal = goal;
         task.problem = Arc::new(problem);
+        task
+    }
+
+    /// The same task with deadlines, on its clock: each condition holds at some moment from the situation in which a
+    /// plan begins until the deadline. Unlike for constraints of the problem, nothing that was before that situation
+    /// counts. If the problem has constraints of its own, plans in mid-execution are refused, as without deadlines.
+    #[must_use]
+    pub fn with_deadlines<'c>(
+        &self,
+        deadlines: impl IntoIterator<Item = (Rational, &'c problem::Condition)>,
+    ) -> Self {
+        let mut task = self.clone();
+        let own = self.grounding(|grounder| grounder.constraints());
+        let mut constraints = Constraints {
+            begin_now: own.is_empty(),
+            ..own
+        };
+        let deadlines = deadlines.into_iter().map(|(deadline, condition)| {
+            let condition = self.grounding(|it| it.ground_condition(condition, &mut Vec::new()));
+            Modal::Within(deadline, condition)
+        });
+        constraints.hard.extend(deadlines);
+        task.constraints = Arc::new(constraints);
         task
     }
 

@@ -246,7 +246,7 @@ fn judge(
     let state = situation.map_or(task.initial(), |situation| &situation.state);
     let is_begun = situation.is_some_and(|situation| *situation != Situation::initial(task));
     let mut constraints = std::sync::Arc::clone(&task.constraints);
-    if is_begun && !constraints.is_empty() {
+    if is_begun && !constraints.is_empty() && !constraints.begin_now {
         std::sync::Arc::make_mut(&mut constraints).is_past_lost = true;
     }
     let mut judge = judge::Judge {

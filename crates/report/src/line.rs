@@ -363,6 +363,9 @@ pub enum ObservationLine {
         /// Its value, if it is not 1.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         value: Option<Exact>,
+        /// The time by which it is to be achieved.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        deadline: Option<Exact>,
         /// The time.
         time: Exact,
     },

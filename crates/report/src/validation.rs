@@ -47,6 +47,13 @@ pub enum Invalid {
         /// The time of the report.
         time: Rational,
     },
+    /// The run reports that the deadline of a goal has passed, but it has not, or there is none.
+    NotLate {
+        /// The time of the report.
+        time: Rational,
+        /// The name of the goal.
+        name: String,
+    },
 }
 
 impl fmt::Display for Invalid {
@@ -76,6 +83,13 @@ impl fmt::Display for Invalid {
                     at(time)
                 )
             }
+            Self::NotLate { time, name } => {
+                write!(
+                    f,
+                    "at {}: the run reports that the deadline of `{name}` has passed, but it has not",
+                    at(time)
+                )
+            }
         }
     }
 }
@@ -85,14 +99,21 @@ pub struct Validation<'a> {
     task: Arc<Task>,
     execution: Execution,
     reader: Box<dyn GoalReader + 'a>,
-    /// The open goals by name.
-    goals: Vec<(String, Condition)>,
+    /// The open goals.
+    goals: Vec<Goal>,
     starts: BTreeMap<Ticket, Start>,
     /// Number of starts that have ended.
     ended: usize,
     now: Rational,
     found: Vec<Invalid>,
     count: usize,
+}
+
+/// An open goal.
+struct Goal {
+    name: String,
+    condition: Condition,
+    deadline: Option<Rational>,
 }
 
 /// A start that was commanded.
@@ -108,8 +129,12 @@ struct Start {
 impl<'a> Validation<'a> {
     /// Creates the validation of a new run of `task`. `reader` reads goals that are given during the run.
     pub fn new(task: &Arc<Task>, reader: impl GoalReader + 'a) -> Self {
-        let goal = task.goal().clone();
-        let goals = Some((FIRST_GOAL.to_owned(), goal)).filter(|(_, goal)| !goal.is_trivial());
+        let goal = Goal {
+            name: FIRST_GOAL.to_owned(),
+            condition: task.goal().clone(),
+            deadline: None,
+        };
+        let goals = Some(goal).filter(|goal| !goal.condition.is_trivial());
         Self {
             execution: Execution::new(task),
             task: Arc::clone(task),
@@ -129,9 +154,15 @@ impl<'a> Validation<'a> {
         if stand.goals.are_others {
             let task = Arc::clone(&self.task);
             let open = stand.goals.open.iter();
-            let read = open.filter_map(|given| match &given.text {
-                None => Some((given.name.clone(), task.goal().clone())),
-                Some(text) => Some((given.name.clone(), self.read(text)?)),
+            let read = open.filter_map(|given| {
+                Some(Goal {
+                    name: given.name.clone(),
+                    condition: match &given.text {
+                        None => task.goal().clone(),
+                        Some(text) => self.read(text)?,
+                    },
+                    deadline: given.deadline.clone(),
+                })
             });
             self.goals = read.collect();
         }
@@ -332,16 +363,26 @@ impl<'a> Validation<'a> {
 
     fn asked(&mut self, request: &Request) {
         match request {
-            Request::Pursue { name, goal, .. } => {
+            Request::Pursue {
+                name,
+                goal,
+                deadline,
+                ..
+            } => {
                 let Some(condition) = self.read(goal) else {
                     return;
                 };
-                match self.goals.iter_mut().find(|(known, _)| known == name) {
-                    Some((_, known)) => *known = condition,
-                    None => self.goals.push((name.clone(), condition)),
+                let given = Goal {
+                    name: name.clone(),
+                    condition,
+                    deadline: deadline.clone(),
+                };
+                match self.goals.iter_mut().find(|known| known.name == *name) {
+                    Some(known) => *known = given,
+                    None => self.goals.push(given),
                 }
             }
-            Request::Abandon { name } => self.goals.retain(|(known, _)| known != name),
+            Request::Abandon { name } => self.goals.retain(|known| known.name != *name),
             Request::Pause | Request::Resume => {}
         }
     }
@@ -353,16 +394,25 @@ impl<'a> Validation<'a> {
 
     /// Compares a change of a goal with the state.
     fn change_goal(&mut self, name: &str, change: GoalChange<'_>) {
-        if change != GoalChange::Achieved {
-            return;
-        }
-        let Some(index) = self.goals.iter().position(|(known, _)| known == name) else {
+        let closes = match change {
+            GoalChange::Achieved | GoalChange::Failed { .. } => true,
+            GoalChange::SetAside { .. } | GoalChange::Pursued => false,
+        };
+        let index = self.goals.iter().position(|known| known.name == name);
+        let Some(index) = index.filter(|_| closes) else {
             return;
         };
-        let (_, goal) = self.goals.remove(index);
-        let unmet = self.unmet([&goal], Execution::holds);
+        let goal = self.goals.remove(index);
+        let time = self.now.clone();
+        if change != GoalChange::Achieved {
+            if goal.deadline.is_none_or(|deadline| time < deadline) {
+                let name = goal.name;
+                self.find(Invalid::NotLate { time, name });
+            }
+            return;
+        }
+        let unmet = self.unmet([&goal.condition], Execution::holds);
         if !unmet.is_empty() {
-            let time = self.now.clone();
             self.find(Invalid::NotReached { time, unmet });
         }
     }
@@ -385,7 +435,8 @@ impl<'a> Validation<'a> {
         match verdict {
             Verdict::GoalReached => {
                 let goals = std::mem::take(&mut self.goals);
-                let unmet = self.unmet(goals.iter().map(|(_, goal)| goal), Execution::reaches);
+                let unmet =
+                    self.unmet(goals.iter().map(|goal| &goal.condition), Execution::reaches);
                 if !unmet.is_empty() {
                     self.find(Invalid::NotReached { time, unmet });
                 } else if !self.execution.is_idle() {
@@ -394,7 +445,7 @@ impl<'a> Validation<'a> {
             }
             Verdict::Unsolvable => {
                 let mut goals = self.goals.iter();
-                let holds = goals.all(|(_, goal)| self.execution.reaches(goal) == Some(true));
+                let holds = goals.all(|goal| self.execution.reaches(&goal.condition) == Some(true));
                 if holds && !self.goals.is_empty() && self.execution.is_idle() {
                     self.find(Invalid::Reached { time });
                 }

@@ -125,8 +125,14 @@ pub(crate) enum CtlCommand {
         /// values are pursued
         #[arg(long, value_name = "V")]
         value: Option<Rational>,
+        /// Time, by the world's clock, by which it is to be achieved; if it is not, it is closed as failed
+        #[arg(long, value_name = "T", conflicts_with = "within")]
+        deadline: Option<Rational>,
+        /// The deadline in seconds from now
+        #[arg(long, value_name = "S")]
+        within: Option<Rational>,
         /// Wait until the goal is closed, or impossible from where the executive rests: exit code 0 if it is achieved, 1
-        /// if it is cancelled or impossible, 3 if the executive rests because no plan was found
+        /// if it is cancelled, failed or impossible, 3 if the executive rests because no plan was found
         #[arg(long)]
         wait: bool,
     },

@@ -44,12 +44,16 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
             goal,
             name,
             value,
+            deadline,
+            within,
             wait,
         } => {
             let new = NewGoal {
                 name: name.clone(),
                 goal: goal.clone(),
                 value: value.clone().map(GivenNumber),
+                deadline: deadline.clone().map(GivenNumber),
+                within: within.clone().map(GivenNumber),
             };
             if *wait {
                 return client.give_and_wait(output, &new);
@@ -237,7 +241,7 @@ impl Client<'_> {
             };
             let exit = match goal.state.as_str() {
                 "achieved" => Exit::Yes,
-                "cancelled" | "impossible" => Exit::No,
+                "cancelled" | "failed" | "impossible" => Exit::No,
                 "unplanned" => Exit::Limit,
                 _ => {
                     std::thread::sleep(GOAL_POLL_INTERVAL);
@@ -294,8 +298,10 @@ fn goals(goals: &GoalsNow) -> String {
             value if *value == Rational::ONE => String::new(),
             value => format!(", value {}", nearest(value)),
         };
+        let by = goal.deadline.as_ref();
+        let by = by.map_or(String::new(), |by| format!(", by {}", nearest(&by.0)));
         let mut line = format!(
-            "{name}{value}: {state} since {since}: {}",
+            "{name}{value}{by}: {state} since {since}: {}",
             escape_control(&goal.goal)
         );
         if let Some(why) = &goal.why {

@@ -176,8 +176,10 @@ documents! {
         pub goal: String,
         /// Its value, a positive number.
         pub value: Exact,
+        /// The time, by the world's clock, by which it is to be achieved, if there is one.
+        pub deadline: Option<Exact>,
         /// `pursued`; `set-aside` while others are pursued; `impossible` if no plan exists, or `unplanned` if none was found,
-        /// from where the executive rests; `achieved` or `cancelled`.
+        /// from where the executive rests; `achieved`, `cancelled`, or `failed` if it was not achieved by its deadline.
         pub state: String,
         /// When it was given, by the world's clock; none if an earlier segment of the journal has it.
         pub given: Option<Exact>,
@@ -300,6 +302,13 @@ documents! {
         /// values are pursued.
         [optional serde(default)]
         pub value: Option<GivenNumber>,
+        /// The time, by the world's clock, by which it is to be achieved. Plans achieve it by then, and if it is not, it is
+        /// closed as failed. By default it may take as long as it takes.
+        [optional serde(default)]
+        pub deadline: Option<GivenNumber>,
+        /// The deadline in seconds from now, in place of `deadline`; a positive number.
+        [optional serde(default)]
+        pub within: Option<GivenNumber>,
     }
 
     /// A fact as it is from now on.

@@ -18,7 +18,7 @@ use elbowroom_plan::{ParameterId, ParameterKind};
 use elbowroom_report::exact::Exact;
 use elbowroom_report::trace::SnapshotLine;
 
-use goals::GoalList;
+use goals::{Given, GoalList};
 
 use super::documents::{
     Activity, GoalsNow, GuaranteeNow, InDoubt, LowerEnd, NextNow, NumberNow, PlanNow, Room,
@@ -60,12 +60,13 @@ impl Status {
     pub fn new(task: &Task, timeout: TimeoutRule) -> Self {
         let mut goals = GoalList::default();
         if !task.problem().goal.is_trivial() {
-            goals.give(
-                FIRST_GOAL,
-                &goal_text(task),
-                &Rational::ONE,
-                &Rational::ZERO,
-            );
+            let own = Given {
+                name: FIRST_GOAL,
+                goal: &goal_text(task),
+                value: &Rational::ONE,
+                deadline: None,
+            };
+            goals.give(&own, &Rational::ZERO);
         }
         let known = Known {
             timeout,
@@ -533,9 +534,20 @@ impl Known {
 
     fn asked(&mut self, request: &Request) {
         match request {
-            Request::Pursue { name, goal, value } => {
+            Request::Pursue {
+                name,
+                goal,
+                value,
+                deadline,
+            } => {
                 self.goals.cancel(name, "replaced", &self.now);
-                self.goals.give(name, goal, value, &self.now);
+                let given = Given {
+                    name,
+                    goal,
+                    value,
+                    deadline: deadline.as_ref(),
+                };
+                self.goals.give(&given, &self.now);
             }
             Request::Abandon { name } => self.goals.cancel(name, "abandoned", &self.now),
             Request::Pause => self.is_paused = true,

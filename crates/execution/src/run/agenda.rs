@@ -80,7 +80,9 @@ impl Run<'_> {
             Todo::Cancel(tickets) => self.cancel(tickets),
             Todo::Send(command) => return Ok(Some(command)),
             Todo::Pass(until) => {
-                let until = until.min(self.settings.time_limit.clone());
+                let limit = Some(self.settings.time_limit.clone());
+                let limits = limit.into_iter().chain(self.next_deadline_of_a_goal());
+                let until = limits.fold(until, Rational::min);
                 self.asked = Some(Next::Wait { until });
             }
             Todo::CheckTimeouts => self.check_timeouts(),

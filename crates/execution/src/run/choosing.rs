@@ -66,19 +66,33 @@ impl Run<'_> {
         lasting.is_some_and(|lasting| lasting.choosing.is_some())
     }
 
-    /// Closes the goals that are achieved while others are still pursued.
+    /// Closes the goals that are achieved while others are still pursued. If none is left, but the plan need not keep
+    /// those that are achieved, they are closed, too.
     pub(super) fn close_achieved_goals(&mut self) {
-        let Some(lasting) = self.lasting.as_mut().filter(|it| it.goals.len() > 1) else {
+        let Some(lasting) = &mut self.lasting else {
             return;
         };
         let belief = &self.belief;
         let is_achieved = |goal: &OpenGoal| belief.is_certain(&goal.ground) == Ok(true);
         let is_left = |goal: &OpenGoal| goal.is_pursued() && !is_achieved(goal);
-        if !lasting.goals.iter().any(is_left) || !lasting.goals.iter().any(is_achieved) {
+        let is_momentary = |goal: &OpenGoal| goal.deadline.is_some() && is_achieved(goal);
+        let is_any_left = lasting.goals.iter().any(is_left);
+        let is_to_close = match is_any_left {
+            true => lasting.goals.iter().any(is_achieved),
+            false => lasting.goals.iter().any(is_momentary),
+        };
+        if !is_to_close {
             return;
         }
         let (achieved, left): (Vec<_>, Vec<_>) = lasting.goals.drain(..).partition(is_achieved);
         lasting.goals = left;
+        if !is_any_left {
+            self.record_achieved(&achieved);
+            self.pursue_all();
+            let names = names_of(&achieved).unwrap_or_default();
+            self.turn(format!("{names} is reached"), false);
+            return;
+        }
         self.lost.has_closed_goals = self.search.is_some();
         self.record_achieved(&achieved);
         self.set_goal();
@@ -86,6 +100,44 @@ impl Run<'_> {
             // Sets that had no plan because of the closed goals may have one now.
             self.choose_anew(false);
         }
+    }
+
+    /// Returns the next deadline of an open goal that is still to come.
+    pub(super) fn next_deadline_of_a_goal(&self) -> Option<Rational> {
+        let goals = self.lasting.iter().flat_map(|it| &it.goals);
+        let deadlines = goals.filter_map(|goal| goal.deadline.as_ref());
+        deadlines.filter(|it| **it > self.now).min().cloned()
+    }
+
+    /// Closes the goals whose deadlines have passed. The others are pursued without them.
+    pub(super) fn close_late_goals(&mut self) {
+        let now = &self.now;
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        let is_late = |goal: &mut OpenGoal| goal.deadline.as_ref().is_some_and(|it| it <= now);
+        let mut late: Vec<OpenGoal> = lasting.goals.extract_if(.., is_late).collect();
+        late.retain(|goal| {
+            // It may have been achieved at this very moment.
+            let is_achieved = self.belief.is_certain(&goal.ground) == Ok(true);
+            self.ports.recorder.record(&Entry::Goal {
+                now,
+                name: &goal.name,
+                change: if is_achieved {
+                    GoalChange::Achieved
+                } else {
+                    GoalChange::Failed {
+                        why: "its deadline has passed",
+                    }
+                },
+            });
+            !is_achieved
+        });
+        let Some(names) = names_of(&late) else {
+            return;
+        };
+        self.pursue_all();
+        self.turn(format!("too late for {names}"), false);
     }
 
     fn record_achieved(&mut self, goals: &[OpenGoal]) {
@@ -390,6 +442,12 @@ impl Run<'_> {
             });
         }
     }
+}
+
+/// Returns the names of goals, if there are any.
+fn names_of(goals: &[OpenGoal]) -> Option<String> {
+    let names: Vec<String> = goals.iter().map(|it| format!("`{}`", it.name)).collect();
+    (!names.is_empty()).then(|| names.join(", "))
 }
 
 /// The names of goals, in words.

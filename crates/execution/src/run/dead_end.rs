@@ -81,7 +81,7 @@ impl Run<'_> {
 
     fn past(&self) -> Past<'_> {
         Past {
-            task: &self.task,
+            task: self.belief.task(),
             beginning: &self.beginning,
             history: &self.history,
             account: &self.account,

@@ -9,6 +9,7 @@ use elbowroom_num::Rational;
 use super::Run;
 use super::lasting::{FIRST_GOAL, Turn};
 use super::stand::{GivenGoal, Goals};
+use crate::executor::Need;
 use crate::reason::{About, Cause, Reason};
 
 /// A goal that is open.
@@ -19,6 +20,8 @@ pub(super) struct OpenGoal {
     pub(super) condition: problem::Condition,
     /// Its value, a positive number.
     pub(super) value: Rational,
+    /// The time by which it is to be achieved.
+    pub(super) deadline: Option<Rational>,
     /// The same condition, grounded.
     pub(super) ground: Condition,
     /// The reason for which it can never become true, if that is known.
@@ -43,6 +46,7 @@ impl OpenGoal {
             ground: task.with_goal(condition.clone()).goal().clone(),
             condition,
             value: Rational::ONE,
+            deadline: None,
             hopeless: None,
             aside: None,
             is_announced: false,
@@ -62,8 +66,8 @@ impl OpenGoal {
 }
 
 /// Returns the conjunction of all goals that are pursued.
-fn together(goals: &[OpenGoal]) -> problem::Condition {
-    let goals = goals.iter().filter(|it| it.is_pursued());
+fn together<'g>(goals: impl IntoIterator<Item = &'g OpenGoal>) -> problem::Condition {
+    let goals = goals.into_iter().filter(|it| it.is_pursued());
     let mut goals: Vec<_> = goals.map(|it| it.condition.clone()).collect();
     match (goals.pop(), goals.is_empty()) {
         (None, _) => problem::Condition::TRUE,
@@ -97,11 +101,33 @@ impl Run<'_> {
             return;
         };
         lasting.has_other_goals = true;
-        let goal = together(&lasting.goals);
+        let goals = std::mem::take(&mut lasting.goals);
         self.foreseen = None;
         self.refusals.forget();
-        self.task = Arc::new(self.task.with_goal(goal));
-        self.belief.pursue(&self.task);
+        self.pursue(&Arc::clone(&self.task), &goals);
+        if let Some(lasting) = &mut self.lasting {
+            lasting.goals = goals;
+        }
+    }
+
+    /// Pursues these goals of a task.
+    fn pursue(&mut self, task: &Task, goals: &[OpenGoal]) {
+        self.task = Arc::new(self.planned_for(task, goals));
+        let all = task.with_goal(together(goals));
+        self.belief.pursue(&Arc::new(all));
+    }
+
+    /// Returns the task of plans for these goals. A plan need not keep a goal true to its end if the goal has a deadline,
+    /// because the goal is closed as soon as it is achieved. Executors that choose the order themselves know no deadlines.
+    fn planned_for(&self, task: &Task, goals: &[OpenGoal]) -> Task {
+        if self.ports.executor.need() == Need::PartialOrder {
+            return task.with_goal(together(goals));
+        }
+        let pursued = goals.iter().filter(|it| it.is_pursued());
+        let deadlines = pursued.filter_map(|it| Some((it.deadline.clone()?, &it.condition)));
+        let others = goals.iter().filter(|it| it.deadline.is_none());
+        let task = task.with_goal(together(others));
+        task.with_deadlines(deadlines)
     }
 
     /// The open goals.
@@ -131,6 +157,7 @@ impl Run<'_> {
             };
             Some(OpenGoal {
                 value: given.value.clone(),
+                deadline: given.deadline.clone(),
                 aside: given.aside.clone(),
                 is_announced: given.aside.is_some(),
                 ..goal
@@ -144,13 +171,15 @@ impl Run<'_> {
         if !goals.are_others {
             return Arc::clone(problem);
         }
-        Arc::new(problem.with_goal(together(&self.read_again(problem, goals))))
+        Arc::new(self.planned_for(problem, &self.read_again(problem, goals)))
     }
 
     /// These are the open goals, where `problem` has its own.
     pub(super) fn pursue_again(&mut self, problem: &Arc<Task>, goals: &Goals, is_paused: bool) {
         let open = self.read_again(problem, goals);
-        self.task = self.task_of(problem, goals);
+        if goals.are_others {
+            self.pursue(problem, &open);
+        }
         if let Some(lasting) = &mut self.lasting {
             lasting.goals = open;
             lasting.has_other_goals = goals.are_others;

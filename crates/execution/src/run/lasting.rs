@@ -162,13 +162,25 @@ impl<'a> Run<'a> {
             Request::Pursue { value, .. } if !value.is_positive() => {
                 Some("the value of a goal is not positive; nothing was made of it")
             }
-            Request::Pursue { name, goal, value } => {
+            Request::Pursue {
+                deadline: Some(deadline),
+                ..
+            } if *deadline <= self.now => {
+                Some("the deadline of the goal has passed; nothing was made of it")
+            }
+            Request::Pursue {
+                name,
+                goal,
+                value,
+                deadline,
+            } => {
                 let Ok(condition) = lasting.reader.read(&self.task, goal) else {
                     return Some("it is no goal of this problem; nothing was made of it");
                 };
                 let text = Some(goal.clone());
                 let mut given = OpenGoal::new(&self.task, name.clone(), text, condition);
                 given.value.clone_from(value);
+                given.deadline.clone_from(deadline);
                 let known = lasting.goals.iter_mut().find(|known| known.name == *name);
                 let is_new = known.is_none();
                 match known {

@@ -102,6 +102,8 @@ pub struct GivenGoal {
     pub text: Option<String>,
     /// Its value, a positive number.
     pub value: Rational,
+    /// The time by which it is to be achieved.
+    pub deadline: Option<Rational>,
     /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
     pub aside: Option<String>,
 }
@@ -112,6 +114,7 @@ impl GivenGoal {
             name: goal.name.clone(),
             text: goal.text.clone(),
             value: goal.value.clone(),
+            deadline: goal.deadline.clone(),
             aside: goal.aside.clone(),
         }
     }
@@ -239,9 +242,9 @@ impl Run<'_> {
         self.agenda.clear();
         self.now.clone_from(stand.belief.time());
         let problem = Arc::clone(&self.task);
-        self.pursue_again(&problem, &stand.goals, stand.is_paused);
         self.belief = stand.belief;
-        self.belief.pursue(&self.task);
+        self.belief.pursue(&problem);
+        self.pursue_again(&problem, &stand.goals, stand.is_paused);
         self.beginning = self.belief.clone();
         self.account.begin_at(stand.started, stand.starts);
         self.allowance = stand.allowance;

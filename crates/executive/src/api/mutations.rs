@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use elbowroom::execute::{misfit, read_goal};
+use elbowroom::execute::{misfit, obstacle_to_deadline, read_goal};
 use elbowroom::execution::Request;
 use elbowroom::execution::run::FIRST_GOAL;
 use elbowroom::executive::documents::{
-    Activity, NewFact, NewGoal, NewNumber, NewProblem, State, Taken,
+    Activity, GivenNumber, NewFact, NewGoal, NewNumber, NewProblem, State, Taken,
 };
 use elbowroom::executive::goal_text;
 use elbowroom::model::ground::{Change, FactId};
@@ -123,10 +123,17 @@ impl ApiRouter {
                 help,
             ));
         }
+        let deadline = deadline(&given.deadline, &given.within, &status.state().now.0)?;
+        if deadline.is_some()
+            && let Some(why) = obstacle_to_deadline(task, &read)
+        {
+            return Err(ApiError::new(422, why, "give the goal without a deadline"));
+        }
         let request = Request::Pursue {
             name: name.clone(),
             goal,
             value,
+            deadline,
         };
         self.submit(vec![ExternalRequest::Request(request)], Some(name))
     }
@@ -213,6 +220,31 @@ impl ApiRouter {
     }
 }
 
+/// Returns the deadline of a goal that is given now.
+fn deadline(
+    deadline: &Option<GivenNumber>,
+    within: &Option<GivenNumber>,
+    now: &Rational,
+) -> Result<Option<Rational>, ApiError> {
+    let refused = |error: String, help| Err(ApiError::new(422, error, help));
+    match (deadline, within) {
+        (Some(_), Some(_)) => refused(
+            "the goal has a deadline and a time within which it is to be achieved".to_owned(),
+            "leave out one of them",
+        ),
+        (None, Some(within)) if !within.0.is_positive() => refused(
+            "the time within which the goal is to be achieved is not positive".to_owned(),
+            "give the seconds from now, such as 60",
+        ),
+        (Some(deadline), None) if deadline.0 <= *now => refused(
+            format!("the deadline has passed: it is {}", now.to_decimal(3)),
+            "give a later time, or the seconds from now (`within`)",
+        ),
+        (None, Some(within)) => Ok(Some(now + &within.0)),
+        (deadline, None) => Ok(deadline.as_ref().map(|it| it.0.clone())),
+    }
+}
+
 /// Returns the error for requests while the journal cannot be written.
 fn journal_failed() -> ApiError {
     let error = "the journal cannot be written, so this is not kept, and the executive ends";
@@ -280,6 +312,7 @@ fn requests_for(new: &Task, task: &Task, state: &State) -> Vec<ExternalRequest> 
         name,
         goal,
         value,
+        deadline: None,
     }));
     requests
 }

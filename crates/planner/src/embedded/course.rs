@@ -23,6 +23,9 @@
 //! not keep a clause together. So nothing is proved this way. Where nothing is found, or a constraint has no
 //! such form, a search ignores the constraints, and the judge rejects the plans that break them. A proof
 //! for the problem without constraints holds with them.
+//!
+//! In mid-execution only [deadlines](Task::with_deadlines) are respected, because nothing that was before counts for
+//! them. They change no action, so that running actions remain as they are.
 
 mod actions;
 mod clauses;
@@ -35,8 +38,9 @@ mod timed;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_model::ground::FactId;
 use elbowroom_model::problem::{Expression, Problem};
-use elbowroom_model::validate::{self, Verdict, validate};
+use elbowroom_model::validate::{self, Verdict, validate_from};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 
 use super::answer::{Answer, Counts, Found, Objective, Progress, Proof, Settings, Stopped};
@@ -90,11 +94,14 @@ pub(super) fn plan(
     settings: &Settings,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Answer {
-    if *situation != Situation::initial(task) || task.constraints().is_past_lost() {
+    let constraints = task.constraints();
+    let is_begun = *situation != Situation::initial(task) && !constraints.begin_now();
+    if is_begun || constraints.is_past_lost() {
         return unsupported(task, "trajectory constraints in mid-execution");
     }
     let mut search = Search {
         task,
+        situation,
         settings,
         observe,
         best: None,
@@ -152,6 +159,7 @@ pub(super) fn plan(
 /// A search for plans of the task, in several problems without constraints.
 struct Search<'a> {
     task: &'a Task,
+    situation: &'a Situation,
     settings: &'a Settings,
     observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     best: Option<Found>,
@@ -170,7 +178,7 @@ impl Search<'_> {
         first_plan_only: bool,
     ) -> Result<Answer, Box<Answer>> {
         let free = match rewriting::without_constraints(self.task, demanded, coverage) {
-            Ok(problem) => free_task(self.task, problem),
+            Ok(problem) => self.free_task(problem),
             Err(Obstacle::Feature(feature)) => {
                 return Err(Box::new(unsupported(self.task, feature)));
             }
@@ -204,7 +212,7 @@ impl Search<'_> {
         settings: &Settings,
         most_states: Option<u64>,
     ) -> Answer {
-        let begin = Situation::initial(free);
+        let begin = self.begin(free);
         let mut counts = Counts::default();
         let mut observe = |progress: &Progress| {
             counts = progress.counts;
@@ -253,7 +261,7 @@ impl Search<'_> {
             return None;
         }
         let task = self.task;
-        let loose = free_task(task, rewriting::loosened(task));
+        let loose = self.free_task(rewriting::loosened(task));
         let settings = self.settings_of_search(true);
         let answer = self.search(&loose, Some(task), &settings, most_states);
         match answer {
@@ -267,11 +275,36 @@ impl Search<'_> {
         }
     }
 
+    /// Returns the task of a problem that extends this one's.
+    fn free_task(&self, problem: Problem) -> Task {
+        if *self.situation == Situation::initial(self.task) {
+            Task::new(problem).with_epsilon(self.task.epsilon().clone())
+        } else {
+            self.task.extended(problem)
+        }
+    }
+
+    /// Returns the situation in which plans of the extended task begin.
+    fn begin(&self, free: &Task) -> Situation {
+        if *self.situation == Situation::initial(self.task) {
+            return Situation::initial(free);
+        }
+        let own = self.task.problem().predicates.len();
+        let is_more = |fact: &&FactId| free.atom(**fact).0.index() >= own;
+        let more = free.initial().facts.iter().filter(is_more).copied();
+        let mut begin = self.situation.clone();
+        begin.state.facts.extend(more);
+        begin
+    }
+
+    fn judged(&self, plan: &TimeTriggeredPlan) -> Option<Found> {
+        judged_without_observers(self.task, self.situation, self.settings, plan)
+    }
+
     /// Takes over what a search reports.
     fn look(&mut self, progress: &Progress) -> ControlFlow<()> {
         let found = progress.plan.as_ref();
-        let found =
-            found.and_then(|found| judged_without_observers(self.task, self.settings, &found.plan));
+        let found = found.and_then(|found| self.judged(&found.plan));
         let worth = |found: &Found| (found.value.clone(), found.makespan.clone());
         let best = &self.best;
         let better =
@@ -366,10 +399,6 @@ impl Search<'_> {
     }
 }
 
-fn free_task(task: &Task, problem: Problem) -> Task {
-    Task::new(problem).with_epsilon(task.epsilon().clone())
-}
-
 fn unsupported(task: &Task, feature: &str) -> Answer {
     Answer::Unsupported(Unsupported {
         feature: feature.to_owned(),
@@ -380,14 +409,17 @@ fn unsupported(task: &Task, feature: &str) -> Answer {
 /// The plan without observers, if the judge accepts it.
 pub(super) fn judged_without_observers(
     task: &Task,
+    situation: &Situation,
     settings: &Settings,
     plan: &TimeTriggeredPlan,
 ) -> Option<Found> {
     let own = plan
-        .steps
+        .new_steps(situation)
         .iter()
         .filter(|step| step.action.schema.index() < task.problem().schemas.len());
-    let steps = own.map(|step| {
+    let running = plan.steps.iter().take(situation.running.len());
+    let running = running.map(|step| Some(step.clone()));
+    let new = own.map(|step| {
         let action = task.instantiate(step.action.schema, &step.action.arguments);
         Some(Step {
             start: step.start.clone(),
@@ -396,9 +428,11 @@ pub(super) fn judged_without_observers(
         })
     });
     let plan = TimeTriggeredPlan {
-        steps: steps.collect::<Option<_>>()?,
+        steps: running.chain(new).collect::<Option<_>>()?,
     };
-    let Verdict::Valid(report) = validate(task, &plan, &validate::Settings::default()) else {
+    let settings_of_validator = validate::Settings::default();
+    let verdict = validate_from(task, situation, &plan, &settings_of_validator);
+    let Verdict::Valid(report) = verdict else {
         return None;
     };
     let metric = report.metric(task);

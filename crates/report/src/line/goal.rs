@@ -14,7 +14,7 @@ pub struct GoalChangeLine {
     pub name: String,
     /// The change.
     pub becomes: GoalState,
-    /// The reason for which it is set aside.
+    /// The reason for which it is set aside, or has failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
 }
@@ -29,6 +29,8 @@ pub enum GoalState {
     SetAside,
     /// The goal is pursued again.
     Pursued,
+    /// The goal is closed, and was not achieved by its deadline.
+    Failed,
 }
 
 impl GoalState {
@@ -38,6 +40,7 @@ impl GoalState {
             Self::Achieved => "achieved",
             Self::SetAside => "set aside",
             Self::Pursued => "pursued again",
+            Self::Failed => "failed",
         }
     }
 }

@@ -116,6 +116,7 @@ impl Line {
                     GoalChange::Achieved => (GoalState::Achieved, None),
                     GoalChange::SetAside { why } => (GoalState::SetAside, Some(why.to_owned())),
                     GoalChange::Pursued => (GoalState::Pursued, None),
+                    GoalChange::Failed { why } => (GoalState::Failed, Some(why.to_owned())),
                 };
                 Self::Goal(GoalChangeLine {
                     now: exact(now),
@@ -258,10 +259,16 @@ impl ObservationLine {
 impl ObservationLine {
     fn asked(request: &Request, time: Exact) -> Self {
         match request {
-            Request::Pursue { name, goal, value } => Self::Goal {
+            Request::Pursue {
+                name,
+                goal,
+                value,
+                deadline,
+            } => Self::Goal {
                 name: name.clone(),
                 goal: goal.clone(),
                 value: (*value != Rational::ONE).then(|| exact(value)),
+                deadline: deadline.as_ref().map(exact),
                 time,
             },
             Request::Abandon { name } => Self::Abandon {
@@ -287,11 +294,16 @@ impl ObservationLine {
                 name,
                 goal,
                 value,
+                deadline,
                 time,
             } => {
-                let (name, goal) = (name.clone(), goal.clone());
-                let value = value.as_ref().map_or(Rational::ONE, |it| it.0.clone());
-                (Request::Pursue { name, goal, value }, time)
+                let request = Request::Pursue {
+                    name: name.clone(),
+                    goal: goal.clone(),
+                    value: value.as_ref().map_or(Rational::ONE, |it| it.0.clone()),
+                    deadline: deadline.as_ref().map(|it| it.0.clone()),
+                };
+                (request, time)
             }
             Self::Abandon { name, time } => {
                 let name = name.clone();

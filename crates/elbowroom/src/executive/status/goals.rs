@@ -18,6 +18,15 @@ const IMPOSSIBLE: &str = "impossible";
 const UNPLANNED: &str = "unplanned";
 const ACHIEVED: &str = "achieved";
 const CANCELLED: &str = "cancelled";
+const FAILED: &str = "failed";
+
+/// A goal that is given.
+pub(super) struct Given<'a> {
+    pub(super) name: &'a str,
+    pub(super) goal: &'a str,
+    pub(super) value: &'a Rational,
+    pub(super) deadline: Option<&'a Rational>,
+}
 
 /// The open goals, and the last ones that were closed.
 #[derive(Clone, Debug, Default)]
@@ -28,11 +37,12 @@ pub(super) struct GoalList {
 
 impl GoalList {
     /// Adds an open goal.
-    pub(super) fn give(&mut self, name: &str, goal: &str, value: &Rational, now: &Rational) {
+    pub(super) fn give(&mut self, given: &Given<'_>, now: &Rational) {
         self.open.push(GoalNow {
-            name: name.to_owned(),
-            goal: goal.to_owned(),
-            value: Exact(value.clone()),
+            name: given.name.to_owned(),
+            goal: given.goal.to_owned(),
+            value: Exact(given.value.clone()),
+            deadline: given.deadline.cloned().map(Exact),
             state: PURSUED.to_owned(),
             given: Some(Exact(now.clone())),
             since: Exact(now.clone()),
@@ -63,6 +73,7 @@ impl GoalList {
             name: line.name.clone(),
             goal: line.goal.as_ref().or(own).cloned().unwrap_or_default(),
             value: line.value.clone().unwrap_or(Exact(Rational::ONE)),
+            deadline: line.deadline.clone(),
             state: state(line.aside.is_some()),
             given: None,
             since: Exact(snapshot.now().clone()),
@@ -79,6 +90,10 @@ impl GoalList {
         let why = match change {
             GoalChange::Achieved => {
                 self.close(now, ACHIEVED, None, |goal| goal.name == name);
+                return;
+            }
+            GoalChange::Failed { why } => {
+                self.close(now, FAILED, Some(why), |goal| goal.name == name);
                 return;
             }
             GoalChange::SetAside { why } => Some(why.to_owned()),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use elbowroom::model::Task;
 use elbowroom::pddl::{self, Source};
 
-use super::scripted::{abandon, assert_has, has, pursue, pursue_with_value, run, task};
+use super::scripted::{abandon, assert_has, has, pursue, pursue_by, pursue_with_value, run, task};
 
 const NEVER: &str = "because (not (here book)) can never become true";
 
@@ -159,5 +159,77 @@ fn a_goal_that_was_set_aside_is_pursued_again_when_another_one_is_abandoned() {
     assert_has(
         &told,
         &["0: `moon` set aside", "5: rest: unsolvable-from-here moon"],
+    );
+}
+
+#[test]
+fn goals_with_deadlines_are_reached_in_the_order_of_their_deadlines() {
+    let script = vec![
+        (0, pursue_by("ward", "(at ward)", 25)),
+        (0, pursue_by("lab", "(at lab)", 15)),
+    ];
+    let told = run(&rooms("(and)"), 100, script);
+    assert_has(
+        &told,
+        &[
+            "start (move home lab)",
+            "10: `lab` achieved",
+            "start (move lab ward)",
+            "20: `ward` achieved",
+            "20: rest: no goals",
+        ],
+    );
+}
+
+#[test]
+fn a_goal_that_would_be_late_is_set_aside_and_fails_at_its_deadline() {
+    let script = vec![
+        (0, pursue_by("ward", "(at ward)", 5)),
+        (0, pursue("lab", "(at lab)")),
+    ];
+    let told = run(&rooms("(and)"), 100, script);
+    assert_has(
+        &told,
+        &[
+            "start (move home lab)",
+            "5: `ward` failed, because its deadline has passed",
+            "rest: goal-reached lab",
+        ],
+    );
+}
+
+#[test]
+fn a_goal_without_others_fails_at_its_deadline() {
+    let script = vec![
+        (0, pursue_by("ward", "(at ward)", 5)),
+        (20, pursue("lab", "(at lab)")),
+    ];
+    let told = run(&rooms("(and)"), 100, script);
+    assert_has(
+        &told,
+        &[
+            "rest: no-plan ward",
+            "5: `ward` failed, because its deadline has passed",
+            "start (move home lab)",
+            "rest: goal-reached lab",
+        ],
+    );
+}
+
+#[test]
+fn a_deadline_that_is_added_to_a_running_plan_is_met() {
+    let script = vec![
+        (0, pursue("lab", "(at lab)")),
+        (5, pursue_by("ward", "(at ward)", 25)),
+    ];
+    let told = run(&rooms("(and)"), 100, script);
+    assert_has(
+        &told,
+        &[
+            "`lab` achieved",
+            "start (move lab ward)",
+            "20: `ward` achieved",
+            "rest: no goals",
+        ],
     );
 }

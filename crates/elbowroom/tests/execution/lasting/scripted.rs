@@ -155,6 +155,7 @@ impl Recorder for Notes {
                     GoalChange::Achieved => "achieved".to_owned(),
                     GoalChange::SetAside { why } => format!("set aside, because {why}"),
                     GoalChange::Pursued => "pursued again".to_owned(),
+                    GoalChange::Failed { why } => format!("failed, because {why}"),
                 };
                 self.note(format!("{}: `{name}` {change}", at(now)));
             }
@@ -263,8 +264,20 @@ pub(crate) fn pursue(name: &str, goal: &str) -> Event {
 }
 
 pub(crate) fn pursue_with_value(name: &str, goal: &str, value: i64) -> Event {
-    let (name, goal, value) = (name.to_owned(), goal.to_owned(), Rational::from(value));
-    Event::Asked(Request::Pursue { name, goal, value })
+    given(name, goal, value, None)
+}
+
+pub(crate) fn pursue_by(name: &str, goal: &str, deadline: i64) -> Event {
+    given(name, goal, 1, Some(deadline))
+}
+
+fn given(name: &str, goal: &str, value: i64, deadline: Option<i64>) -> Event {
+    Event::Asked(Request::Pursue {
+        name: name.to_owned(),
+        goal: goal.to_owned(),
+        value: Rational::from(value),
+        deadline: deadline.map(Rational::from),
+    })
 }
 
 pub(crate) fn abandon(name: &str) -> Event {

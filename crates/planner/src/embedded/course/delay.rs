@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use super::super::answer::Settings;
@@ -19,6 +19,7 @@ const MOST_DELAYS: usize = 32;
 /// initial names.
 pub(in super::super) fn delayed(
     task: &Task,
+    situation: &Situation,
     settings: &Settings,
     plan: &TimeTriggeredPlan,
 ) -> Option<TimeTriggeredPlan> {
@@ -29,7 +30,9 @@ pub(in super::super) fn delayed(
         .flat_map(|modal| modal.times())
         .chain(timed)
         .collect();
-    let starts: BTreeSet<&Rational> = plan.steps.iter().map(|step| &step.start).collect();
+    let running = situation.running.len();
+    let new = plan.new_steps(situation).iter();
+    let starts: BTreeSet<&Rational> = new.map(|step| &step.start).collect();
     let delays = starts.iter().flat_map(|&start| {
         let moments = named
             .iter()
@@ -39,11 +42,11 @@ pub(in super::super) fn delayed(
     let positive = delays.filter(|(_, delay)| delay.is_positive());
     positive.take(MOST_DELAYS).find_map(|(from, delay)| {
         let mut later = plan.clone();
-        for step in &mut later.steps {
+        for step in later.steps.iter_mut().skip(running) {
             if step.start >= *from {
                 step.start += &delay;
             }
         }
-        judged_without_observers(task, settings, &later).map(|_| later)
+        judged_without_observers(task, situation, settings, &later).map(|_| later)
     })
 }

@@ -341,9 +341,9 @@ impl<'a, 't> Strand<'a, 't> {
             return Judged::Refused;
         };
         if let Some(constrained) = constrained
-            && judged_without_observers(constrained, settings, &plan).is_none()
+            && judged_without_observers(constrained, situation, settings, &plan).is_none()
         {
-            let Some(later) = delayed(constrained, settings, &plan) else {
+            let Some(later) = delayed(constrained, situation, settings, &plan) else {
                 return Judged::Refused;
             };
             let strictness = validate::Settings::default();

@@ -75,6 +75,9 @@ pub struct GoalLine {
     /// Its value, if it is not 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<Exact>,
+    /// The time by which it is to be achieved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deadline: Option<Exact>,
     /// The reason for which it is set aside while others are pursued; none if it is pursued.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aside: Option<String>,
@@ -107,6 +110,7 @@ pub(super) fn goal_lines(goals: &Goals) -> Vec<GoalLine> {
         name: given.name.clone(),
         goal: given.text.clone(),
         value: (given.value != Rational::ONE).then(|| exact(&given.value)),
+        deadline: given.deadline.as_ref().map(exact),
         aside: given.aside.clone(),
     });
     lines.collect()
@@ -117,6 +121,7 @@ pub(super) fn goals_of(lines: &[GoalLine]) -> Vec<GivenGoal> {
         name: line.name.clone(),
         text: line.goal.clone(),
         value: line.value.as_ref().map_or(Rational::ONE, |it| it.0.clone()),
+        deadline: line.deadline.as_ref().map(|it| it.0.clone()),
         aside: line.aside.clone(),
     });
     goals.collect()
