@@ -51,3 +51,44 @@ fn values_are_positive_numbers() {
     let goal = json!({"goal": "(done a1)", "value": "5/2"});
     assert_eq!(own.post("/v1/goals", &goal).0, 200);
 }
+
+#[test]
+fn goals_with_deadlines_are_achieved_or_fail() {
+    let own = simulated("deadlines");
+    own.await_state(|state| state["activity"] == "resting");
+    for (extra, wrong) in [
+        ("within", json!(0)),
+        ("within", json!(-2)),
+        ("deadline", json!("1/1000000")),
+        ("deadline", json!("soon")),
+    ] {
+        let goal = json!({"goal": "(done b2)", extra: wrong});
+        let (status, refusal) = own.post("/v1/goals", &goal);
+        assert_eq!(status, 422, "{goal}: {refusal}");
+    }
+    let both = json!({"goal": "(done b2)", "within": 5, "deadline": 1_000_000});
+    assert_eq!(own.post("/v1/goals", &both).0, 422);
+    for (name, seconds) in [("soon", "0.001"), ("later", "100000")] {
+        let (token, address) = (own.token(), own.address());
+        let executive = ["--token", &token, "--to", &address, "--json"];
+        let goal = [
+            "goal",
+            "(done b2)",
+            "--name",
+            name,
+            "--within",
+            seconds,
+            "--wait",
+        ];
+        let told = ctl(&[&executive[..], &goal].concat());
+        let text = String::from_utf8_lossy(&told.stdout).into_owned();
+        let answer: Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{told:?}"));
+        let (code, state) = if name == "soon" {
+            (1, "failed")
+        } else {
+            (0, "achieved")
+        };
+        assert_eq!(told.status.code(), Some(code), "{text}");
+        assert_eq!(answer["state"], state, "{text}");
+    }
+}

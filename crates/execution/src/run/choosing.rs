@@ -39,8 +39,7 @@ impl Choosing {
         }
     }
 
-    /// A choice among all these goals, which are tried. Goals of greater value are preferred, and then those that were
-    /// given first.
+    /// A choice among all these goals, which are tried. Goals of greater value are preferred, and then the earlier ones.
     fn among(mut goals: Vec<(String, Rational)>) -> Self {
         goals.sort_by(|(_, value), (_, other)| other.cmp(value));
         let (names, values) = goals.into_iter().unzip();
@@ -303,7 +302,8 @@ impl Run<'_> {
         self.follow(choosing, step, true)
     }
 
-    /// Sets those open goals aside that can never become true. Returns the names and values of the others.
+    /// Sets those open goals aside that can never become true. Returns the names and values of the others: first those
+    /// with deadlines, in their order.
     fn set_hopeless_goals_aside(&mut self) -> Vec<(String, Rational)> {
         self.pursue_all();
         self.note_hopeless_goals();
@@ -311,10 +311,14 @@ impl Run<'_> {
         for goal in self.lasting.iter_mut().flat_map(|it| &mut it.goals) {
             goal.aside.clone_from(&goal.hopeless);
             if goal.is_pursued() {
-                others.push((goal.name.clone(), goal.value.clone()));
+                others.push(&*goal);
             }
         }
+        others.sort_by_key(|goal| (goal.deadline.is_none(), goal.deadline.as_ref()));
+        let others = others.iter();
         others
+            .map(|goal| (goal.name.clone(), goal.value.clone()))
+            .collect()
     }
 
     /// Notes which of the goals that are pursued can never become true.
@@ -388,8 +392,8 @@ impl Run<'_> {
             step = choosing.selection.after_failure(set);
         };
         if pursued.is_empty() {
-            self.pursue_all();
-            self.announce_goals();
+            // Each that can never become true keeps its own reason at the rest.
+            self.set_hopeless_goals_aside();
             return false;
         }
         let list = self::list(&choosing, &set, &pursued);
@@ -399,7 +403,10 @@ impl Run<'_> {
             let position = choosing.position(&goal.name).unwrap_or_default();
             let why = || match &goal.hopeless {
                 Some(why) => why.clone(),
-                None if choosing.selection.is_excluded(position) => "no plan reaches it".to_owned(),
+                None if choosing.selection.is_excluded(position) => match goal.deadline {
+                    Some(_) => "no plan reaches it by its deadline".to_owned(),
+                    None => "no plan reaches it".to_owned(),
+                },
                 None if choosing.selection.is_untried(position) => {
                     format!("a plan for {list} is found first")
                 }
@@ -422,7 +429,7 @@ impl Run<'_> {
     }
 
     /// Records which goals are set aside, and which are pursued again.
-    fn announce_goals(&mut self) {
+    pub(super) fn announce_goals(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;
         };

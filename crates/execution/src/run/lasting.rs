@@ -472,6 +472,7 @@ impl<'a> Run<'a> {
         if self.choose_after(verdict) {
             return;
         }
+        self.announce_goals();
         let dead_end = match verdict {
             Verdict::Unsolvable if self.is_explaining => self.dead_end(),
             _ => Vec::new(),

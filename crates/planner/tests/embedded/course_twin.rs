@@ -14,17 +14,17 @@ use elbowroom_planner::{Answer, plan};
 use crate::world::{answer_from, describe, task};
 
 /// A source of numbers that is the same each time (Marsaglia's xorshift).
-struct Dice(u64);
+pub(crate) struct Dice(pub(crate) u64);
 
 impl Dice {
-    fn below(&mut self, end: u64) -> u64 {
+    pub(crate) fn below(&mut self, end: u64) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
         (self.0 >> 11) % end
     }
 
-    fn one<'a>(&mut self, of: &[&'a str]) -> &'a str {
+    pub(crate) fn one<'a>(&mut self, of: &[&'a str]) -> &'a str {
         let count = u64::try_from(of.len()).expect("few");
         of[usize::try_from(self.below(count)).expect("few")]
     }
@@ -45,7 +45,7 @@ const FORMS: [&str; 11] = [
     "(and (always-within {t} {c} {d}) (sometime {c}) (at-most-once {d}))",
 ];
 
-const CONDITIONS: [&str; 10] = [
+pub(crate) const CONDITIONS: [&str; 10] = [
     "(p)",
     "(q)",
     "(r)",
@@ -71,7 +71,7 @@ const EFFECTS: [&str; 9] = [
 ];
 
 /// Three actions, which last longer or not at all, and never end when another one does.
-fn domain(dice: &mut Dice) -> String {
+pub(crate) fn domain(dice: &mut Dice) -> String {
     let mut text = "(:predicates (p) (q) (r) (g)) (:functions (x))".to_owned();
     for action in 0..3 {
         let mut effects = [String::new(), String::new()];

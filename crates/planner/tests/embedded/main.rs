@@ -12,6 +12,7 @@ mod cancellation;
 mod concurrency;
 mod course;
 mod course_twin;
+mod deadlines;
 mod drains;
 mod features;
 mod memory;

@@ -106,13 +106,17 @@ impl GoalList {
         }
     }
 
-    /// No plan reaches the open goals that are pursued; none exists if it `is_certain`.
+    /// No plan reaches the open goals that are pursued; none exists if it `is_certain`. Those that are set aside even
+    /// now can never become true.
     pub(super) fn give_up(&mut self, is_certain: bool, why: &str, now: &Rational) {
-        let state = if is_certain { IMPOSSIBLE } else { UNPLANNED };
-        for goal in self.open.iter_mut().filter(|goal| goal.state == PURSUED) {
-            state.clone_into(&mut goal.state);
+        for goal in &mut self.open {
+            let is_pursued = goal.state == PURSUED;
+            let is_unplanned = is_pursued && !is_certain;
+            goal.state = if is_unplanned { UNPLANNED } else { IMPOSSIBLE }.to_owned();
             goal.since = Exact(now.clone());
-            goal.why = (!why.is_empty()).then(|| why.to_owned());
+            if is_pursued {
+                goal.why = (!why.is_empty()).then(|| why.to_owned());
+            }
         }
     }
 
