@@ -165,8 +165,8 @@ class World:
         self._version = 1
         # Whether Elbowroom is gone.
         self._is_alone = threading.Event()
-        # The wall clock's time at the world's time 0, which begins with the first thing to do: what
-        # is prepared before that takes no time.
+        # Reading of the monotonic clock at the world's time 0, which is the first message after the greeting:
+        # preparations take no time.
         self._zero: float | None = None
 
     # What a program registers.
@@ -242,7 +242,7 @@ class World:
 
     def now(self) -> float:
         """What time it is: seconds since the run began."""
-        return 0.0 if self._zero is None else (_time.time() - self._zero) * self.speed
+        return 0.0 if self._zero is None else (_time.monotonic() - self._zero) * self.speed
 
     # The conversation.
 
@@ -352,9 +352,10 @@ class World:
 
     def _begin_time(self) -> None:
         if self._zero is None:
-            self._zero = _time.time()
+            self._zero = _time.monotonic()
             if self._ledger is not None:
-                self._ledger.write(zero=self._zero)
+                # Only the wall clock continues over a restart.
+                self._ledger.write(zero=_time.time())
 
     def _greet(self, message: dict[str, Any]) -> None:
         resumed = message.get("resumed")
@@ -490,10 +491,11 @@ class World:
 
     def _remember(self, lines: list[dict[str, Any]]) -> None:
         """What happened before this program was started again."""
+        self._continue_time(lines)
         for line in lines:
             if "zero" in line:
-                self._zero = line["zero"]
-            elif "report" in line:
+                continue
+            if "report" in line:
                 self._ended[line["report"]["ticket"]] = line["report"]
             elif "ticket" in line:
                 action = Action(self, line["ticket"], line["action"], line.get("duration"))
@@ -513,6 +515,19 @@ class World:
 
         if self._resumed is not None:
             self._resumed(under_way)
+
+    def _continue_time(self, lines: list[dict[str, Any]]) -> None:
+        """Sets the world's time after a restart, by the wall clock, but not before the last time in the ledger."""
+        for line in lines:
+            if "zero" in line:
+                self._zero = _time.monotonic() - (_time.time() - line["zero"])
+        if self._zero is None:
+            return
+        times = [line.get("report", {}).get("time", line.get("start", 0.0)) for line in lines]
+        last = max(time for time in times if time is not None)
+        if self.now() < last:
+            print(f"{self.name}: the system clock was set back; time continues at {last:.3f} s", file=sys.stderr)
+            self._zero = _time.monotonic() - last / self.speed
 
     def _leave(self) -> None:
         """The run is over, or Elbowroom is gone: what runs is to stop, unless it can be resumed."""

@@ -7,6 +7,7 @@ import tempfile
 import threading
 import time
 import unittest
+from unittest import mock
 
 from elbowroom_world import Failed, Simulation, World
 
@@ -289,6 +290,21 @@ class OnTheWallClock(unittest.TestCase):
         self.assertEqual(peer.wait(1)[0], [])
 
 
+class WhenTheSystemClockIsSet(unittest.TestCase):
+    def test_time_is_monotonic(self):
+        for offset in (-3600.0, 3600.0):
+            world, wall = World(speed=100), time.time
+            peer = Peer(world)
+            peer.wait(1)
+            with mock.patch("time.time", lambda: wall() + offset):
+                before = world.now()
+                reports, now = peer.wait(before + 1)
+            self.assertEqual(reports, [])
+            self.assertGreaterEqual(now, before + 1)
+            self.assertLess(now, 100 * 1800)
+            self.assertTrue(peer.stop())
+
+
 class Simulated(unittest.TestCase):
     def test_time_jumps_to_the_next_end(self):
         world = Simulation()
@@ -361,6 +377,15 @@ class AfterACrash(unittest.TestCase):
         _, peer = self.resumed(True)
         _, now = peer.wait(0)
         self.assertGreater(now, 10)
+
+    def test_time_after_restart_is_not_before_the_ledger(self):
+        self.before()
+        wall = time.time
+        with mock.patch("time.time", lambda: wall() - 3600):
+            told, peer = self.resumed(True)
+            _, now = peer.wait(0)
+        self.assertGreaterEqual(now, told[1]["time"])
+        self.assertLess(now, 100 * 1800)
 
     def test_nothing_is_started_twice(self):
         self.before()
