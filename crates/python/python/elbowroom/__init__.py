@@ -33,6 +33,7 @@ from ._answers import (
 from ._errors import (
     BugError,
     CampaignError,
+    ClockWarning,
     DamagedWarning,
     Diagnostic,
     ElbowroomError,
@@ -96,6 +97,7 @@ __all__ = [
     "BugError",
     "CampaignError",
     "Cancel",
+    "ClockWarning",
     "Comparison",
     "Constraint",
     "DamagedWarning",

@@ -12,6 +12,7 @@ import queue
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from fractions import Fraction
@@ -19,6 +20,8 @@ from typing import Any
 
 from . import _native
 from ._calls import WorldLoop, WorldThread
+from ._clock import ClockCheck, Overdue
+from ._errors import ClockWarning
 from ._world import Action, Observation, ended, passage, wire
 
 GRACE = 5.0
@@ -77,6 +80,7 @@ class Lifecycle:
         self._failure: Exception | None = None
         self._interrupts = 0
         self._callables = 0
+        self.clock = ClockCheck()
         self.is_begun = False
         self.is_ended_early = False
 
@@ -163,7 +167,8 @@ class Lifecycle:
         future, self._pending_wait = self._pending_wait, None
         if future is None:
             future = self._begin(self._world.wait, Fraction(until))
-        if not self._await(future, self._is_closing):
+        overdue = self.clock.expect(Fraction(until))
+        if not self._await(future, self._is_closing, overdue=overdue):
             if self._is_closing:
                 raise Blocked("the world did not answer in time")
             self._pending_wait, self._is_closing = future, True
@@ -174,6 +179,7 @@ class Lifecycle:
                 self._is_closing = True
                 return self._nothing()
             passed = passage(answer)
+            self._check_clock(Fraction(until), Fraction(passed["now"]), not passed["observations"])
         except Exception:
             self.begin_end()
             raise
@@ -263,7 +269,13 @@ class Lifecycle:
     def _has_raised_interrupt(self, future: Future[Any]) -> bool:
         return isinstance(future.exception(), KeyboardInterrupt)
 
-    def _await(self, future: Future[Any], is_late: bool, last: float | None = None) -> bool:
+    def _await(
+        self,
+        future: Future[Any],
+        is_late: bool,
+        last: float | None = None,
+        overdue: Overdue | None = None,
+    ) -> bool:
         """Returns ``True`` once a call has returned, and ``False`` if it runs out of time.
 
         Calls have no time limit before the run is to end. After that, ``is_late`` calls have until ``last``, by default
@@ -284,6 +296,10 @@ class Lifecycle:
                     return False
                 self.request_end()
                 continue
+            if overdue is not None and now - begun > overdue.after and not self.is_ending:
+                self.clock.messages.append(overdue.message)
+                warnings.warn(overdue.message, ClockWarning, 2)
+                overdue = None
             try:
                 # A signal that arrives just before the wait does not end it.
                 left = POLL_INTERVAL if limit is None else limit - now
@@ -296,6 +312,13 @@ class Lifecycle:
 
     def _nothing(self) -> str:
         return json.dumps(passage((Fraction(self._now), ())))
+
+    def _check_clock(self, until: Fraction, now: Fraction, is_silent: bool) -> None:
+        # A wait that is cut short at the end of the run continues beyond its time.
+        if not self._is_closing:
+            message = self.clock.note(until, now, is_silent)
+            if message is not None:
+                warnings.warn(message, ClockWarning, 2)
 
     def _note(self, observations: Sequence[dict[str, Any]]) -> None:
         for fields in observations:

@@ -195,6 +195,8 @@ class RunRequest:
     ) -> tuple[Run, str | None]:
         answer, record, is_interrupted, raised = answered
         run = Run(document(answer), record)
+        if self._lifecycle is not None:
+            run.warnings += self._lifecycle.clock.messages
         if self._handle is not None:
             self._handle.run = run
         if isinstance(raised, Blocked):

@@ -137,7 +137,7 @@ class SteppedAdapter(World):
             taken = world.step(float(dt))
             passed = dt if taken is None else Fraction(text(taken))
             if passed <= 0:
-                # The run notices a clock that stands still.
+                # The run notices a clock that does not advance.
                 break
             world._time += passed
             self._keep_pace()
