@@ -30,7 +30,7 @@ class SteppedWorld:
     ...     def step(self, dt):
     ...         for action in [*self.left]:
     ...             self.left[action] -= dt
-    ...             if self.left[action] <= 0:
+    ...             if self.left[action] < dt / 2:
     ...                 del self.left[action]
     ...                 self.succeeded(action)
     ...     def cancel(self, action):
@@ -52,7 +52,7 @@ class SteppedWorld:
 
     @property
     def now(self) -> Fraction:
-        """The time of the simulation at the end of the last step."""
+        """The time of the simulation at the end of the step."""
         return self._time
 
     def begin(self, action: Action) -> None:
@@ -134,12 +134,15 @@ class SteppedAdapter(World):
         longest = Fraction(text(world.dt))
         while not world._reports and world._time < until:
             dt = min(longest, until - world._time)
-            taken = world.step(float(dt))
-            passed = dt if taken is None else Fraction(text(taken))
-            if passed <= 0:
+            before = world._time
+            # What is reported during a step happened by its end.
+            world._time = before + dt
+            passed = world.step(float(dt))
+            if passed is not None:
+                world._time = before + Fraction(text(passed))
+            if world._time <= before:
                 # The run notices a clock that does not advance.
                 break
-            world._time += passed
             self._keep_pace()
             if self._is_to_end() and not self._has_yielded:
                 self._has_yielded = True
