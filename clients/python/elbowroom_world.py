@@ -51,7 +51,7 @@ import time as _time
 import traceback
 from typing import Any, Callable, Iterable, TextIO
 
-__all__ = ["Action", "Failed", "Simulation", "World"]
+__all__ = ["Action", "Failed", "Simulation", "Stepped", "World"]
 
 VERSION = 2
 
@@ -613,6 +613,83 @@ class Simulation(World):
 
     def _time(self, question: dict[str, Any]) -> float:
         return self._clock
+
+
+class Stepped(World):
+    """Simulator that advances in steps; derive from it.
+
+        class Depot(Stepped):
+            def begin(self, action):
+                robots[action.arguments[0]].command(action)
+
+            def step(self, dt):
+                physics.advance(dt)
+                for action in physics.finished():
+                    action.succeeded()
+
+            def cancel(self, action):
+                robots[action.arguments[0]].halt()
+
+        Depot().run()
+
+    ``pace`` is how many of its seconds pass in one real second; without it, it runs as fast as possible. All methods
+    are called in the thread of :meth:`World.run`, one after the other. Reports may be made in any thread.
+    """
+
+    dt = 0.1
+    """Longest step, in seconds of the simulation."""
+
+    def __init__(self, name: str = "simulation", *, pace: float | None = None) -> None:
+        super().__init__(name)
+        self._clock, self._pace = 0.0, pace
+        self._does["*"] = ("stepped", self.begin)
+
+    def begin(self, action: Action) -> None:
+        """Begins an action. It may ``raise Failed(why)``; then the action does not start. An instantaneous action
+        (``duration`` is ``None``) happens here."""
+        raise NotImplementedError("a stepped world needs a method begin(action)")
+
+    def step(self, dt: float) -> float | None:
+        """Advances the simulation by ``dt`` seconds, at most :attr:`dt`. A simulator with a fixed step returns how
+        much time has passed."""
+        raise NotImplementedError("a stepped world needs a method step(dt)")
+
+    def cancel(self, action: Action) -> None:
+        """Stops a running action at once."""
+        raise NotImplementedError("a stepped world needs a method cancel(action)")
+
+    def now(self) -> float:
+        return self._clock
+
+    def _launch(self, found: tuple[str, Does], action: Action) -> None:
+        _, function = found
+        if self._call(function, action):
+            self._take({"type": "started", "ticket": action.ticket}, self._clock)
+
+    def _cancel(self, action: Action) -> None:
+        self.cancel(action)
+        self._take({"type": "ended", "ticket": action.ticket, "outcome": "cancelled"}, self._clock)
+
+    def _next(self, question: dict[str, Any] | None) -> tuple[Any, ...]:
+        if question is None or not self._inbox.empty():
+            return self._inbox.get()
+        return ("time",)
+
+    def _is_due(self, question: dict[str, Any]) -> bool:
+        until = _number(question.get("until"))
+        if self._news or until is None or self._clock >= until:
+            return True
+        before, dt = self._clock, min(self.dt, until - self._clock)
+        # Reports during a step have the time of its end.
+        self._clock = before + dt
+        passed = self.step(dt)
+        if passed is not None:
+            self._clock = before + passed
+        if self._pace is not None:
+            due = (self._zero or 0.0) + self._clock / self._pace
+            _time.sleep(max(0.0, due - _time.monotonic()))
+        # Elbowroom notices a clock that does not advance.
+        return self._inbox.empty() and not before < self._clock < until
 
 
 class _Ledger:

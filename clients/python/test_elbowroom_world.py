@@ -9,7 +9,7 @@ import time
 import unittest
 from unittest import mock
 
-from elbowroom_world import Failed, Simulation, World
+from elbowroom_world import Failed, Simulation, Stepped, World
 
 
 PIPES = []
@@ -319,6 +319,72 @@ class Simulated(unittest.TestCase):
         self.assertEqual((reports[0]["outcome"], now), ("succeeded", 10))
         self.assertEqual(peer.wait(100), ([], 100))
         self.assertTrue(peer.stop())
+
+
+class Depot(Stepped):
+    """Each action takes twice its planned duration."""
+
+    def __init__(self, **options):
+        super().__init__(**options)
+        self.left = {}
+
+    def begin(self, action):
+        if action.name == "fly":
+            raise Failed("no wings")
+        if action.duration is not None:
+            self.left[action] = 2 * action.duration
+
+    def step(self, dt):
+        for action in list(self.left):
+            self.left[action] -= dt
+            if self.left[action] <= 1e-9:
+                del self.left[action]
+                action.succeeded()
+
+    def cancel(self, action):
+        del self.left[action]
+
+
+class InSteps(unittest.TestCase):
+    def test_simulator_advances_to_the_next_end(self):
+        peer = Peer(Depot())
+        peer.start(0, duration=1.0)
+        self.assertEqual(peer.wait(100), ([{"type": "started", "ticket": 0, "time": 0.0}], 0.0))
+        ((report,), now) = peer.wait(100)
+        self.assertEqual(report["outcome"], "succeeded")
+        self.assertAlmostEqual(report["time"], 2.0)
+        self.assertAlmostEqual(now, 2.0)
+        self.assertEqual(peer.wait(5), ([], 5))
+        self.assertTrue(peer.stop())
+
+    def test_refused_cancelled_and_instantaneous_actions(self):
+        peer = Peer(Depot())
+        peer.start(0, "(fly rover)")
+        self.assertEqual(kinds(peer.wait(1)[0]), [("ended", "failed")])
+        peer.start(1, "(beep)", None)
+        self.assertEqual(kinds(peer.wait(1)[0]), [("started", None)])
+        peer.start(2)
+        self.assertEqual(kinds(peer.wait(1)[0]), [("started", None)])
+        peer.tell(type="cancel", ticket=2)
+        self.assertEqual(kinds(peer.wait(1)[0]), [("ended", "cancelled")])
+        self.assertEqual(peer.world.left, {})
+        self.assertEqual(peer.wait(10)[0], [])
+
+    def test_running_actions_are_cancelled_at_the_end(self):
+        peer = Peer(Depot(pace=100.0))
+        peer.start(0, duration=50.0)
+        peer.wait(3)
+        self.assertTrue(peer.stop())
+        self.assertEqual(peer.world.left, {})
+
+    def test_steps_of_a_fixed_length_are_counted(self):
+        class Fixed(Depot):
+            def step(self, dt):
+                super().step(0.25)
+                return 0.25
+
+        peer = Peer(Fixed())
+        self.assertEqual(peer.wait(0.6), ([], 0.75))
 
 
 class AfterACrash(unittest.TestCase):

@@ -135,7 +135,7 @@ class SteppedAdapter(World):
         while not world._reports and world._time < until:
             dt = min(longest, until - world._time)
             before = world._time
-            # What is reported during a step happened by its end.
+            # Reports during a step have the time of its end.
             world._time = before + dt
             passed = world.step(float(dt))
             if passed is not None:
