@@ -323,12 +323,12 @@ def test_faults_while_the_run_ends(
     check(run, fault)
 
 
-@pytest.mark.parametrize("is_async", [False, True])
 @pytest.mark.parametrize("method", ["start", "wait"])
-@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize(
+    ("world", "is_async"),
+    [*((name, True) for name in WORLDS), ("World", False), ("SteppedWorld", False)],
+)
 def test_raising_world_is_cancelled(problem, world: str, method: str, is_async: bool) -> None:
-    if world == "AsyncWorld" and not is_async:
-        pytest.skip("needs an event loop")
     fault = Fault("raises", method)
 
     def run() -> None:
@@ -426,3 +426,38 @@ def test_execution_is_stopped_in_order(problem, plan: Path) -> None:
                 execution_stopped = True
             execution.observe(step.until, [elbowroom.ended(it, step.until, "cancelled") for it in cancelled])
     assert step.run.verdict == "interrupted" and cancelled == begun
+
+
+CHILD = """
+import asyncio, sys, threading
+from test_lifecycle import *
+
+problem = elbowroom.read(DELIVERY / "domain.pddl", DELIVERY / "problem.pddl")
+fault, handle = Fault("ignores"), elbowroom.Stop()
+world = WORLDS[sys.argv[1]](fault)
+threading.Thread(target=lambda: (fault.is_ready.wait(), print("ready", flush=True)), daemon=True).start()
+try:
+    if isinstance(world, elbowroom.AsyncWorld):
+        asyncio.run(problem.run_async(PLAN, world=world, stop=handle))
+    else:
+        problem.run(PLAN, world=world, stop=handle)
+except KeyboardInterrupt:
+    pass
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+print(handle.run.verdict, fault.names("cancel") == STARTED, fault.names("stop") == [""])
+"""
+
+
+@pytest.mark.parametrize("signals", [2, 3])
+@pytest.mark.parametrize("world", WORLDS)
+def test_signals_to_a_process_end_its_run(world: str, signals: int) -> None:
+    command = [sys.executable, "-c", CHILD, world]
+    folder = Path(__file__).parent
+    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "ready\n"
+        for _ in range(signals):
+            child.send_signal(signal.SIGINT)
+            time.sleep(0.2)
+        rest, _ = child.communicate(timeout=HANG)
+    assert rest == "interrupted True True\n" and child.returncode == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import warnings
 from typing import Any
 
@@ -134,6 +135,8 @@ class Executable:
         Arguments and errors are those of :meth:`run`. Plans are made in a thread, so that the event loop continues.
         If the task is cancelled, the run ends in order. The :class:`asyncio.CancelledError` has it as ``run``.
         """
+        if world is None or isinstance(world, (str, os.PathLike)):
+            raise TypeError("run_async needs a world in Python; `problem.run` executes in world files")
         request = RunRequest(
             self._native,
             None if plan is None else self._plan_text(plan),

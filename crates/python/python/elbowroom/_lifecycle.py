@@ -7,6 +7,7 @@ called. A world that raises, blocks or ignores *cancel* cannot delay the end bey
 
 from __future__ import annotations
 
+import asyncio
 import json
 import queue
 import signal
@@ -130,11 +131,15 @@ class Lifecycle:
 
         return call
 
-    def on_signal(self, _number: int, _frame: object) -> None:
-        """Handles Ctrl-C."""
-        self.interrupt()
-        if self._callables:
-            raise KeyboardInterrupt
+    @property
+    def is_in_callback(self) -> bool:
+        """``True`` during calls of :meth:`foreign` callbacks."""
+        return self._callables > 0
+
+    def abandon(self) -> None:
+        """Ends the run without further waits."""
+        self._is_abandoned = True
+        self.request_end()
 
     # Calls from the native module.
 
@@ -175,7 +180,7 @@ class Lifecycle:
             return self._nothing()
         try:
             answer = self._outcome(future)
-            if self._has_raised_interrupt(future):
+            if self._is_interrupted_call(future):
                 self._is_closing = True
                 return self._nothing()
             passed = passage(answer)
@@ -221,7 +226,7 @@ class Lifecycle:
             future = self._begin(stop)
             last = (begun if since is None else since) + GRACE + STOP_TIME
             if self._await(future, True, max(last, begun + BRIEF)):
-                error = future.exception()
+                error = None if future.cancelled() else future.exception()
                 if isinstance(error, Exception):
                     self._failure = self._failure or error
         for future in self._unfinished:
@@ -261,13 +266,17 @@ class Lifecycle:
             raise
 
     def _outcome(self, future: Future[Any]) -> Any:
-        if self._has_raised_interrupt(future):
+        if future.cancelled():
+            # The event loop ends.
+            self.request_end()
+            return None
+        if isinstance(future.exception(), KeyboardInterrupt):
             self.interrupt()
             return None
         return future.result()
 
-    def _has_raised_interrupt(self, future: Future[Any]) -> bool:
-        return isinstance(future.exception(), KeyboardInterrupt)
+    def _is_interrupted_call(self, future: Future[Any]) -> bool:
+        return future.cancelled() or isinstance(future.exception(), KeyboardInterrupt)
 
     def _await(
         self,
@@ -331,18 +340,38 @@ class Lifecycle:
 
 
 class CtrlC:
-    """Passes Ctrl-C to a lifecycle while it is entered, in the main thread. Handlers of others are left alone."""
+    """Passes Ctrl-C to a lifecycle while it is entered, in the main thread.
 
-    def __init__(self, lifecycle: Lifecycle) -> None:
+    With ``takes_over``, also if there is another handler, such as that of :func:`asyncio.run`. That one receives a
+    signal at the end if there was any.
+    """
+
+    def __init__(self, lifecycle: Lifecycle, takes_over: bool = False) -> None:
         self._lifecycle = lifecycle
-        self._is_installed = False
+        self._takes_over = takes_over
+        self._previous: Any = None
+        self._is_received = False
 
     def __enter__(self) -> None:
         is_main = threading.current_thread() is threading.main_thread()
-        if is_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            signal.signal(signal.SIGINT, self._lifecycle.on_signal)
-            self._is_installed = True
+        previous = signal.getsignal(signal.SIGINT)
+        if is_main and callable(previous):
+            if self._takes_over or previous is signal.default_int_handler:
+                signal.signal(signal.SIGINT, self._receive)
+                self._previous = previous
 
     def __exit__(self, *_: object) -> None:
-        if self._is_installed:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        if self._previous is None:
+            return
+        signal.signal(signal.SIGINT, self._previous)
+        if self._takes_over and self._is_received:
+            try:
+                asyncio.get_running_loop().call_soon(signal.raise_signal, signal.SIGINT)
+            except RuntimeError:
+                pass  # the event loop is gone
+
+    def _receive(self, _number: int, _frame: object) -> None:
+        self._is_received = True
+        self._lifecycle.interrupt()
+        if not self._takes_over and self._lifecycle.is_in_callback:
+            raise KeyboardInterrupt

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 import threading
@@ -15,7 +16,7 @@ from . import _native
 from ._answers import Run
 from ._calls import WorldLoop, WorldThread, has_coroutines
 from ._errors import InterruptedWarning, RequestError, WorldError
-from ._lifecycle import GRACE, STOP_TIME, Blocked, CtrlC, Lifecycle
+from ._lifecycle import GRACE, POLL_INTERVAL, STOP_TIME, Blocked, CtrlC, Lifecycle
 from ._numbers import document, text, timeout_text
 from ._stepped import SteppedAdapter, SteppedWorld
 from ._stop import Stop
@@ -144,24 +145,13 @@ class RunRequest:
             except RuntimeError:
                 pass  # the event loop was closed meanwhile
 
-        threading.Thread(target=work, name="elbowroom-run", daemon=True).start()
-        cancelled: asyncio.CancelledError | None = None
-        deadline: float | None = None
-        while not over.done():
-            left = None if deadline is None else deadline - time.monotonic()
-            if left is not None and left <= 0:
-                break
-            try:
-                await asyncio.wait({over}, timeout=left)
-            except asyncio.CancelledError as error:
-                now, lifecycle = time.monotonic(), self._lifecycle
-                if lifecycle is None or lifecycle.is_abandoned:
-                    raise cancelled or error from None
-                lifecycle.interrupt()
-                if cancelled is None:
-                    cancelled, deadline = error, now + GRACE + STOP_TIME + _MARGIN
-                elif lifecycle.is_abandoned:
-                    deadline = now + _MARGIN
+        # No daemon: native code must not run while the interpreter is finalized.
+        threading.Thread(target=work, name="elbowroom-run").start()
+        try:
+            cancelled = await self._ended(over)
+        finally:
+            if not over.done():
+                self._abandon()
         if cancelled is None:
             run, warning = over.result()
             if warning is not None:
@@ -173,6 +163,35 @@ class RunRequest:
             run_so_far, _ = over.result()
         cancelled.run = run_so_far  # type: ignore[attr-defined]
         raise cancelled from failure
+
+    async def _ended(self, over: asyncio.Future[Any]) -> asyncio.CancelledError | None:
+        """Waits for the end of the run. Returns the first cancellation of the task."""
+        lifecycle = self._lifecycle
+        assert lifecycle is not None
+        cancelled: asyncio.CancelledError | None = None
+        deadline: float | None = None
+        with contextlib.ExitStack() as handlers:
+            while not over.done():
+                left = None if deadline is None else deadline - time.monotonic()
+                if left is not None and left <= 0:
+                    break
+                try:
+                    # A signal that arrives just before the wait does not end it.
+                    timeout = POLL_INTERVAL if left is None else min(left, POLL_INTERVAL)
+                    await asyncio.wait({over}, timeout=timeout)
+                except asyncio.CancelledError as error:
+                    now = time.monotonic()
+                    lifecycle.interrupt()
+                    if cancelled is None:
+                        cancelled, deadline = error, now + GRACE + STOP_TIME + _MARGIN
+                        handlers.enter_context(CtrlC(lifecycle, takes_over=True))
+                    elif lifecycle.is_abandoned:
+                        deadline = min(deadline or now, now) + _MARGIN
+        return cancelled
+
+    def _abandon(self) -> None:
+        if self._lifecycle is not None:
+            self._lifecycle.abandon()
 
     def _answer(self) -> tuple[str, str | None, bool, BaseException | None]:
         lifecycle, planner, progress = self._lifecycle, self._planner, self._progress
