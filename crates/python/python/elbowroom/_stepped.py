@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 
@@ -48,7 +49,7 @@ class SteppedWorld:
     def __init__(self) -> None:
         self._time = Fraction(0)
         self._running: set[int] = set()
-        self._reports: list[Observation] = []
+        self._reports: deque[Observation] = deque()
 
     @property
     def now(self) -> Fraction:
@@ -111,16 +112,15 @@ class SteppedAdapter(World):
         self._world = world
         self._is_to_end = is_to_end
         self._has_yielded = False
-        world._time, world._running, world._reports = Fraction(0), set(), []
+        world._time, world._running, world._reports = Fraction(0), set(), deque()
         self._begun = time.monotonic()
 
     def start(self, action: Action) -> None:
         world = self._world
         world._running.add(action.ticket)
-        before = len(world._reports)
         world.begin(action)
         if action.ticket in world._running:
-            world._reports.insert(before, started(action, world._time))
+            world._reports.append(started(action, world._time))
         if action.duration is None:
             world._running.discard(action.ticket)
 
@@ -147,7 +147,8 @@ class SteppedAdapter(World):
             if self._is_to_end() and not self._has_yielded:
                 self._has_yielded = True
                 break
-        reports, world._reports = world._reports, []
+        # Other threads may report meanwhile.
+        reports = [world._reports.popleft() for _ in range(len(world._reports))]
         return world._time, reports
 
     def look(self, facts: Sequence[str], fluents: Sequence[str]) -> Sequence[Observation]:
