@@ -51,7 +51,7 @@ import time as _time
 import traceback
 from typing import Any, Callable, Iterable, TextIO
 
-__all__ = ["Action", "Failed", "Simulation", "World"]
+__all__ = ["Action", "Failed", "Simulation", "Stepped", "World"]
 
 VERSION = 2
 
@@ -165,8 +165,8 @@ class World:
         self._version = 1
         # Whether Elbowroom is gone.
         self._is_alone = threading.Event()
-        # The wall clock's time at the world's time 0, which begins with the first thing to do: what
-        # is prepared before that takes no time.
+        # Reading of the monotonic clock at the world's time 0, which is the first message after the greeting:
+        # preparations take no time.
         self._zero: float | None = None
 
     # What a program registers.
@@ -242,7 +242,7 @@ class World:
 
     def now(self) -> float:
         """What time it is: seconds since the run began."""
-        return 0.0 if self._zero is None else (_time.time() - self._zero) * self.speed
+        return 0.0 if self._zero is None else (_time.monotonic() - self._zero) * self.speed
 
     # The conversation.
 
@@ -352,9 +352,10 @@ class World:
 
     def _begin_time(self) -> None:
         if self._zero is None:
-            self._zero = _time.time()
+            self._zero = _time.monotonic()
             if self._ledger is not None:
-                self._ledger.write(zero=self._zero)
+                # Only the wall clock continues over a restart.
+                self._ledger.write(zero=_time.time())
 
     def _greet(self, message: dict[str, Any]) -> None:
         resumed = message.get("resumed")
@@ -490,10 +491,11 @@ class World:
 
     def _remember(self, lines: list[dict[str, Any]]) -> None:
         """What happened before this program was started again."""
+        self._continue_time(lines)
         for line in lines:
             if "zero" in line:
-                self._zero = line["zero"]
-            elif "report" in line:
+                continue
+            if "report" in line:
                 self._ended[line["report"]["ticket"]] = line["report"]
             elif "ticket" in line:
                 action = Action(self, line["ticket"], line["action"], line.get("duration"))
@@ -513,6 +515,19 @@ class World:
 
         if self._resumed is not None:
             self._resumed(under_way)
+
+    def _continue_time(self, lines: list[dict[str, Any]]) -> None:
+        """Sets the world's time after a restart, by the wall clock, but not before the last time in the ledger."""
+        for line in lines:
+            if "zero" in line:
+                self._zero = _time.monotonic() - (_time.time() - line["zero"])
+        if self._zero is None:
+            return
+        times = [line.get("report", {}).get("time", line.get("start", 0.0)) for line in lines]
+        last = max(time for time in times if time is not None)
+        if self.now() < last:
+            print(f"{self.name}: the system clock was set back; time continues at {last:.3f} s", file=sys.stderr)
+            self._zero = _time.monotonic() - last / self.speed
 
     def _leave(self) -> None:
         """The run is over, or Elbowroom is gone: what runs is to stop, unless it can be resumed."""
@@ -598,6 +613,83 @@ class Simulation(World):
 
     def _time(self, question: dict[str, Any]) -> float:
         return self._clock
+
+
+class Stepped(World):
+    """Simulator that advances in steps; derive from it.
+
+        class Depot(Stepped):
+            def begin(self, action):
+                robots[action.arguments[0]].command(action)
+
+            def step(self, dt):
+                physics.advance(dt)
+                for action in physics.finished():
+                    action.succeeded()
+
+            def cancel(self, action):
+                robots[action.arguments[0]].halt()
+
+        Depot().run()
+
+    ``pace`` is how many of its seconds pass in one real second; without it, it runs as fast as possible. All methods
+    are called in the thread of :meth:`World.run`, one after the other. Reports may be made in any thread.
+    """
+
+    dt = 0.1
+    """Longest step, in seconds of the simulation."""
+
+    def __init__(self, name: str = "simulation", *, pace: float | None = None) -> None:
+        super().__init__(name)
+        self._clock, self._pace = 0.0, pace
+        self._does["*"] = ("stepped", self.begin)
+
+    def begin(self, action: Action) -> None:
+        """Begins an action. It may ``raise Failed(why)``; then the action does not start. An instantaneous action
+        (``duration`` is ``None``) happens here."""
+        raise NotImplementedError("a stepped world needs a method begin(action)")
+
+    def step(self, dt: float) -> float | None:
+        """Advances the simulation by ``dt`` seconds, at most :attr:`dt`. A simulator with a fixed step returns how
+        much time has passed."""
+        raise NotImplementedError("a stepped world needs a method step(dt)")
+
+    def cancel(self, action: Action) -> None:
+        """Stops a running action at once."""
+        raise NotImplementedError("a stepped world needs a method cancel(action)")
+
+    def now(self) -> float:
+        return self._clock
+
+    def _launch(self, found: tuple[str, Does], action: Action) -> None:
+        _, function = found
+        if self._call(function, action):
+            self._take({"type": "started", "ticket": action.ticket}, self._clock)
+
+    def _cancel(self, action: Action) -> None:
+        self.cancel(action)
+        self._take({"type": "ended", "ticket": action.ticket, "outcome": "cancelled"}, self._clock)
+
+    def _next(self, question: dict[str, Any] | None) -> tuple[Any, ...]:
+        if question is None or not self._inbox.empty():
+            return self._inbox.get()
+        return ("time",)
+
+    def _is_due(self, question: dict[str, Any]) -> bool:
+        until = _number(question.get("until"))
+        if self._news or until is None or self._clock >= until:
+            return True
+        before, dt = self._clock, min(self.dt, until - self._clock)
+        # Reports during a step have the time of its end.
+        self._clock = before + dt
+        passed = self.step(dt)
+        if passed is not None:
+            self._clock = before + passed
+        if self._pace is not None:
+            due = (self._zero or 0.0) + self._clock / self._pace
+            _time.sleep(max(0.0, due - _time.monotonic()))
+        # Elbowroom notices a clock that does not advance.
+        return self._inbox.empty() and not before < self._clock < until
 
 
 class _Ledger:

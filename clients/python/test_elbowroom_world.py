@@ -7,8 +7,9 @@ import tempfile
 import threading
 import time
 import unittest
+from unittest import mock
 
-from elbowroom_world import Failed, Simulation, World
+from elbowroom_world import Failed, Simulation, Stepped, World
 
 
 PIPES = []
@@ -289,6 +290,21 @@ class OnTheWallClock(unittest.TestCase):
         self.assertEqual(peer.wait(1)[0], [])
 
 
+class WhenTheSystemClockIsSet(unittest.TestCase):
+    def test_time_is_monotonic(self):
+        for offset in (-3600.0, 3600.0):
+            world, wall = World(speed=100), time.time
+            peer = Peer(world)
+            peer.wait(1)
+            with mock.patch("time.time", lambda: wall() + offset):
+                before = world.now()
+                reports, now = peer.wait(before + 1)
+            self.assertEqual(reports, [])
+            self.assertGreaterEqual(now, before + 1)
+            self.assertLess(now, 100 * 1800)
+            self.assertTrue(peer.stop())
+
+
 class Simulated(unittest.TestCase):
     def test_time_jumps_to_the_next_end(self):
         world = Simulation()
@@ -303,6 +319,72 @@ class Simulated(unittest.TestCase):
         self.assertEqual((reports[0]["outcome"], now), ("succeeded", 10))
         self.assertEqual(peer.wait(100), ([], 100))
         self.assertTrue(peer.stop())
+
+
+class Depot(Stepped):
+    """Each action takes twice its planned duration."""
+
+    def __init__(self, **options):
+        super().__init__(**options)
+        self.left = {}
+
+    def begin(self, action):
+        if action.name == "fly":
+            raise Failed("no wings")
+        if action.duration is not None:
+            self.left[action] = 2 * action.duration
+
+    def step(self, dt):
+        for action in list(self.left):
+            self.left[action] -= dt
+            if self.left[action] <= 1e-9:
+                del self.left[action]
+                action.succeeded()
+
+    def cancel(self, action):
+        del self.left[action]
+
+
+class InSteps(unittest.TestCase):
+    def test_simulator_advances_to_the_next_end(self):
+        peer = Peer(Depot())
+        peer.start(0, duration=1.0)
+        self.assertEqual(peer.wait(100), ([{"type": "started", "ticket": 0, "time": 0.0}], 0.0))
+        ((report,), now) = peer.wait(100)
+        self.assertEqual(report["outcome"], "succeeded")
+        self.assertAlmostEqual(report["time"], 2.0)
+        self.assertAlmostEqual(now, 2.0)
+        self.assertEqual(peer.wait(5), ([], 5))
+        self.assertTrue(peer.stop())
+
+    def test_refused_cancelled_and_instantaneous_actions(self):
+        peer = Peer(Depot())
+        peer.start(0, "(fly rover)")
+        self.assertEqual(kinds(peer.wait(1)[0]), [("ended", "failed")])
+        peer.start(1, "(beep)", None)
+        self.assertEqual(kinds(peer.wait(1)[0]), [("started", None)])
+        peer.start(2)
+        self.assertEqual(kinds(peer.wait(1)[0]), [("started", None)])
+        peer.tell(type="cancel", ticket=2)
+        self.assertEqual(kinds(peer.wait(1)[0]), [("ended", "cancelled")])
+        self.assertEqual(peer.world.left, {})
+        self.assertEqual(peer.wait(10)[0], [])
+
+    def test_running_actions_are_cancelled_at_the_end(self):
+        peer = Peer(Depot(pace=100.0))
+        peer.start(0, duration=50.0)
+        peer.wait(3)
+        self.assertTrue(peer.stop())
+        self.assertEqual(peer.world.left, {})
+
+    def test_steps_of_a_fixed_length_are_counted(self):
+        class Fixed(Depot):
+            def step(self, dt):
+                super().step(0.25)
+                return 0.25
+
+        peer = Peer(Fixed())
+        self.assertEqual(peer.wait(0.6), ([], 0.75))
 
 
 class AfterACrash(unittest.TestCase):
@@ -361,6 +443,15 @@ class AfterACrash(unittest.TestCase):
         _, peer = self.resumed(True)
         _, now = peer.wait(0)
         self.assertGreater(now, 10)
+
+    def test_time_after_restart_is_not_before_the_ledger(self):
+        self.before()
+        wall = time.time
+        with mock.patch("time.time", lambda: wall() - 3600):
+            told, peer = self.resumed(True)
+            _, now = peer.wait(0)
+        self.assertGreaterEqual(now, told[1]["time"])
+        self.assertLess(now, 100 * 1800)
 
     def test_nothing_is_started_twice(self):
         self.before()

@@ -214,6 +214,13 @@ pub enum Entry<'a> {
         /// The time.
         now: &'a Rational,
     },
+    /// The world failed, but can still receive commands: running actions are cancelled.
+    WorldFailed {
+        /// The time.
+        now: &'a Rational,
+        /// The error.
+        why: &'a str,
+    },
     /// The run is over.
     Over(&'a Report),
 }

@@ -65,7 +65,7 @@
 //! The rest of the running plan for goals that were added is made ready in the same way.
 //!
 //! However a run ends, nothing is left running: what has not ended is cancelled, and has
-//! [`FAREWELL`] to stop. Only a world that has failed is told nothing more.
+//! [`FAREWELL`] to stop. Only a world that can no longer be reached receives no commands.
 //!
 //! The goal is not taken as reached while anything is under way or in doubt, not before the last
 //! timed initial that changes what it reads, and not before the world has had a chance to look

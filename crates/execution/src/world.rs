@@ -62,13 +62,26 @@ pub struct Passage {
 pub struct WorldError {
     /// The error, with advice.
     pub message: String,
+    /// `true` if the world can still receive commands. Its running actions are cancelled then.
+    pub is_reachable: bool,
 }
 
 impl WorldError {
-    /// The error with that message.
+    /// Returns the error of a world that can receive no more commands.
     pub fn new(message: impl Into<String>) -> Self {
         Self {
             message: message.into(),
+            is_reachable: false,
+        }
+    }
+
+    /// Returns the same error of a world that can still receive commands.
+    #[must_use]
+    pub fn reachable(self) -> Self {
+        let is_reachable = true;
+        Self {
+            is_reachable,
+            ..self
         }
     }
 }

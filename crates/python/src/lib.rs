@@ -38,6 +38,7 @@ mod plans;
 mod recorder;
 mod run;
 mod stepper;
+mod stop;
 mod task;
 mod trouble;
 mod watch;
@@ -60,6 +61,8 @@ mod native {
     use crate::run::{executors, run};
     #[pymodule_export]
     use crate::stepper::Stepper;
+    #[pymodule_export]
+    use crate::stop::Stop;
     #[pymodule_export]
     use crate::task::{Task, read};
     #[pymodule_export]

@@ -14,6 +14,7 @@ use serde_json::{Map, Value};
 
 use crate::planner::{PyPlanner, Raised};
 use crate::recorder::Tape;
+use crate::stop::Stop;
 use crate::task::{Task, read_options, threads};
 use crate::trouble::{Trouble, guarded, json};
 use crate::watch::Watch;
@@ -53,10 +54,11 @@ pub(crate) fn run(
     has_trace: bool,
     time_limit: Option<f64>,
     progress: Option<Py<PyAny>>,
+    stop: &Stop,
 ) -> PyResult<(String, Option<String>, bool, Option<Py<PyAny>>)> {
     let (answer, trace, is_interrupted, raised) = guarded(py, || {
         let spec = problem.specification(options, plan.is_some())?;
-        let watch = Watch::start(time_limit, progress);
+        let watch = Watch::start(time_limit, progress).stopped_by(Arc::clone(&stop.flag));
         let raised = Raised::default();
         let task = problem.with_epsilon_of(&spec);
         let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;

@@ -1,6 +1,6 @@
 //! Runs that an event loop drives.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom::answers::RunAnswer;
@@ -24,6 +24,8 @@ pub(crate) struct Stepper {
     task: Arc<model::Task>,
     tape: Option<Tape>,
     raised: Raised,
+    /// Requests the end of the run.
+    stop: Arc<AtomicBool>,
 }
 
 /// The next need of a run: its kind, and its subject.
@@ -36,10 +38,10 @@ pub(crate) enum Needed {
     Over(&'static str, String, Option<String>),
 }
 
+/// The planner of an event loop is not interrupted.
+const ALWAYS: &(dyn Fn() -> bool + Sync) = &|| true;
 /// Nobody looks at a clock: how long making a plan takes in the world is said in the options.
 const NO_CLOCK: &(dyn Fn() -> Rational + Sync) = &|| Rational::ZERO;
-/// An event loop that wants no more asks nothing more.
-const ALWAYS: &(dyn Fn() -> bool + Sync) = &|| true;
 
 #[pymethods]
 impl Stepper {
@@ -57,10 +59,12 @@ impl Stepper {
             let task = problem.with_epsilon_of(&spec);
             let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
             let raised = Raised::default();
+            let stop = Arc::new(AtomicBool::new(false));
+            let is_stopped = Arc::clone(&stop);
             let mut execution = spec.execution(&task)?.beginning_with(first).explaining();
+            execution = execution.ending_when(move || is_stopped.load(Ordering::SeqCst));
             execution = if let Some(callable) = planner {
-                let flag = Arc::new(AtomicBool::new(false));
-                execution.planned_by(problem.asking(callable, flag, &raised))
+                execution.planned_by(problem.asking(callable, Arc::clone(&stop), &raised))
             } else {
                 let model = spec.model(task.problem());
                 let model = model.map_err(elbowroom::execute::SpecError::World)?;
@@ -81,6 +85,7 @@ impl Stepper {
                 task,
                 tape,
                 raised,
+                stop,
             })
         })
     }
@@ -153,6 +158,11 @@ impl Stepper {
             self.run().fail(WorldError::new(why));
             Ok(())
         })
+    }
+
+    /// Requests the end of the run.
+    fn stop(&self) {
+        self.stop.store(true, Ordering::SeqCst);
     }
 
     /// The present time, by the world's clock.

@@ -44,6 +44,15 @@ impl Watch {
         }
     }
 
+    /// Ends the work when `flag` is set.
+    pub(crate) fn stopped_by(self, flag: Arc<AtomicBool>) -> Self {
+        let interrupted = flag;
+        Self {
+            interrupted,
+            ..self
+        }
+    }
+
     /// For whoever else may see Ctrl-C: a world in Python.
     pub(crate) fn flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.interrupted)

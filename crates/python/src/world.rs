@@ -59,10 +59,21 @@ impl PyWorld {
             }
             Err(error) => {
                 let message = error.to_string();
-                self.raised = Some(error);
-                Err(WorldError::new(message))
+                self.raised.get_or_insert(error);
+                Err(WorldError::new(message).reachable())
             }
         }
+    }
+}
+
+impl PyWorld {
+    /// Notifies the Python side if its answer is invalid, as of an exception.
+    fn understood<T>(&self, answer: Result<T, WorldError>) -> Result<T, WorldError> {
+        answer.map_err(|error| {
+            // The error of the answer is the one that counts.
+            let _ = Python::attach(|py| self.adapter.call_method0(py, "begin_end").map(|_| ()));
+            error.reachable()
+        })
     }
 }
 
@@ -97,7 +108,7 @@ impl World for PyWorld {
             let observations = Vec::new();
             return Ok(Passage { now, observations });
         };
-        let passage = read_passage(&text, &self.task)?;
+        let passage = self.understood(read_passage(&text, &self.task))?;
         self.now = passage.now.clone();
         Ok(passage)
     }
@@ -112,7 +123,7 @@ impl World for PyWorld {
             self.call(py, "look", (facts, fluents), |it| it.extract::<String>())
         })?;
         match answered {
-            Some(text) => read_observations(&text, &self.task),
+            Some(text) => self.understood(read_observations(&text, &self.task)),
             None => Ok(Vec::new()),
         }
     }

@@ -8,8 +8,8 @@ import importlib
 import pytest
 from conftest import names
 
-MODULES = ["", "._answers", "._errors", "._execution", "._numbers", "._odds", "._problem",
-           "._tables", "._world"]  # fmt: skip
+MODULES = ["", "._answers", "._errors", "._executable", "._execution", "._numbers", "._odds", "._problem",
+           "._stepped", "._stop", "._tables", "._world"]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import time
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 from conftest import DELIVERY
 
 import elbowroom
+from elbowroom import _clock
 
 
 class AsPlanned(elbowroom.World):
@@ -17,6 +20,7 @@ class AsPlanned(elbowroom.World):
 
     def __init__(self, factor: Fraction = Fraction(1)) -> None:
         self.factor = factor
+        self.now = Fraction(0)
         self.coming: list[elbowroom.Observation] = []
         self.begun: list[str] = []
 
@@ -28,10 +32,10 @@ class AsPlanned(elbowroom.World):
             self.coming.append(elbowroom.ended(action, action.now + lasts))
 
     def cancel(self, action: elbowroom.Action) -> None:
-        self.coming.append(elbowroom.ended(action, action.now, "cancelled"))
+        self.coming.append(elbowroom.ended(action, self.now, "cancelled"))
 
     def wait(self, until):
-        now = min([until, *(it.time for it in self.coming)])
+        self.now = now = min([until, *(it.time for it in self.coming)])
         due = [it for it in self.coming if it.time <= now]
         self.coming = [it for it in self.coming if it.time > now]
         return now, due
@@ -128,6 +132,53 @@ def test_an_execution_refuses_what_it_has_not_asked_for(
     execution.fail("the robot is gone")
     over = execution.next_command()
     assert isinstance(over, elbowroom.Over) and over.run.verdict == "world-failed"
+
+
+class BadClock(AsPlanned):
+    """A world whose clock is wrong at the second wait."""
+
+    def __init__(self, wrong: Callable[[Fraction, Fraction], Fraction | None]) -> None:
+        super().__init__()
+        self.wrong, self.waits, self.last = wrong, 0, Fraction(0)
+
+    def wait(self, until):
+        self.waits += 1
+        now = self.wrong(self.last, until) if self.waits >= 2 else None
+        if now is not None:
+            return now, []
+        self.last, observations = super().wait(until)
+        return self.last, observations
+
+
+@pytest.mark.filterwarnings("ignore::elbowroom.ClockWarning")
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda last, until: until + 3600, "jumped from 0.000 s to"),
+        (lambda last, until: last - 3600, "went back from 0.000 s to -3600.000 s"),
+        (lambda last, until: last, "does not advance from 0.000 s"),
+    ],
+)
+def test_irregular_clock_is_a_warning(problem, plan, wrong, words) -> None:
+    with pytest.warns(elbowroom.ClockWarning, match=words):
+        try:
+            run = problem.run(plan, world=BadClock(wrong))
+        except elbowroom.WorldError as error:
+            run = error.run
+    assert any(words in warning for warning in run.warnings)
+
+
+def test_overdue_wait_is_a_warning(problem, plan, monkeypatch) -> None:
+    monkeypatch.setattr(_clock, "PATIENCE", -1000.0)
+
+    class Slow(AsPlanned):
+        def wait(self, until):
+            time.sleep(0.3)
+            return super().wait(until)
+
+    with pytest.warns(elbowroom.ClockWarning, match="has not returned from a wait"):
+        run = problem.run(plan, world=Slow())
+    assert run.verdict == "goal-reached" and run.warnings
 
 
 def test_threads_change_no_run(problem: elbowroom.Problem) -> None:

@@ -43,6 +43,8 @@ pub enum Line {
     Resting(RestingLine),
     /// Somebody asked the run to end.
     Interrupted(InterruptedLine),
+    /// The world failed; running actions are cancelled.
+    WorldFailed(WorldFailedLine),
     /// The run is over.
     Over(ReportLine),
 }
@@ -530,6 +532,16 @@ pub struct InterruptedLine {
     pub now: Exact,
 }
 
+/// The world failed, but can still receive commands: running actions are cancelled.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WorldFailedLine {
+    /// The time.
+    pub now: Exact,
+    /// The error.
+    pub why: String,
+}
+
 /// The report on a finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReportLine {
@@ -596,6 +608,7 @@ impl Line {
             Goal(&'a GoalChangeLine),
             Resting(&'a RestingLine),
             Interrupted(&'a InterruptedLine),
+            WorldFailed(&'a WorldFailedLine),
         }
 
         let named = match self {
@@ -616,6 +629,7 @@ impl Line {
             Self::Goal(line) => Named::Goal(line),
             Self::Resting(line) => Named::Resting(line),
             Self::Interrupted(line) => Named::Interrupted(line),
+            Self::WorldFailed(line) => Named::WorldFailed(line),
         };
         written(&named)
     }

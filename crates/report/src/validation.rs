@@ -223,6 +223,7 @@ impl<'a> Validation<'a> {
             | Entry::Planning { now, .. }
             | Entry::Kept { now, .. }
             | Entry::Warning { now, .. }
+            | Entry::WorldFailed { now, .. }
             | Entry::Interrupted { now } => self.pass(now),
             Entry::Goal { now, name, change } => {
                 self.pass(now);

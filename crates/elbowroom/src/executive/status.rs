@@ -331,7 +331,7 @@ impl Known {
                     }
                 }
             }
-            Entry::Kept { .. } | Entry::Interrupted { .. } => {}
+            Entry::Kept { .. } | Entry::Interrupted { .. } | Entry::WorldFailed { .. } => {}
             Entry::Goal { now, name, change } => self.goals.change(name, *change, now),
             Entry::Resting {
                 now,

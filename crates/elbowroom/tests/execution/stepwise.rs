@@ -8,11 +8,11 @@ use elbowroom::execute::{
 };
 use elbowroom::execution::run::{Next, NotAsked, Report, Run, Verdict};
 use elbowroom::execution::{
-    Answer, Executor, Passage, PlanAnswer, PlannerAnswer, RequestId, Urgency, Workers, World,
-    WorldError,
+    Answer, Command, Executor, Passage, PlanAnswer, PlannerAnswer, RequestId, Urgency, Workers,
+    World, WorldError,
 };
 use elbowroom::num::Rational;
-use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, TraceWriter};
+use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, TraceWriter};
 use elbowroom::sim::{SimWorld, Unreliable};
 
 use crate::scene::{EXECUTORS, Scene};
@@ -127,6 +127,82 @@ fn a_run_that_is_over_stays_over() {
     assert_eq!(report.verdict, Verdict::WorldFailed { why });
     run.fail(WorldError::new("it fell over again"));
     assert_eq!(run.next(), Next::Over(report));
+}
+
+/// World that fails at one call, but can still receive commands.
+struct Stumbling<'w> {
+    inner: Box<dyn World + 'w>,
+    /// Number of calls before the failure.
+    left: Option<usize>,
+}
+
+impl Stumbling<'_> {
+    fn pass_call(&mut self) -> Result<(), WorldError> {
+        match self.left {
+            Some(0) => {
+                self.left = None;
+                Err(WorldError::new("it stumbled").reachable())
+            }
+            left => {
+                self.left = left.map(|left| left - 1);
+                Ok(())
+            }
+        }
+    }
+}
+
+impl World for Stumbling<'_> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.pass_call()?;
+        self.inner.command(now, command)
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        self.pass_call()?;
+        self.inner.wait(until)
+    }
+}
+
+#[test]
+fn reachable_world_that_failed_is_cancelled_and_replayed() {
+    let scene = Scene::case("delivery");
+    let model = scene.world("");
+    let header = r#"{"event":"header","format":"elbowroom-trace","version":1}"#;
+    let mut failures = 0;
+    for executor in EXECUTORS.iter() {
+        for left in 0..12 {
+            let mut text = format!("{header}\n");
+            let mut sink = |line: &str| text.push_str(line);
+            let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
+            let mut world = Stumbling {
+                inner: model.world(&scene.task, 0),
+                left: Some(left),
+            };
+            let execution = scene.execution(executor).recorded_by(&mut writer);
+            let report = execution.run_in(&mut world);
+            if report.verdict == Verdict::GoalReached {
+                continue;
+            }
+            let why = "it stumbled".to_owned();
+            assert_eq!(report.verdict, Verdict::WorldFailed { why });
+            failures += 1;
+            assert!(text.contains("\"event\":\"world-failed\""), "{text}");
+            let running = report.executed.iter().filter(|it| it.ending.is_none());
+            assert_eq!(running.count(), 0, "{executor}, {left}");
+
+            let stored = Stored::read(&text).expect("a trace");
+            let mut replay = Replay::new(&stored, Arc::clone(&scene.task));
+            let execution = scene.execution(executor);
+            execution
+                .planned_by(ReplayPlanner::new(&stored))
+                .recorded_by(&mut replay)
+                .run_in(&mut ReplayWorld::new(&stored, &scene.task));
+            let (agreed, difference) = replay.outcome();
+            assert_eq!(difference, None, "{executor}, {left}");
+            assert_eq!(agreed, stored.lines.len(), "{executor}, {left}");
+        }
+    }
+    assert!(failures > EXECUTORS.len(), "{failures}");
 }
 
 #[test]

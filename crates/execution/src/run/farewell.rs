@@ -18,6 +18,8 @@ pub(super) struct Closing {
     dead_end: Vec<Reason>,
     /// When it ends, whatever has stopped by then.
     last: Rational,
+    /// `true` once the world has reported its time. A wait that was cut short may have left the clock of the run behind.
+    has_answered: bool,
 }
 
 impl Run<'_> {
@@ -32,8 +34,9 @@ impl Run<'_> {
         Err(Stop::Over(Verdict::Interrupted))
     }
 
-    /// Ends the run: cancels what has not ended, and gives it a moment to stop. A world that has
-    /// failed is told nothing more; one that fails meanwhile changes nothing any more.
+    /// Ends the run: cancels the running actions, and waits for their ends. A world that cannot be reached
+    /// ([`WorldError::is_reachable`](crate::WorldError)) receives no commands. A failure of the world meanwhile ends the
+    /// wait, and leaves the verdict as it is.
     pub(super) fn stop(&mut self, stop: Stop) {
         self.agenda.clear();
         self.news.clear();
@@ -42,26 +45,36 @@ impl Run<'_> {
             self.conclude();
             return;
         }
+        let mut has_left = false;
         let verdict = match stop {
             Stop::Over(verdict) if self.goes_on_after(&verdict) => {
                 self.rest(&verdict);
                 return;
             }
             Stop::Over(verdict) => verdict,
-            Stop::World(error) => Verdict::WorldFailed { why: error.message },
+            Stop::World(error) => {
+                has_left = !error.is_reachable;
+                if error.is_reachable {
+                    self.ports.recorder.record(&Entry::WorldFailed {
+                        now: &self.now,
+                        why: &error.message,
+                    });
+                }
+                Verdict::WorldFailed { why: error.message }
+            }
         };
         let dead_end = match verdict {
             Verdict::Unsolvable if self.is_explaining => self.dead_end(),
             _ => Vec::new(),
         };
-        let has_failed = matches!(verdict, Verdict::WorldFailed { .. });
         self.closing = Some(Closing {
             verdict,
             dead_end,
             last: &self.now + Rational::from(FAREWELL),
+            has_answered: false,
         });
         let open: Vec<Ticket> = self.account.open_tickets().collect();
-        if has_failed || open.is_empty() {
+        if has_left || open.is_empty() {
             self.conclude();
             return;
         }
@@ -85,6 +98,11 @@ impl Run<'_> {
     /// The world has answered to [`Self::close`].
     pub(super) fn go_on_closing(&mut self) {
         let moves_on = self.progress.note(&self.now, self.steps);
+        if let Some(closing) = &mut self.closing
+            && !std::mem::replace(&mut closing.has_answered, true)
+        {
+            closing.last = &self.now + Rational::from(FAREWELL);
+        }
         match &self.closing {
             Some(closing) if self.now < closing.last && moves_on.is_ok() => {
                 let last = closing.last.clone();

@@ -104,6 +104,10 @@ impl Log {
                 let what = "somebody asked the run to end".to_owned();
                 self.add(&line.now.0, "end", what, String::new(), String::new());
             }
+            Line::WorldFailed(line) => {
+                let what = "the world failed".to_owned();
+                self.add(&line.now.0, "end", what, String::new(), line.why.clone());
+            }
             Line::Over(report) => {
                 let why = report.why.clone().unwrap_or_default();
                 let what = report.verdict.replace('-', " ");

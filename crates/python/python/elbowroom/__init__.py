@@ -33,6 +33,7 @@ from ._answers import (
 from ._errors import (
     BugError,
     CampaignError,
+    ClockWarning,
     DamagedWarning,
     Diagnostic,
     ElbowroomError,
@@ -48,6 +49,8 @@ from ._execution import Cancel, Look, Over, Start, Stepped, Wait
 from ._odds import ActionShare, FactShare, Happening, Loss, Odds, Sampled
 from ._plans import Plans
 from ._problem import Problem, read
+from ._stepped import SteppedWorld
+from ._stop import Stop
 from ._tables import Progress
 from ._world import Action, AsyncWorld, Observation, World, ended, fact, started, value
 from .campaign import Comparison, Experiment, compare
@@ -94,6 +97,7 @@ __all__ = [
     "BugError",
     "CampaignError",
     "Cancel",
+    "ClockWarning",
     "Comparison",
     "Constraint",
     "DamagedWarning",
@@ -126,7 +130,9 @@ __all__ = [
     "Start",
     "Step",
     "Stepped",
+    "SteppedWorld",
     "Stn",
+    "Stop",
     "UndecidedError",
     "UnsupportedError",
     "Verdict",

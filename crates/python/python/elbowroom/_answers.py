@@ -424,6 +424,8 @@ class Run(Table):
         """The answer as the command has it."""
         self.trace_text: str | None = trace
         """The trace as JSON Lines, which ``elbowroom run --replay`` plays back."""
+        self.warnings: list[str] = []
+        """Warnings about the clock of a world in Python: it does not advance, jumps, or is set back."""
 
     @property
     def verdict(self) -> str:

@@ -107,5 +107,9 @@ class InterruptedWarning(UserWarning):
     """Ctrl-C has ended a search or a run early; what was found until then is the answer."""
 
 
+class ClockWarning(UserWarning):
+    """The clock of a world in Python does not advance, jumps, or is set back; see :attr:`Run.warnings`."""
+
+
 class DamagedWarning(UserWarning):
     """A part of a campaign that was kept is no longer what was written; it is made again."""

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
-import inspect
 import json
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from . import _native
 from ._answers import Run
-from ._errors import RequestError, WorldError
-from ._numbers import Number, document, text, timeout_text
-from ._world import Action, AsyncWorld, Observation, World, passage, wire
+from ._numbers import Number, document
+from ._world import Action, Observation, passage, wire
 
 
 class Start(NamedTuple):
@@ -50,36 +47,6 @@ class Over(NamedTuple):
 
 Next = Start | Cancel | Wait | Look | Over
 """What an execution needs next."""
-
-_TEXTS = ("precision", "planning_time", "realtime", "time_limit", "planner_time", "epsilon")
-
-
-def run_options(
-    executor: str, planner: object, seed: int, options: dict[str, Any]
-) -> dict[str, Any]:
-    """The specification of a run, as the native module reads it."""
-    chosen: dict[str, Any] = {"executor": executor, "seed": seed}
-    chosen["planner"] = planner if isinstance(planner, str) else "embedded"
-    if not isinstance(planner, str) and options.get("jobs") is not None:
-        raise RequestError("`jobs` says how many threads the embedded planner uses")
-    if not isinstance(planner, str) and options.get("self_overlap"):
-        raise RequestError("`self_overlap` is about plans of the embedded planner")
-    for name, value in options.items():
-        if name in _TEXTS and value is not None and value != "measured":
-            value = text(value)
-        if name == "timeout":
-            if value is None:
-                continue
-            value = timeout_text(value)
-        if name == "vary" and isinstance(value, str):
-            value = [value]
-        if name == "likelihoods" and isinstance(value, str):
-            from ._problem import named_text
-
-            file, likelihoods = named_text(value, "likelihoods")
-            value = {"name": file, "text": likelihoods}
-        chosen[name] = value
-    return chosen
 
 
 class Stepped:
@@ -136,7 +103,7 @@ class Stepped:
         Raises:
             RequestError: if nothing of that kind was asked for, or it cannot be understood.
         """
-        self._native.observe(passage((now, observations)))
+        self._native.observe(json.dumps(passage((now, observations))))
 
     def see(self, observations: Sequence[Observation] = ()) -> None:
         """What was seen of that which :class:`Look` has asked for.
@@ -146,34 +113,13 @@ class Stepped:
         """
         self._native.see(json.dumps(wire(observations)))
 
+    def stop(self) -> None:
+        """Ends the run in order: the running actions are cancelled, and their ends are awaited.
+
+        To be followed by :meth:`next_command`, until :class:`Over`.
+        """
+        self._native.stop()
+
     def fail(self, why: str) -> None:
         """The world has failed; the run ends with the verdict ``"world-failed"``."""
         self._native.fail(why)
-
-
-async def drive(execution: Stepped, world: AsyncWorld | World) -> Run:
-    """Drives an execution in a world, whose methods may be coroutines."""
-
-    async def call(made: Any) -> Any:
-        return await made if inspect.isawaitable(made) else made
-
-    while True:
-        # Plans are made in there; the loop goes on meanwhile.
-        step = await asyncio.to_thread(execution.next_command)
-        if isinstance(step, Over):
-            return step.run
-        try:
-            if isinstance(step, Start):
-                await call(world.start(step.action))
-            elif isinstance(step, Cancel):
-                await call(world.cancel(step.action))
-            elif isinstance(step, Wait):
-                now, observations = await call(world.wait(step.until))
-                execution.observe(now, observations)
-            else:
-                execution.see(await call(world.look(step.facts, step.fluents)))
-        except Exception as error:
-            execution.fail(f"{type(error).__name__}: {error}")
-            over = await asyncio.to_thread(execution.next_command)
-            run = over.run if isinstance(over, Over) else None
-            raise WorldError(f"{type(error).__name__}: {error}", run) from error

@@ -4,45 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, TypeAlias
+from typing import Any
 
 from . import _native
-from ._answers import Envelope, NoPlan, Plan, Run, Step, Stn, Verdict
-from ._errors import Diagnostic, InterruptedWarning, RequestError, WorldError, diagnostics
-from ._execution import Stepped, drive, run_options
+from ._answers import Envelope, NoPlan, Plan, Step, Stn, Verdict
+from ._errors import Diagnostic, RequestError, diagnostics
+from ._executable import Executable
 from ._numbers import Number, document, text, timeout_text
 from ._odds import Odds
 from ._plans import Plans
 from ._tables import ProgressCallback, listener
-from ._world import Adapter, AsyncWorld, World
-
-Text: TypeAlias = "str | os.PathLike[str]"
-"""A path, or a text: a str with a parenthesis or a line feed in it is a text."""
-
-AnyPlan: TypeAlias = "Plan | Stn | Text | Iterable[tuple[Any, ...]]"
-"""A plan: what :meth:`Problem.plan` or :meth:`Problem.stn` gave, a path, a text, or steps
-(start, action, duration)."""
-
-PlannerCallable: TypeAlias = Callable[[str, str], "str | Plan | None"]
-"""A planner in Python: gets the texts of a domain and a problem, returns a plan, or ``None``."""
-
-_LARGEST_FILE = 256 << 20
-
-
-def named_text(given: Text, what: str) -> tuple[str, str]:
-    """A text and its name for messages."""
-    if isinstance(given, str) and ("\n" in given or "(" in given or not given.strip()):
-        return what, given
-    if not isinstance(given, (str, os.PathLike)):
-        raise TypeError(f"the {what} must be a path or a text, not {type(given).__name__}")
-    path = os.fspath(given)
-    if os.path.getsize(path) > _LARGEST_FILE:
-        raise RequestError(f"the {what} {path} has more than 256 MB; give a text file")
-    with open(path, encoding="utf-8-sig", errors="replace") as file:
-        return path, file.read()
+from ._texts import AnyPlan, Text, box, line, named_text, seconds, warn
 
 
 def read(domain: Text, problem: Text, *, epsilon: Number = "0.001") -> Problem:
@@ -68,7 +42,7 @@ def read(domain: Text, problem: Text, *, epsilon: Number = "0.001") -> Problem:
     return Problem(native, diagnostics(found), text(epsilon))
 
 
-class Problem:
+class Problem(Executable):
     """A planning problem: what :func:`read` returns. It does not change."""
 
     def __init__(
@@ -114,7 +88,7 @@ class Problem:
             return "plan.stn", plan.text
         if isinstance(plan, (str, os.PathLike)):
             return named_text(plan, "plan")
-        return "plan", "".join(_line(step) for step in plan)
+        return "plan", "".join(line(step) for step in plan)
 
     def read_plan(self, plan: AnyPlan) -> Plan:
         """Reads a plan with fixed times, as planners print it.
@@ -202,12 +176,12 @@ class Problem:
         """
         if first is None:
             first = time_limit is None
-        limit = _seconds(time_limit)
+        limit = seconds(time_limit)
         answer, is_interrupted = self._native.plan(
             planner, limit, first, memory, jobs, self_overlap, listener(progress)
         )
         found = document(answer)
-        _warn(is_interrupted, found["answer"] == "plan")
+        warn(is_interrupted, found["answer"] == "plan")
         if found["answer"] != "plan":
             return NoPlan(found)
         return Plan.of(found)
@@ -242,7 +216,7 @@ class Problem:
         >>> plans.answer.stop
         'exhausted'
         """
-        native = _native.Plans(self._native, _seconds(time_limit), memory, jobs, self_overlap)
+        native = _native.Plans(self._native, seconds(time_limit), memory, jobs, self_overlap)
         return Plans(native)
 
     def stn(self, plan: AnyPlan) -> Stn:
@@ -331,16 +305,16 @@ class Problem:
             "growth": growth,
             "sharpen": sharpen,
             "enforce": enforce,
-            "contains": _box(contains),
+            "contains": box(contains),
             "timeout": None if timeout is None else timeout_text(timeout),
         }
         if most_checks is not None:
             options["most_checks"] = most_checks
         answer, makespans, is_interrupted = self._native.envelope(
-            self._plan_text(plan), json.dumps(options), _seconds(time_limit), listener(progress)
+            self._plan_text(plan), json.dumps(options), seconds(time_limit), listener(progress)
         )
         found = document(answer)
-        _warn(is_interrupted, found["answer"] != "none")
+        warn(is_interrupted, found["answer"] != "none")
         return Envelope(found, None if makespans is None else document(makespans))
 
     def odds(
@@ -411,170 +385,14 @@ class Problem:
             named_text(likelihoods, "likelihoods"),
             None if world is None else named_text(world, "world"),
             json.dumps(options),
-            _seconds(time_limit),
+            seconds(time_limit),
             listener(progress),
         )
         found = document(answer)
-        _warn(is_interrupted, found["answer"] != "none")
+        warn(is_interrupted, found["answer"] != "none")
         return Odds(found, svg)
-
-    def run(
-        self,
-        plan: AnyPlan | None = None,
-        *,
-        world: World | Text | None = None,
-        executor: str = "live",
-        planner: str | PlannerCallable = "embedded",
-        seed: int = 0,
-        trace: bool = True,
-        wall_time_limit: float | None = None,
-        progress: ProgressCallback | bool | None = None,
-        **options: Any,
-    ) -> Run:
-        """Executes a plan in a world: dispatches, watches, and replans.
-
-        Args:
-            plan: the plan to begin with; without one, one is made.
-            world: a :class:`World` in Python, or a world file (``docs/formats/world.md``); without
-                one, everything goes as planned.
-            executor: who decides; :func:`elbowroom.executors` lists them.
-            planner: who makes new plans: ``"embedded"``, ``"none"``, another planner's name or
-                command line, or a function of the texts of domain and problem.
-            seed: which trajectory of a simulated world.
-            trace: whether to keep the record of the run.
-            wall_time_limit: in seconds on the wall clock; then the run ends in order.
-            progress: is told of what happens; ``True`` shows a bar.
-            options: further members of a run's specification, as the header of a trace has them
-                (``docs/formats/trace.md``): ``time_limit`` and ``planning_time`` in the world's
-                seconds, ``timeout`` (as in :meth:`envelope`), ``max_replans``, ``vary``,
-                ``guarantee``, ``precision``, ``running``, ``likelihoods``, ``self_overlap``, …; and ``jobs``, the number of threads of the
-                embedded planner: 1 unless it is given, 0 for one for each processor. It changes no plan, and is no
-                part of the trace.
-
-        Returns:
-            What came of it; also when the goal was not reached. Ctrl-C ends the run in order.
-
-        Raises:
-            RequestError: if the options contradict each other.
-            WorldError: if the world raises something, which is then its cause.
-
-        >>> run = problem.run(PLAN)
-        >>> run.verdict, run.time
-        ('goal-reached', Fraction(30003, 1000))
-        """
-        chosen = run_options(executor, planner, seed, options)
-        adapter: Adapter | None = None
-        if isinstance(world, (str, os.PathLike)):
-            chosen["world"] = named_text(world, "world")[1]
-        elif isinstance(world, AsyncWorld):
-            raise TypeError("this world has coroutines; `await problem.run_async(…)`")
-        elif world is not None:
-            adapter = Adapter(world)
-            # What the world does is its own; nothing is known of it.
-            chosen["world_process"] = f"python {type(world).__qualname__}"
-        answer, record, is_interrupted, raised = _native.run(
-            self._native,
-            None if plan is None else self._plan_text(plan),
-            json.dumps(chosen),
-            adapter,
-            asked(planner),
-            trace,
-            _seconds(wall_time_limit),
-            listener(progress),
-        )
-        result = Run(document(answer), record)
-        if raised is not None:
-            raise WorldError(f"{type(raised).__name__}: {raised}", result) from raised
-        if result.verdict == "world-failed":
-            raise WorldError(f"the world broke its contract: {result.why}", result)
-        _warn(is_interrupted, True)
-        return result
-
-    def execution(
-        self,
-        plan: AnyPlan | None = None,
-        *,
-        executor: str = "live",
-        planner: str | PlannerCallable = "embedded",
-        trace: bool = True,
-        **options: Any,
-    ) -> Stepped:
-        """A run that an event loop of your own drives, step by step.
-
-        Arguments and errors are those of :meth:`run`.
-
-        >>> execution = problem.execution(PLAN)
-        >>> execution.next_command().action.name
-        '(drive rover depot shelf)'
-        """
-        chosen = run_options(executor, planner, 0, options)
-        chosen.setdefault("world_process", "python")
-        native = _native.Stepper(
-            self._native,
-            None if plan is None else self._plan_text(plan),
-            json.dumps(chosen),
-            asked(planner),
-            trace,
-        )
-        return Stepped(native)
-
-    async def run_async(
-        self, plan: AnyPlan | None = None, *, world: AsyncWorld | World, **options: Any
-    ) -> Run:
-        """Executes a plan in a world whose methods are coroutines.
-
-        Arguments and errors are those of :meth:`run`; plans are made in a thread, so that the event
-        loop goes on meanwhile.
-        """
-        return await drive(self.execution(plan, **options), world)
 
 
 def _read_again(domain: tuple[str, str], problem: tuple[str, str], epsilon: str) -> Problem:
     native, found = _native.read(domain, problem, epsilon)
     return Problem(native, diagnostics(found), epsilon)
-
-
-def asked(planner: str | PlannerCallable) -> Callable[[str, str], str | None] | None:
-    """What the native module asks for plans, if that is in Python."""
-    if isinstance(planner, str):
-        return None
-    callable_ = planner
-
-    def ask(domain: str, problem: str) -> str | None:
-        found = callable_(domain, problem)
-        if found is None or isinstance(found, NoPlan):
-            return None
-        return str(found)
-
-    return ask
-
-
-def _line(step: tuple[Any, ...]) -> str:
-    start, action, *rest = step
-    duration = rest[0] if rest else None
-    lasts = "" if duration is None else f" [{text(duration)}]"
-    return f"{text(start)}: {action}{lasts}\n"
-
-
-def _box(contains: str | dict[str, tuple[Number, Number]] | None) -> str | None:
-    if contains is None or isinstance(contains, str):
-        return contains
-    ends = {name: (text(lower), text(upper)) for name, (lower, upper) in contains.items()}
-    return " ".join(f"{name}=[{lower},{upper}]" for name, (lower, upper) in ends.items())
-
-
-def _seconds(limit: float | None) -> float | None:
-    if limit is None:
-        return None
-    seconds = float(limit)
-    if not seconds >= 0:
-        raise ValueError(f"a time limit of {limit} seconds; give a number from 0 on")
-    return seconds
-
-
-def _warn(is_interrupted: bool, has_result: bool) -> None:
-    if not is_interrupted:
-        return
-    if not has_result:
-        raise KeyboardInterrupt
-    warnings.warn("ended by Ctrl-C; this is what was found until then", InterruptedWarning, 3)

@@ -22,7 +22,8 @@ from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, STN
 
 from ._answers import Verdict
 from ._errors import UnsupportedError
-from ._problem import AnyPlan, Problem, read
+from ._problem import Problem, read
+from ._texts import AnyPlan
 from ._up_bounds import Bounds
 from ._up_expressions import Expressions, first_of
 from ._up_timed import TimedEffects

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -124,6 +123,9 @@ class World:
         """What is true of these now; nothing, if the world cannot look."""
         return ()
 
+    def stop(self) -> None:
+        """Stops everything. Called once at the end of each run, whatever has ended it."""
+
 
 class AsyncWorld:
     """A world whose methods are coroutines, for :meth:`elbowroom.Problem.run_async`."""
@@ -144,40 +146,19 @@ class AsyncWorld:
         """As :meth:`World.look`."""
         return ()
 
+    async def stop(self) -> None:
+        """As :meth:`World.stop`."""
 
-def passage(answer: tuple[Number, Sequence[Observation]]) -> str:
-    """The answer to a wait, as the native module reads it."""
+
+def passage(answer: tuple[Number, Sequence[Observation]]) -> dict[str, Any]:
+    """The answer to a wait, as the native module reads it in JSON."""
     try:
         now, observations = answer
     except (TypeError, ValueError):
         raise TypeError(
             f"wait() must return what time it is and a list of observations, not {answer!r}"
         ) from None
-    return json.dumps({"now": text(now), "observations": wire(observations)})
-
-
-class Adapter:
-    """Between the native module, which gives and takes texts, and a world."""
-
-    def __init__(self, world: World) -> None:
-        self._world = world
-        self._actions: dict[int, Action] = {}
-
-    def start(self, now: str, ticket: int, name: str, duration: str | None) -> None:
-        lasts = None if duration is None else Fraction(duration)
-        action = Action(ticket, name, lasts, Fraction(now))
-        self._actions[ticket] = action
-        self._world.start(action)
-
-    def cancel(self, _now: str, ticket: int) -> None:
-        self._world.cancel(self._actions[ticket])
-
-    def wait(self, until: str) -> str:
-        return passage(self._world.wait(Fraction(until)))
-
-    def look(self, facts: list[str], fluents: list[str]) -> str:
-        look = getattr(self._world, "look", None)
-        return json.dumps(wire(look(facts, fluents)) if look is not None else [])
+    return {"now": text(now), "observations": wire(observations)}
 
 
 __all__ = [

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import _native, _plots
 from ._errors import CampaignError, DamagedWarning, InterruptedWarning
-from ._problem import Text, named_text
+from ._texts import Text, named_text
 from ._tables import Progress, ProgressCallback, Table, html_table, listener
 
 if TYPE_CHECKING:

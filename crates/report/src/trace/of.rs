@@ -15,7 +15,7 @@ use super::line::{
     GoalChangeLine, GoalState, InstanceLine, InterruptedLine, IntervalLine, KeptLine, Line,
     LookedLine, NetworkLine, ObservationLine, ObservedLine, OrderLine, ParameterLine, PassedLine,
     PlanLine, PlannedLine, PlanningLine, ReasonLine, ReportLine, RestingLine, RunningLine,
-    SituationLine, StepLine, WarningLine, WindowLine,
+    SituationLine, StepLine, WarningLine, WindowLine, WorldFailedLine,
 };
 use crate::exact::Exact;
 
@@ -138,6 +138,10 @@ impl Line {
                 dead_end: dead_end.iter().map(ReasonLine::of).collect(),
             }),
             Entry::Interrupted { now } => Self::Interrupted(InterruptedLine { now: exact(now) }),
+            Entry::WorldFailed { now, why } => Self::WorldFailed(WorldFailedLine {
+                now: exact(now),
+                why: why.to_owned(),
+            }),
             Entry::Over(report) => Self::Over(ReportLine::of(report)),
         }
     }

@@ -141,6 +141,12 @@ impl Stored {
         over - usize::from(self.is_complete())
     }
 
+    /// Returns `true` if the world failed, but could still receive commands.
+    fn has_reachable_failure(&self) -> bool {
+        let is_failure = |line: &Line| matches!(line, Line::WorldFailed(_));
+        self.lines.iter().any(is_failure)
+    }
+
     /// The lines by their number in the file.
     fn numbered(&self) -> impl Iterator<Item = (usize, &Line)> {
         (self.first_number()..).zip(&self.lines)
@@ -184,54 +190,65 @@ impl Stored {
     }
 }
 
-/// A world that reports what a trace says it reported.
-///
-/// A world that failed fails again, with the same words.
+/// World that reports what a trace has from its world, and fails where that failed.
 pub struct ReplayWorld {
     task: Arc<Task>,
-    passages: VecDeque<(usize, Rational, Vec<ObservationLine>)>,
-    /// How the world failed at the end of the trace, if it did.
-    failure: Option<String>,
-    /// How many commands it is given after its last answer, the last of which it fails to carry out;
-    /// 0 if it carries out all of them.
-    commands: usize,
+    answers: VecDeque<Played>,
+}
+
+/// Answer of a world in a trace.
+enum Played {
+    /// Reports up to a time, with the number of the line.
+    Passage(usize, Rational, Vec<ObservationLine>),
+    /// A failure.
+    Failure {
+        error: WorldError,
+        /// Number of commands since the last answer, the last of which fails; 0 if a wait fails.
+        commands: usize,
+    },
 }
 
 impl ReplayWorld {
     /// The world of a trace.
     pub fn new(stored: &Stored, task: &Arc<Task>) -> Self {
-        let passages = stored.numbered().filter_map(|(number, line)| match line {
-            Line::Passed(PassedLine {
-                now, observations, ..
-            })
-            | Line::Looked(LookedLine { now, observations }) => {
-                Some((number, now.0.clone(), observations.clone()))
-            }
-            _ => None,
-        });
-        let failure = match stored.lines.last() {
-            Some(Line::Over(report)) if report.verdict == WORLD_FAILED => report.why.clone(),
-            _ => None,
-        };
-        let commands = match &stored.lines[..] {
-            [before @ .., _] if failure.is_some() => failed_command(before),
-            _ => 0,
-        };
+        let mut answers = VecDeque::new();
+        for (index, (number, line)) in stored.numbered().enumerate() {
+            let failure = match line {
+                Line::Passed(PassedLine {
+                    now, observations, ..
+                })
+                | Line::Looked(LookedLine { now, observations }) => {
+                    let passage = Played::Passage(number, now.0.clone(), observations.clone());
+                    answers.push_back(passage);
+                    continue;
+                }
+                Line::WorldFailed(failed) => WorldError::new(&failed.why).reachable(),
+                Line::Over(report)
+                    if report.verdict == WORLD_FAILED
+                        && index + 1 == stored.lines.len()
+                        && !stored.has_reachable_failure() =>
+                {
+                    WorldError::new(report.why.as_deref().unwrap_or(END))
+                }
+                _ => continue,
+            };
+            answers.push_back(Played::Failure {
+                error: failure,
+                commands: failed_command(&stored.lines[..index]),
+            });
+        }
         Self {
-            passages: passages.collect(),
             task: Arc::clone(task),
-            failure,
-            commands,
+            answers,
         }
     }
 
-    /// What it says when there is nothing more to be played back.
-    fn end(&self) -> WorldError {
-        WorldError::new(self.failure.as_deref().unwrap_or(END))
-    }
-
     fn next(&mut self) -> Result<Passage, WorldError> {
-        let (line, now, reported) = self.passages.pop_front().ok_or_else(|| self.end())?;
+        let (line, now, reported) = match self.answers.pop_front() {
+            Some(Played::Passage(line, now, reported)) => (line, now, reported),
+            Some(Played::Failure { error, .. }) => return Err(error),
+            None => return Err(WorldError::new(END)),
+        };
         let mut observations = Vec::with_capacity(reported.len());
         for observation in &reported {
             if let Some((event, time)) = observation.of_the_run() {
@@ -253,8 +270,8 @@ const END: &str = "the trace ends here";
 /// The verdict of a run whose world has failed.
 const WORLD_FAILED: &str = "world-failed";
 
-/// The number of commands since the last answer of the world, if these lines end with one: nothing was
-/// decided after it, so that it, or the wait for what it brings, is what failed.
+/// Returns the number of commands since the last answer of the world if these lines end with a command, and 0 otherwise.
+/// Nothing was decided after that command, so it failed, or the wait for its outcome.
 fn failed_command(lines: &[Line]) -> usize {
     let Some(Line::Command(_)) = lines.last() else {
         return 0;
@@ -268,10 +285,12 @@ fn failed_command(lines: &[Line]) -> usize {
 
 impl World for ReplayWorld {
     fn command(&mut self, _now: &Rational, _command: &Command) -> Result<(), WorldError> {
-        if self.passages.is_empty() && self.commands > 0 {
-            self.commands -= 1;
-            if self.commands == 0 {
-                return Err(self.end());
+        if let Some(Played::Failure { commands, .. }) = self.answers.front_mut()
+            && *commands > 0
+        {
+            *commands -= 1;
+            if *commands == 0 {
+                return self.next().map(|_| ());
             }
         }
         Ok(())

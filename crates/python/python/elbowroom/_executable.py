@@ -1,0 +1,148 @@
+"""Execution of plans: the methods of a problem that run them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import warnings
+from typing import Any
+
+from . import _native
+from ._answers import Run
+from ._errors import InterruptedWarning
+from ._execution import Stepped
+from ._runs import RunRequest, run_options
+from ._stepped import SteppedWorld
+from ._stop import Stop
+from ._tables import ProgressCallback, listener
+from ._texts import AnyPlan, PlannerCallable, Text, asked
+from ._world import AsyncWorld, World
+
+
+class Executable:
+    """Problem whose plans can be executed."""
+
+    _native: _native.Task
+
+    def _plan_text(self, plan: AnyPlan) -> tuple[str, str]:
+        raise NotImplementedError
+
+    def run(
+        self,
+        plan: AnyPlan | None = None,
+        *,
+        world: World | SteppedWorld | Text | None = None,
+        executor: str = "live",
+        planner: str | PlannerCallable = "embedded",
+        seed: int = 0,
+        trace: bool = True,
+        wall_time_limit: float | None = None,
+        progress: ProgressCallback | bool | None = None,
+        stop: Stop | None = None,
+        **options: Any,
+    ) -> Run:
+        """Executes a plan in a world: dispatches, watches, and replans.
+
+        Args:
+            plan: the plan to begin with; without one, one is made.
+            world: a :class:`World` or a :class:`SteppedWorld` in Python, or a world file (``docs/formats/world.md``); without
+                one, everything goes as planned.
+            executor: who decides; :func:`elbowroom.executors` lists them.
+            planner: who makes new plans: ``"embedded"``, ``"none"``, another planner's name or
+                command line, or a function of the texts of domain and problem.
+            seed: which trajectory of a simulated world.
+            trace: whether to keep the record of the run.
+            wall_time_limit: in seconds on the wall clock; then the run ends in order.
+            progress: is told of what happens; ``True`` shows a bar.
+            stop: a handle that ends the run in order, from any thread.
+            options: further members of a run's specification, as the header of a trace has them
+                (``docs/formats/trace.md``): ``time_limit`` and ``planning_time`` in the world's
+                seconds, ``timeout`` (as in :meth:`envelope`), ``max_replans``, ``vary``,
+                ``guarantee``, ``precision``, ``running``, ``likelihoods``, ``self_overlap``, …; and ``jobs``, the number of threads of the
+                embedded planner: 1 unless it is given, 0 for one for each processor. It changes no plan, and is no
+                part of the trace.
+
+        Returns:
+            What came of it; also when the goal was not reached. Ctrl-C ends the run in order: running actions are
+            cancelled, their ends are awaited for at most 5 s, and the world's ``stop`` is called. A second Ctrl-C is
+            ignored meanwhile. A third one ends the run at once.
+
+        Raises:
+            RequestError: if the options contradict each other.
+            WorldError: if the world raises something, which is then its cause.
+
+        >>> run = problem.run(PLAN)
+        >>> run.verdict, run.time
+        ('goal-reached', Fraction(30003, 1000))
+        """
+        request = RunRequest(
+            self._native,
+            None if plan is None else self._plan_text(plan),
+            world=world,
+            executor=executor,
+            planner=planner,
+            seed=seed,
+            trace=trace,
+            wall_time_limit=wall_time_limit,
+            progress=listener(progress),
+            stop=stop,
+            **options,
+        )
+        run, warning = request.execute()
+        if warning is not None:
+            warnings.warn(warning, InterruptedWarning, 2)
+        return run
+
+    def execution(
+        self,
+        plan: AnyPlan | None = None,
+        *,
+        executor: str = "live",
+        planner: str | PlannerCallable = "embedded",
+        trace: bool = True,
+        **options: Any,
+    ) -> Stepped:
+        """A run that an event loop of your own drives, step by step.
+
+        Arguments and errors are those of :meth:`run`.
+
+        >>> execution = problem.execution(PLAN)
+        >>> execution.next_command().action.name
+        '(drive rover depot shelf)'
+        """
+        chosen = run_options(executor, planner, 0, options)
+        chosen.setdefault("world_process", "python")
+        native = _native.Stepper(
+            self._native,
+            None if plan is None else self._plan_text(plan),
+            json.dumps(chosen),
+            asked(planner),
+            trace,
+        )
+        return Stepped(native)
+
+    async def run_async(
+        self,
+        plan: AnyPlan | None = None,
+        *,
+        world: AsyncWorld | World | SteppedWorld,
+        progress: ProgressCallback | bool | None = None,
+        **options: Any,
+    ) -> Run:
+        """Executes a plan in a world whose methods are coroutines.
+
+        Arguments and errors are those of :meth:`run`. Plans are made in a thread, so that the event loop continues.
+        If the task is cancelled, the run ends in order. The :class:`asyncio.CancelledError` has it as ``run``.
+        """
+        if world is None or isinstance(world, (str, os.PathLike)):
+            raise TypeError("run_async needs a world in Python; `problem.run` executes in world files")
+        request = RunRequest(
+            self._native,
+            None if plan is None else self._plan_text(plan),
+            world=world,
+            progress=listener(progress),
+            loop=asyncio.get_running_loop(),
+            **options,
+        )
+        return await request.execute_async()
