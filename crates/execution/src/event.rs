@@ -117,7 +117,7 @@ pub enum Request {
         /// Its value, a positive number: if not all goals can be reached together, those with the greatest sum of values
         /// are pursued.
         value: Rational,
-        /// The time, on the run's clock, at which the goal is given up if it has not been achieved; `None` if it may take
+        /// The time, on the run's clock, at which the goal has failed if it has not been achieved; `None` if it may take
         /// as long as it takes. Plans achieve it by then.
         deadline: Option<Rational>,
     },

@@ -163,12 +163,6 @@ impl<'a> Run<'a> {
                 Some("the value of a goal is not positive; nothing was made of it")
             }
             Request::Pursue {
-                deadline: Some(deadline),
-                ..
-            } if *deadline <= self.now => {
-                Some("the deadline of the goal has passed; nothing was made of it")
-            }
-            Request::Pursue {
                 name,
                 goal,
                 value,

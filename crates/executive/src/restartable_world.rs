@@ -1,0 +1,356 @@
+//! World process that can be started again: when a run is resumed from its journal, and when the program ends while
+//! the run continues.
+//!
+//! After a start, the program is asked about the actions that were running. Those that it does not know have failed.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom::execution::{
+    Command, Ending, Event, Observation, Passage, Ticket, World, WorldError,
+};
+use elbowroom::model::Task;
+use elbowroom::model::ground::{FactId, FluentId};
+use elbowroom::num::Rational;
+use elbowroom::num::work::Stop;
+
+use crate::belief_updates::BeliefUpdates;
+use crate::clock::Clock;
+use crate::error::{Error, WarningSink};
+use crate::process_world::{ProcessLimits, ProcessWorld};
+use crate::running_actions::RunningActions;
+
+/// Delay before the first restart. Each further one in a row takes twice as long.
+const FIRST_DELAY: Duration = Duration::from_millis(500);
+
+/// Longest delay before a restart.
+const LONGEST_DELAY: Duration = Duration::from_secs(30);
+
+/// Time without a failure after which the number of restarts and the delay begin anew.
+const RELIABLE_AFTER: Duration = Duration::from_secs(600);
+
+/// Interval between two checks for a request to stop the run.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+
+/// Arguments for a start of the world process.
+pub(crate) struct Launch<'a> {
+    pub(crate) command: String,
+    pub(crate) task: &'a Arc<Task>,
+    pub(crate) limits: ProcessLimits,
+    pub(crate) stop: Stop,
+    pub(crate) warnings: WarningSink,
+}
+
+/// Computes the world's time since the last record, or returns the reason why it is unknown.
+pub(crate) type Elapsed<'a> = Box<dyn Fn() -> Result<Rational, &'static str> + Send + 'a>;
+
+/// See the module.
+pub(crate) struct RestartableWorld<'a> {
+    launch: Launch<'a>,
+    process: Option<ProcessWorld>,
+    running: RunningActions,
+    beliefs: BeliefUpdates,
+    /// Time since the end of the journal, until the process of a resumed run is started.
+    elapsed: Option<Elapsed<'a>>,
+    /// Runs since the last answer.
+    answered: Clock,
+    /// Current time of the run.
+    last: Rational,
+    /// Offset that is added to the times of a world that restarts at time 0.
+    shift: Rational,
+    /// Outcome of the actions that were running, until the run has received it.
+    news: Option<Vec<Observation>>,
+    /// Restarts since the program was last reliable, and since when it runs.
+    restarts: u32,
+    started: Clock,
+}
+
+impl<'a> RestartableWorld<'a> {
+    /// Starts the program for a new run.
+    ///
+    /// # Errors
+    /// As [`ProcessWorld::start`].
+    pub(crate) fn start(launch: Launch<'a>, beliefs: BeliefUpdates) -> Result<Self, Error> {
+        let process = ProcessWorld::start(
+            &launch.command,
+            launch.task,
+            launch.limits.clone(),
+            launch.stop.clone(),
+        )?;
+        let process = process.with_beliefs(beliefs.clone());
+        let running = RunningActions::default();
+        let mut world = Self::later(launch, running, Rational::ZERO, beliefs);
+        world.process = Some(process);
+        Ok(world)
+    }
+
+    /// Starts the program for a resumed run when it is needed first. These actions were `running` at the end of the
+    /// journal, at the time `last`.
+    pub(crate) fn resumed(
+        launch: Launch<'a>,
+        running: RunningActions,
+        (last, elapsed): (Rational, Elapsed<'a>),
+        beliefs: BeliefUpdates,
+    ) -> Self {
+        Self {
+            elapsed: Some(elapsed),
+            ..Self::later(launch, running, last, beliefs)
+        }
+    }
+
+    fn later(
+        launch: Launch<'a>,
+        running: RunningActions,
+        last: Rational,
+        beliefs: BeliefUpdates,
+    ) -> Self {
+        Self {
+            launch,
+            process: None,
+            running,
+            beliefs,
+            elapsed: None,
+            answered: Clock::start(),
+            last,
+            shift: Rational::ZERO,
+            news: None,
+            restarts: 0,
+            started: Clock::start(),
+        }
+    }
+
+    /// Records that the run has reached this time, while its journal is replayed.
+    pub(crate) fn note_time(&mut self, now: &Rational) {
+        if *now > self.last {
+            self.last.clone_from(now);
+        }
+    }
+
+    /// Stops the program, if it runs.
+    pub(crate) fn stop(self) {
+        if let Some(process) = self.process {
+            process.stop();
+        }
+    }
+
+    /// Returns the process. Starts it if it does not run, and requests the outcome of running actions.
+    fn process(&mut self) -> Result<&mut ProcessWorld, WorldError> {
+        if self.process.is_none() {
+            let launch = &self.launch;
+            let resumed = self.running.message(&self.last);
+            let world = ProcessWorld::resume(
+                &launch.command,
+                launch.task,
+                launch.limits.clone(),
+                launch.stop.clone(),
+                (&resumed, self.running.given()),
+            );
+            let world = world.map_err(|error| WorldError::new(error.message()))?;
+            self.process = Some(world.with_beliefs(self.beliefs.clone()));
+            self.started = Clock::start();
+            self.reconcile()?;
+        }
+        let missing = || WorldError::new("the world is not there");
+        self.process.as_mut().ok_or_else(missing)
+    }
+
+    /// Requests the outcome of running actions, and repeats cancellations.
+    fn reconcile(&mut self) -> Result<(), WorldError> {
+        let Some(world) = &mut self.process else {
+            return Ok(());
+        };
+        let tickets = self.running.tickets();
+        let (passage, knows) = world.recall(&tickets)?;
+        let is_resumed = self.elapsed.is_some();
+        if !knows {
+            // The clock of the world restarts at 0. That of the run has advanced with the wall clock, except for
+            // simulations.
+            let elapsed = match self.elapsed.take() {
+                Some(elapsed) => elapsed(),
+                None => Ok(self.answered.seconds()),
+            };
+            self.shift = match elapsed {
+                Ok(elapsed) => &self.last + elapsed - &passage.now,
+                Err(why) => {
+                    self.launch.warnings.warn(&format!(
+                        "the run resumes at {} s, the time of the last record of its journal: {why}",
+                        self.last.to_decimal(3)
+                    ));
+                    self.last.clone()
+                }
+            };
+        }
+        self.elapsed = None;
+        self.last = (&passage.now + &self.shift).max(self.last.clone());
+        let mut news = shifted(passage.observations, &self.shift);
+        for (ticket, is_cancelled) in self.running.open() {
+            let is_told = news.iter().any(|it| is_about(&it.event, ticket));
+            if !(knows && is_told) {
+                let why = match (knows, is_resumed) {
+                    (true, _) => "the world knows nothing of it after the restart",
+                    (false, true) => {
+                        "it was under way when the run was cut off, and the world cannot say what became of it"
+                    }
+                    (false, false) => {
+                        "it was running when the world ended, and the world cannot say what became of it"
+                    }
+                };
+                news.push(failed(Ticket(ticket), &self.last, why));
+            }
+            // The world may have received the cancellation already. An action that it does not know may still run.
+            if is_cancelled || !is_told {
+                let ticket = Ticket(ticket);
+                world.command(&self.last, &Command::Cancel { ticket })?;
+            }
+        }
+        for observation in &news {
+            self.running.observe(&observation.event);
+        }
+        self.news = Some(news);
+        self.answered = Clock::start();
+        Ok(())
+    }
+
+    /// Starts the program again after a failure, as often as it may be, and returns the failure otherwise.
+    fn restart(&mut self, failure: WorldError) -> Result<(), WorldError> {
+        let mut failure = failure;
+        if self.started.elapsed() > RELIABLE_AFTER {
+            self.restarts = 0;
+        }
+        while self.restarts < self.launch.limits.restarts && !self.launch.stop.is_requested() {
+            if let Some(process) = self.process.take() {
+                process.stop();
+            }
+            let delay = FIRST_DELAY.saturating_mul(1 << self.restarts.min(16));
+            self.restarts += 1;
+            self.launch.warnings.warn(&format!(
+                "{}; the world is started again (restart {} of {})",
+                failure.message, self.restarts, self.launch.limits.restarts
+            ));
+            self.pause(delay.min(LONGEST_DELAY));
+            match self.process() {
+                Ok(_) => return Ok(()),
+                Err(error) => failure = error,
+            }
+        }
+        Err(failure)
+    }
+
+    /// Waits by the wall clock, unless the run is to stop.
+    fn pause(&self, delay: Duration) {
+        let clock = Clock::start();
+        while !self.launch.stop.is_requested() {
+            let left = delay.saturating_sub(clock.elapsed());
+            if left.is_zero() {
+                break;
+            }
+            std::thread::sleep(left.min(POLL_INTERVAL));
+        }
+    }
+
+    /// Asks the process. Returns `None` if it was started again instead.
+    fn ask<T>(
+        &mut self,
+        question: impl FnOnce(&mut ProcessWorld) -> Result<T, WorldError>,
+    ) -> Result<Option<T>, WorldError> {
+        let answer = match self.process() {
+            Ok(process) => question(process),
+            Err(error) => Err(error),
+        };
+        match answer {
+            Ok(answer) => {
+                self.answered = Clock::start();
+                Ok(Some(answer))
+            }
+            Err(failure) => self.restart(failure).map(|()| None),
+        }
+    }
+
+    /// Returns what became known at a restart, with the time.
+    fn take_news(&mut self) -> Option<Passage> {
+        let observations = self.news.take()?;
+        let now = self.last.clone();
+        Some(Passage { now, observations })
+    }
+}
+
+fn is_about(event: &Event, about: u64) -> bool {
+    match event {
+        Event::Started { ticket, .. } | Event::Ended { ticket, .. } => ticket.0 == about,
+        _ => false,
+    }
+}
+
+fn failed(ticket: Ticket, time: &Rational, why: &str) -> Observation {
+    Observation {
+        time: time.clone(),
+        event: Event::Ended {
+            ticket,
+            ending: Ending::Failed {
+                why: why.to_owned(),
+            },
+            measured: Vec::new(),
+        },
+    }
+}
+
+fn shifted(mut observations: Vec<Observation>, shift: &Rational) -> Vec<Observation> {
+    for observation in &mut observations {
+        observation.time = &observation.time + shift;
+    }
+    observations
+}
+
+impl World for RestartableWorld<'_> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        if self.process.is_none() {
+            self.ask(|_| Ok(()))?;
+        }
+        if let (Some(news), Command::Start { ticket, .. }) = (&mut self.news, command) {
+            // The decision was made before the outcome of running actions was known.
+            let why = "it was not started: the world was started again just then";
+            news.push(failed(*ticket, &self.last, why));
+            return Ok(());
+        }
+        self.running.note(command);
+        let told = (now - &self.shift).max(Rational::ZERO);
+        self.ask(|process| process.command(&told, command)).map(drop)
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        if self.process.is_none() {
+            self.ask(|_| Ok(()))?;
+        }
+        if let Some(news) = self.take_news() {
+            return Ok(news);
+        }
+        let local = until - &self.shift;
+        let Some(passage) = self.ask(|process| process.wait(&local))? else {
+            let now = self.last.clone();
+            return Ok(self.take_news().unwrap_or(Passage {
+                now,
+                observations: Vec::new(),
+            }));
+        };
+        let passage = Passage {
+            now: &passage.now + &self.shift,
+            observations: shifted(passage.observations, &self.shift),
+        };
+        self.note_time(&passage.now);
+        for observation in &passage.observations {
+            self.running.observe(&observation.event);
+        }
+        Ok(passage)
+    }
+
+    fn look(
+        &mut self,
+        facts: &[FactId],
+        fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        let seen = self.ask(|process| process.look(facts, fluents))?;
+        let mut news = self.news.take().unwrap_or_default();
+        news.extend(shifted(seen.unwrap_or_default(), &self.shift));
+        Ok(news)
+    }
+}
