@@ -311,8 +311,7 @@ impl RunHost for Executive {
 /// When the executor does not support changing goals.
 pub fn make_persistent(spec: &mut RunSpec) -> Result<(), Error> {
     spec.is_lasting = true;
-    let knows_one_goal = spec.executor.registered.name == "lookahead";
-    if knows_one_goal || spec.executor.asks_odds() {
+    if !spec.executor.supports_changing_goals() {
         return Err(Error::new(
             format!(
                 "`{}` reckons with one goal, and goals change here",
