@@ -4,7 +4,6 @@
 mod access;
 mod admission;
 mod client;
-mod page_server;
 mod stream;
 
 use std::collections::BTreeMap;
@@ -15,7 +14,6 @@ use std::time::Duration;
 
 pub use access::{AccessControl, Address, is_local_name};
 pub use client::{Response, Target, send};
-pub use page_server::PageServer;
 pub use stream::{Listener, Stream};
 
 use crate::clock::Clock;

@@ -18,7 +18,7 @@ use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use serde::de::DeserializeOwned;
 
-use super::router::{ApiError, ApiRouter};
+use super::router::{Accepted, ApiError, ApiRouter, ServedRun};
 use crate::messages::counted;
 use crate::request_queue::{ExternalRequest, RequestStatus};
 
@@ -31,6 +31,16 @@ const LONGEST_NAME: usize = 64;
 impl ApiRouter {
     /// Processes a request.
     pub(super) fn change(&self, method: &str, path: &str, body: &[u8]) -> Result<Taken, ApiError> {
+        let kind = match (method, path) {
+            ("PUT", _) | ("POST", "/v1/goals" | "/v1/facts" | "/v1/numbers") => {
+                Accepted::Everything
+            }
+            ("DELETE", _) | ("POST", "/v1/pause" | "/v1/resume") => Accepted::Pauses,
+            _ => Accepted::Nothing,
+        };
+        if let Ok(run) = self.run() {
+            run.check_accepts(kind)?;
+        }
         match (method, path) {
             ("PUT", "/v1/problem") => self.problem(read(body)?),
             ("POST", "/v1/goals") => self.goal(read(body)?),
@@ -60,7 +70,7 @@ impl ApiRouter {
         requests: Vec<ExternalRequest>,
         name: Option<String>,
     ) -> Result<Taken, ApiError> {
-        let (status, _) = self.run()?;
+        let status = &self.run()?.status;
         if self.queue().has_journal_failed() {
             return Err(journal_failed());
         }
@@ -104,7 +114,7 @@ impl ApiRouter {
     }
 
     fn goal(&self, given: NewGoal) -> Result<Taken, ApiError> {
-        let (status, task) = self.run()?;
+        let ServedRun { status, task, .. } = self.run()?;
         let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
         let read = read_goal(task, &given.goal);
         let read = read.map_err(|why| ApiError::new(422, why, help))?;
@@ -143,7 +153,7 @@ impl ApiRouter {
     }
 
     fn abandon(&self, name: &str) -> Result<Taken, ApiError> {
-        let open = self.run()?.0.goals();
+        let open = self.run()?.status.goals();
         // A pending request may add the goal.
         if !open.iter().any(|known| known == name) && self.queue().is_idle() {
             let help = match open.as_slice() {
@@ -158,7 +168,7 @@ impl ApiRouter {
     }
 
     fn fact(&self, given: &NewFact) -> Result<Taken, ApiError> {
-        let (_, task) = self.run()?;
+        let task = &self.run()?.task;
         let help = "write it as the problem does, such as (at rover base)";
         let unknown = || {
             let error = format!("the problem has no fact `{}`", given.fact.escape_debug());
@@ -174,7 +184,7 @@ impl ApiRouter {
     }
 
     fn number(&self, given: NewNumber) -> Result<Taken, ApiError> {
-        let (_, task) = self.run()?;
+        let task = &self.run()?.task;
         let unknown = || {
             let error = format!(
                 "the problem has no fluent `{}`",
@@ -194,14 +204,18 @@ impl ApiRouter {
     /// Starts the run with the initial problem, or changes the situation to that of a later problem with the same
     /// objects.
     fn problem(&self, given: NewProblem) -> Result<Taken, ApiError> {
-        let domain = self.domain().source();
+        let fixed = || {
+            let error = "this run has a problem of its own";
+            ApiError::new(409, error, "`elbowroom serve` accepts problems")
+        };
+        let domain = self.domain().ok_or_else(fixed)?.source();
         let read = pddl::read_problem(&domain, &Source::new("the problem", given.problem.as_str()));
         let (problem, _) = read.map_err(|mistakes| {
             let first = mistakes.errors().next().map(ToString::to_string);
             let help = "`elbowroom check DOMAIN PROBLEM` lists all mistakes";
             ApiError::new(422, first.unwrap_or_default(), help)
         })?;
-        let Ok((status, task)) = self.run() else {
+        let Ok(ServedRun { status, task, .. }) = self.run() else {
             let taken = self.initial_problem().give(given.problem)?;
             let until = (!taken).then(|| "it is read".to_owned());
             let name = None;
