@@ -7,8 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use elbowroom::answers::{Halt, Watcher};
-use elbowroom::execute::{RunSpec, misfit, read_goal};
-use elbowroom::execution::Request;
+use elbowroom::execute::RunSpec;
 use elbowroom::execution::run::PlanningTime;
 use elbowroom::executive::Status;
 use elbowroom::executive::documents::State;
@@ -26,6 +25,7 @@ use crate::journal::{JournalFile, Segments};
 use crate::messages::plain;
 use crate::operator::OperatorInterface;
 use crate::process_world::ProcessLimits;
+use crate::request_check::check;
 use crate::request_queue::{ExternalRequest, RequestQueue, RequestStatus};
 use crate::resume::{InterruptedRun, ResumeSettings};
 use crate::run::{JournaledOutcome, RunError, RunHost, RunInputs};
@@ -160,13 +160,13 @@ impl Executive {
     /// Submits a request, and waits until the run accepts it, for at most `timeout`.
     ///
     /// # Errors
-    /// When a goal is invalid, a fact or fluent is unknown, or the queue is full.
+    /// When a goal, its name or its value is invalid, a fact or fluent is unknown, or the queue is full.
     pub fn submit(
         &self,
         request: ExternalRequest,
         timeout: Duration,
     ) -> Result<RequestStatus, Error> {
-        self.check(&request)?;
+        check(&request, &self.checks)?;
         let number = self.queue.submit(vec![request]).ok_or_else(|| {
             Error::new(
                 "too many requests wait for the executive",
@@ -174,40 +174,6 @@ impl Executive {
             )
         })?;
         Ok(self.queue.wait_until_accepted(number, timeout))
-    }
-
-    fn check(&self, request: &ExternalRequest) -> Result<(), Error> {
-        let task = &self.checks;
-        match request {
-            ExternalRequest::Request(Request::Pursue { goal, .. }) => {
-                let help = "write a condition as in the section :goal, such as (at rover base)";
-                let read = read_goal(task, goal).map_err(|why| Error::new(why, help))?;
-                match misfit(task.problem(), &read) {
-                    Some(why) => Err(Error::new(why, help)),
-                    None => Ok(()),
-                }
-            }
-            ExternalRequest::Request(_) => Ok(()),
-            ExternalRequest::Fact { fact, .. } => {
-                let is_known = task
-                    .fact_named(fact)
-                    .is_some_and(|fact| !task.is_derived(fact));
-                is_known.then_some(()).ok_or_else(|| {
-                    Error::new(
-                        format!("the problem has no fact `{fact}` that can be reported"),
-                        "write it as in the problem, such as (at rover base)",
-                    )
-                })
-            }
-            ExternalRequest::Number { fluent, .. } => {
-                task.fluent_named(fluent).map(drop).ok_or_else(|| {
-                    Error::new(
-                        format!("the problem has no fluent `{fluent}`"),
-                        "write it as in the problem, such as (charge rover)",
-                    )
-                })
-            }
-        }
     }
 
     /// Returns the state of the run: activity, goals, running actions, believed facts and numbers.

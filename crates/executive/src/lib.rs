@@ -35,6 +35,7 @@ pub mod messages;
 pub mod operator;
 pub mod process_world;
 pub mod realtime;
+mod request_check;
 pub mod request_queue;
 pub mod resume;
 pub mod run;

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use elbowroom::execute::{misfit, read_goal};
 use elbowroom::execution::Request;
 use elbowroom::execution::run::FIRST_GOAL;
 use elbowroom::executive::documents::{
@@ -19,14 +18,13 @@ use elbowroom::pddl::{self, Source};
 use serde::de::DeserializeOwned;
 
 use super::router::{Accepted, ApiError, ApiRouter, ServedRun};
+use crate::error::Error;
 use crate::messages::counted;
+use crate::request_check::check;
 use crate::request_queue::{ExternalRequest, RequestStatus};
 
 /// Time limit for a client to wait until the run accepts its request.
 const ACCEPT_TIMEOUT: Duration = Duration::from_secs(2);
-
-/// Limit on the name of a goal, in bytes.
-const LONGEST_NAME: usize = 64;
 
 impl ApiRouter {
     /// Processes a request.
@@ -45,7 +43,7 @@ impl ApiRouter {
             ("PUT", "/v1/problem") => self.problem(read(body)?),
             ("POST", "/v1/goals") => self.goal(read(body)?),
             ("DELETE", path) => self.abandon(path.trim_start_matches("/v1/goals/")),
-            ("POST", "/v1/facts") => self.fact(&read(body)?),
+            ("POST", "/v1/facts") => self.fact(read(body)?),
             ("POST", "/v1/numbers") => self.number(read(body)?),
             ("POST", "/v1/pause") => {
                 self.submit(vec![ExternalRequest::Request(Request::Pause)], None)
@@ -62,6 +60,17 @@ impl ApiRouter {
                 })
             }
         }
+    }
+
+    /// Submits a request of a client if it is valid.
+    fn submit_checked(
+        &self,
+        request: ExternalRequest,
+        name: Option<String>,
+    ) -> Result<Taken, ApiError> {
+        let invalid = |error: Error| ApiError::new(422, error.message(), error.advice());
+        check(&request, &self.run()?.task).map_err(invalid)?;
+        self.submit(vec![request], name)
     }
 
     /// Submits requests in this order, and waits up to two seconds until the run accepts them.
@@ -114,31 +123,14 @@ impl ApiRouter {
     }
 
     fn goal(&self, given: NewGoal) -> Result<Taken, ApiError> {
-        let ServedRun { status, task, .. } = self.run()?;
-        let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
-        let read = read_goal(task, &given.goal);
-        let read = read.map_err(|why| ApiError::new(422, why, help))?;
-        if let Some(why) = misfit(task.problem(), &read) {
-            return Err(ApiError::new(422, why, help));
-        }
-        let name = given.name.map(checked_name).transpose()?;
-        let name = name.unwrap_or_else(|| self.new_name(&status.goals()));
-        let goal = given.goal.trim().to_owned();
-        let value = given.value.map_or(Rational::ONE, |value| value.0);
-        if !value.is_positive() {
-            let help = "give a positive number, such as 2.5";
-            return Err(ApiError::new(
-                422,
-                "the value of a goal is not positive",
-                help,
-            ));
-        }
+        let open = self.run()?.status.goals();
+        let name = given.name.unwrap_or_else(|| self.new_name(&open));
         let request = Request::Pursue {
             name: name.clone(),
-            goal,
-            value,
+            goal: given.goal.trim().to_owned(),
+            value: given.value.map_or(Rational::ONE, |value| value.0),
         };
-        self.submit(vec![ExternalRequest::Request(request)], Some(name))
+        self.submit_checked(ExternalRequest::Request(request), Some(name))
     }
 
     /// Returns a name that no open goal has.
@@ -167,38 +159,14 @@ impl ApiRouter {
         self.submit(vec![ExternalRequest::Request(request)], Some(name))
     }
 
-    fn fact(&self, given: &NewFact) -> Result<Taken, ApiError> {
-        let task = &self.run()?.task;
-        let help = "write it as the problem does, such as (at rover base)";
-        let unknown = || {
-            let error = format!("the problem has no fact `{}`", given.fact.escape_debug());
-            ApiError::new(422, error, help)
-        };
-        let fact = task.fact_named(&given.fact).ok_or_else(unknown)?;
-        if task.is_derived(fact) {
-            let error = format!("`{}` follows from other facts", given.fact);
-            return Err(ApiError::new(422, error, "say those instead"));
-        }
-        let (fact, becomes) = (task.fact_name(fact), given.becomes);
-        self.submit(vec![ExternalRequest::Fact { fact, becomes }], None)
+    fn fact(&self, given: NewFact) -> Result<Taken, ApiError> {
+        let (fact, becomes) = (given.fact, given.becomes);
+        self.submit_checked(ExternalRequest::Fact { fact, becomes }, None)
     }
 
     fn number(&self, given: NewNumber) -> Result<Taken, ApiError> {
-        let task = &self.run()?.task;
-        let unknown = || {
-            let error = format!(
-                "the problem has no fluent `{}`",
-                given.fluent.escape_debug()
-            );
-            ApiError::new(
-                422,
-                error,
-                "write it as the problem does, such as (charge rover)",
-            )
-        };
-        let fluent = task.fluent_named(&given.fluent).ok_or_else(unknown)?;
-        let (fluent, value) = (task.fluent_name(fluent), given.value.0);
-        self.submit(vec![ExternalRequest::Number { fluent, value }], None)
+        let (fluent, value) = (given.fluent, given.value.0);
+        self.submit_checked(ExternalRequest::Number { fluent, value }, None)
     }
 
     /// Starts the run with the initial problem, or changes the situation to that of a later problem with the same
@@ -305,19 +273,6 @@ fn timed_facts(task: &Task) -> impl Iterator<Item = FactId> {
         Change::Add(fact) | Change::Delete(fact) => Some(*fact),
         Change::Update { .. } => None,
     })
-}
-
-/// Checks that a name can be part of a path.
-fn checked_name(name: String) -> Result<String, ApiError> {
-    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
-    if name.is_empty() || name.len() > LONGEST_NAME || !name.bytes().all(is_plain) {
-        return Err(ApiError::new(
-            422,
-            "this is no name for a goal",
-            "use up to 64 letters, digits, and `-`, `_` or `.`",
-        ));
-    }
-    Ok(name)
 }
 
 /// Parses a body.
