@@ -22,6 +22,7 @@
 pub mod api;
 pub mod background_planner;
 pub mod background_preparer;
+mod background_task;
 pub mod belief_updates;
 pub mod clock;
 pub mod completion_signal;
