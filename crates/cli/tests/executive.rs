@@ -23,6 +23,8 @@ mod killed;
 mod meanwhile;
 #[path = "executive/recorded.rs"]
 mod recorded;
+#[path = "executive/single_run.rs"]
+mod single_run;
 #[path = "../../../testing/skipped.rs"]
 mod skipped;
 

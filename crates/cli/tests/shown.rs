@@ -32,9 +32,14 @@ fn a_run_for_other_viewers_is_the_same_as_a_report_of_its_trace() {
 #[test]
 fn what_cannot_be_shown_is_told_before_anything_is_done() {
     let nowhere = "/nowhere/at/all";
-    let tests: [(&[&str], &str); 4] = [
+    let tests: [(&[&str], &str); 5] = [
         (&["--perfetto", nowhere], "cannot write /nowhere/at/all"),
         (&["--realtime", "1", "--serve=east"], "it is no address"),
+        (
+            &["--realtime", "1", "--serve", "--token", nowhere],
+            "cannot read the token",
+        ),
+        // The old name of the option.
         (
             &["--realtime", "1", "--serve", "--control", nowhere],
             "cannot read the token",

@@ -1,8 +1,6 @@
 //! Planning in the background: a thread makes a plan during the run, on demand or in advance.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::{self, JoinHandle};
 
 use elbowroom::execute::{FirstPlan, RunSpec};
 use elbowroom::execution::{PlanAnswer, Planner, PlannerAnswer};
@@ -10,6 +8,7 @@ use elbowroom::model::problem::Condition;
 use elbowroom::model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom::num::work::Stop;
 
+use crate::background_task::BackgroundTask;
 use crate::clock::Clock;
 use crate::completion_signal::{Completion, CompletionSignal};
 use crate::memory_limit::MemoryLimit;
@@ -40,13 +39,11 @@ pub struct BackgroundSettings {
     pub most_memory: Option<u64>,
 }
 
-/// Planning in progress.
+/// Planning in progress. The answer is `None` if it was cancelled.
 struct Work {
     situation: Situation,
     goal: Condition,
-    is_needless: Arc<AtomicBool>,
-    is_done: Arc<AtomicBool>,
-    answer: JoinHandle<Option<PlannerAnswer>>,
+    answer: BackgroundTask<Option<PlannerAnswer>>,
 }
 
 impl Work {
@@ -56,7 +53,7 @@ impl Work {
 
     /// Waits for the answer. Returns it with the fact numbers of `task`, or `None` if planning was interrupted.
     fn answer(self, task: &Task, situation: &Situation) -> Option<PlannerAnswer> {
-        let mut made = self.answer.join().ok()??;
+        let mut made = self.answer.join()??;
         if let PlanAnswer::Plan(plan) = &made.answer {
             made.answer = PlanAnswer::Plan(renumbered(plan, task, situation)?);
         }
@@ -87,67 +84,42 @@ impl<'a> BackgroundPlanner<'a> {
 
     /// Starts a thread that makes a plan.
     fn spawn(&self, task: &Task, situation: &Situation) -> Option<Work> {
-        let is_needless = Arc::new(AtomicBool::new(false));
-        let (guard, is_done) = self.settings.signal.guard();
-        let (spec, run_stop, stop) = (
-            Arc::clone(&self.spec),
-            self.settings.stop.clone(),
-            Arc::clone(&is_needless),
-        );
+        let (spec, run_stop) = (Arc::clone(&self.spec), self.settings.stop.clone());
         let most_memory = self.settings.most_memory;
         let (own, from) = (task.with_own_table(), situation.clone());
-        let interrupted = Stop::of_this_thread();
-        let made = thread::Builder::new()
-            .name("planner".to_owned())
-            .spawn(move || {
-                let _notifies = guard;
-                interrupted.iter().for_each(Stop::obey);
-                let begun = Clock::start();
-                let clock = || begun.seconds();
-                let limit = most_memory.map(|most| Mutex::new(MemoryLimit::of(most)));
-                let is_too_much = || {
-                    limit.as_ref().is_some_and(|limit| {
-                        let mut limit = limit.lock().unwrap_or_else(PoisonError::into_inner);
-                        limit.is_exceeded()
-                    })
+        let signal = &self.settings.signal;
+        let answer = BackgroundTask::spawn("planner", signal, move |cancel| {
+            let begun = Clock::start();
+            let clock = || begun.seconds();
+            let limit = most_memory.map(|most| Mutex::new(MemoryLimit::of(most)));
+            let is_too_much = || {
+                limit.as_ref().is_some_and(|limit| {
+                    let mut limit = limit.lock().unwrap_or_else(PoisonError::into_inner);
+                    limit.is_exceeded()
+                })
+            };
+            let is_needed = || !cancel.is_requested() && !run_stop.is_requested();
+            let goes_on = || is_needed() && !is_too_much();
+            let mut planner = spec.planner_for(&own, None, &clock, &goes_on).ok()?;
+            let mut made = planner.plan(&own, &from);
+            if is_too_much() && !matches!(made.answer, PlanAnswer::Plan(_)) {
+                let most = most_memory.unwrap_or_default() >> 20;
+                made.answer = PlanAnswer::NotFound {
+                    why: format!("no plan was found with {most} MB (--planner-memory)"),
                 };
-                let is_needed = || !stop.load(Ordering::SeqCst) && !run_stop.is_requested();
-                let goes_on = || is_needed() && !is_too_much();
-                let mut planner = spec.planner_for(&own, None, &clock, &goes_on).ok()?;
-                let mut made = planner.plan(&own, &from);
-                if is_too_much() && !matches!(made.answer, PlanAnswer::Plan(_)) {
-                    let most = most_memory.unwrap_or_default() >> 20;
-                    made.answer = PlanAnswer::NotFound {
-                        why: format!("no plan was found with {most} MB (--planner-memory)"),
-                    };
-                }
-                is_needed().then_some(made)
-            });
+            }
+            is_needed().then_some(made)
+        });
         Some(Work {
             situation: situation.clone(),
             goal: task.problem().goal.clone(),
-            is_needless,
-            is_done,
-            answer: made.ok()?,
+            answer: answer?,
         })
     }
 
     /// Returns the plan that was begun in advance, if it is for this situation; cancels it otherwise.
     fn take_expected(&mut self, task: &Task, situation: &Situation) -> Option<Work> {
-        let work = self.job.take()?;
-        if work.is_for(task, situation) {
-            return Some(work);
-        }
-        work.is_needless.store(true, Ordering::SeqCst);
-        None
-    }
-}
-
-impl Drop for BackgroundPlanner<'_> {
-    fn drop(&mut self) {
-        for work in self.job.iter().chain(&self.search) {
-            work.is_needless.store(true, Ordering::SeqCst);
-        }
+        self.job.take().filter(|work| work.is_for(task, situation))
     }
 }
 
@@ -165,9 +137,7 @@ impl Planner for BackgroundPlanner<'_> {
     }
 
     fn expect(&mut self, task: &Task, situation: &Situation) {
-        if let Some(work) = self.job.take() {
-            work.is_needless.store(true, Ordering::SeqCst);
-        }
+        self.job = None;
         // A planner that compares probabilities keeps its results between plans.
         if !self.spec.executor.asks_odds() {
             self.job = self.spawn(task, situation);
@@ -179,9 +149,7 @@ impl Planner for BackgroundPlanner<'_> {
         let expected = self.take_expected(task, situation);
         self.search = expected.or_else(|| self.spawn(task, situation));
         if let Some(work) = &self.search {
-            self.settings
-                .signal
-                .arm(Arc::clone(&work.is_done), Completion::PlanMade);
+            work.answer.arm(Completion::PlanMade);
         }
         self.search.is_some()
     }
@@ -199,9 +167,7 @@ impl Planner for BackgroundPlanner<'_> {
 
     fn give_up(&mut self) {
         self.settings.signal.disarm();
-        if let Some(work) = self.search.take() {
-            work.is_needless.store(true, Ordering::SeqCst);
-        }
+        self.search = None;
     }
 }
 

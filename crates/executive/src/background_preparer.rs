@@ -2,15 +2,13 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, JoinHandle};
 
 use elbowroom::execute::{Analyst, RunSpec, SpecError, WholeRegion};
 use elbowroom::execution::executors::ExecutorSpec;
 use elbowroom::execution::{Mission, Need, PrepareError, Prepared, Preparer, Wanted};
 use elbowroom::model::{Task, TimeTriggeredPlan};
-use elbowroom::num::work::Stop;
 
+use crate::background_task::BackgroundTask;
 use crate::completion_signal::{Completion, CompletionSignal};
 
 /// Preparer that works in a thread and signals completion.
@@ -25,11 +23,8 @@ pub struct BackgroundPreparer {
     work: Option<Work>,
 }
 
-/// Preparation in progress.
-struct Work {
-    is_needless: Arc<AtomicBool>,
-    answer: JoinHandle<Option<Result<Mission, PrepareError>>>,
-}
+/// Preparation in progress. The result is `None` if it has added facts to the table of its thread.
+type Work = BackgroundTask<Option<Result<Mission, PrepareError>>>;
 
 impl BackgroundPreparer {
     /// Creates a preparer for runs of `spec`, with the completion signal of the run.
@@ -47,20 +42,14 @@ impl BackgroundPreparer {
 
     /// Starts a thread that prepares a plan and its dispatchable networks.
     fn spawn(&self, wanted: &Wanted<'_>) -> Option<Work> {
-        let is_needless = Arc::new(AtomicBool::new(false));
-        let stop = Arc::clone(&is_needless);
-        let (guard, is_done) = self.signal.guard();
         let own = wanted.task.with_own_table();
         let (plan, situation) = (wanted.plan.clone(), wanted.situation.clone());
         let (running, now, need) = (wanted.running.to_vec(), wanted.now.clone(), wanted.need);
         let (analyst, executor) = (self.analyst.clone(), self.executor.clone());
-        let interrupted = Stop::of_this_thread();
-        let made = thread::Builder::new().name("preparer".to_owned());
-        let made = made.spawn(move || {
-            let _notifies = guard;
-            interrupted.iter().for_each(Stop::obey);
+        let work = BackgroundTask::spawn("preparer", &self.signal, move |cancel| {
+            let cancel = cancel.clone();
             let mut analyst = analyst.until(move || {
-                if stop.load(Ordering::SeqCst) {
+                if cancel.is_requested() {
                     ControlFlow::Break(())
                 } else {
                     ControlFlow::Continue(())
@@ -85,12 +74,10 @@ impl BackgroundPreparer {
             }
             (size(&own) == before).then_some(mission)
         });
-        let answer = made.ok()?;
-        self.signal.arm(is_done, Completion::PlanReady);
-        Some(Work {
-            is_needless,
-            answer,
-        })
+        if let Some(work) = &work {
+            work.arm(Completion::PlanReady);
+        }
+        work
     }
 }
 
@@ -125,7 +112,7 @@ impl Preparer for BackgroundPreparer {
 
     fn collect(&mut self, wanted: &Wanted<'_>) -> Result<Mission, PrepareError> {
         self.signal.disarm();
-        let made = self.work.take().and_then(|work| work.answer.join().ok()?);
+        let made = self.work.take().and_then(|work| work.join()?);
         match made {
             Some(Ok(mission)) => Ok(Mission {
                 // With the run's own table.
@@ -139,9 +126,8 @@ impl Preparer for BackgroundPreparer {
     }
 
     fn give_up(&mut self) {
-        if let Some(work) = self.work.take() {
+        if self.work.take().is_some() {
             self.signal.disarm();
-            work.is_needless.store(true, Ordering::SeqCst);
         }
     }
 }

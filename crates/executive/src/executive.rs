@@ -7,8 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use elbowroom::answers::{Halt, Watcher};
-use elbowroom::execute::{RunSpec, misfit, obstacle_to_deadline, read_goal};
-use elbowroom::execution::Request;
+use elbowroom::execute::RunSpec;
 use elbowroom::execution::run::PlanningTime;
 use elbowroom::executive::Status;
 use elbowroom::executive::documents::State;
@@ -26,6 +25,7 @@ use crate::journal::{JournalFile, Segments};
 use crate::messages::plain;
 use crate::operator::OperatorInterface;
 use crate::process_world::ProcessLimits;
+use crate::request_check::check;
 use crate::request_queue::{ExternalRequest, RequestQueue, RequestStatus};
 use crate::resume::{InterruptedRun, ResumeSettings};
 use crate::run::{JournaledOutcome, RunError, RunHost, RunInputs};
@@ -160,13 +160,13 @@ impl Executive {
     /// Submits a request, and waits until the run accepts it, for at most `timeout`.
     ///
     /// # Errors
-    /// When a goal is invalid, a fact or fluent is unknown, or the queue is full.
+    /// When a goal, its name or its value is invalid, a fact or fluent is unknown, or the queue is full.
     pub fn submit(
         &self,
         request: ExternalRequest,
         timeout: Duration,
     ) -> Result<RequestStatus, Error> {
-        self.check(&request)?;
+        check(&request, &self.checks)?;
         let number = self.queue.submit(vec![request]).ok_or_else(|| {
             Error::new(
                 "too many requests wait for the executive",
@@ -174,44 +174,6 @@ impl Executive {
             )
         })?;
         Ok(self.queue.wait_until_accepted(number, timeout))
-    }
-
-    fn check(&self, request: &ExternalRequest) -> Result<(), Error> {
-        let task = &self.checks;
-        match request {
-            ExternalRequest::Request(Request::Pursue { goal, deadline, .. }) => {
-                let help = "write a condition as in the section :goal, such as (at rover base)";
-                let read = read_goal(task, goal).map_err(|why| Error::new(why, help))?;
-                if let Some(why) = misfit(task.problem(), &read) {
-                    return Err(Error::new(why, help));
-                }
-                let obstacle = deadline.as_ref().and(obstacle_to_deadline(task, &read));
-                match obstacle {
-                    Some(why) => Err(Error::new(why, "give the goal without a deadline")),
-                    None => Ok(()),
-                }
-            }
-            ExternalRequest::Request(_) => Ok(()),
-            ExternalRequest::Fact { fact, .. } => {
-                let is_known = task
-                    .fact_named(fact)
-                    .is_some_and(|fact| !task.is_derived(fact));
-                is_known.then_some(()).ok_or_else(|| {
-                    Error::new(
-                        format!("the problem has no fact `{fact}` that can be reported"),
-                        "write it as in the problem, such as (at rover base)",
-                    )
-                })
-            }
-            ExternalRequest::Number { fluent, .. } => {
-                task.fluent_named(fluent).map(drop).ok_or_else(|| {
-                    Error::new(
-                        format!("the problem has no fluent `{fluent}`"),
-                        "write it as in the problem, such as (charge rover)",
-                    )
-                })
-            }
-        }
     }
 
     /// Returns the state of the run: activity, goals, running actions, believed facts and numbers.
@@ -315,8 +277,7 @@ impl RunHost for Executive {
 /// When the executor does not support changing goals.
 pub fn make_persistent(spec: &mut RunSpec) -> Result<(), Error> {
     spec.is_lasting = true;
-    let knows_one_goal = spec.executor.registered.name == "lookahead";
-    if knows_one_goal || spec.executor.asks_odds() {
+    if !spec.executor.supports_changing_goals() {
         return Err(Error::new(
             format!(
                 "`{}` reckons with one goal, and goals change here",

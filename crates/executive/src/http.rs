@@ -4,74 +4,24 @@
 mod access;
 mod admission;
 mod client;
-mod page_server;
+mod request;
 mod stream;
 
-use std::collections::BTreeMap;
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Write as _};
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
 pub use access::{AccessControl, Address, is_local_name};
 pub use client::{Response, Target, send};
-pub use page_server::PageServer;
+pub use request::{Request, RequestError};
 pub use stream::{Listener, Stream};
 
-use crate::clock::Clock;
 use admission::Admission;
-
-/// Time limit for a client to send its request.
-const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
+use request::read;
 
 /// Time limit for a client to read a part of its response.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(10);
-
-/// Limit on the request line and the headers, in bytes.
-const LONGEST_HEAD: usize = 16 << 10;
-
-/// Limit on a body, in bytes.
-pub const LONGEST_BODY: usize = 4 << 20;
-
-/// Headers that must not be repeated, because readers disagree about their meaning then.
-const SINGLE: [&str; 4] = ["host", "content-length", "authorization", "origin"];
-
-/// Request of a client.
-#[derive(Debug, Default)]
-pub struct Request {
-    /// Method, such as `GET`.
-    pub method: String,
-    /// Path without the query.
-    pub path: String,
-    /// Query without the question mark; may be empty.
-    pub query: String,
-    /// Headers by name, in lower case.
-    headers: BTreeMap<String, String>,
-    /// Body; may be empty.
-    pub body: Vec<u8>,
-}
-
-impl Request {
-    /// Returns the value of a header. `name` is in lower case.
-    pub fn header(&self, name: &str) -> Option<&str> {
-        self.headers.get(name).map(String::as_str)
-    }
-}
-
-/// Rejection of a request that is malformed or not admitted.
-#[derive(Clone, Copy, Debug)]
-pub struct RequestError {
-    /// Status code of the response.
-    pub status: u16,
-    /// Reason, in lower case.
-    pub reason: &'static str,
-}
-
-impl RequestError {
-    const fn new(status: u16, reason: &'static str) -> Self {
-        Self { status, reason }
-    }
-}
 
 /// Serves clients, each in a thread of its own, until the program ends. Returns at once. `is_known` returns `true` for
 /// requests with the token; clients without it cannot exhaust their limits. `handler` writes the response.
@@ -141,107 +91,6 @@ fn reject_foreign(request: &Request) -> Result<(), RequestError> {
         ));
     }
     Ok(())
-}
-
-const CUT_OFF: RequestError = RequestError::new(400, "the request ends in the middle");
-
-/// Reads a request.
-fn read(stream: &mut Stream) -> Result<Request, RequestError> {
-    let clock = Clock::start();
-    let mut text = Vec::new();
-    let end = loop {
-        if let Some(end) = text.windows(4).position(|bytes| bytes == b"\r\n\r\n") {
-            break end;
-        }
-        if text.len() > LONGEST_HEAD {
-            return Err(RequestError::new(431, "the headers are longer than 16 KB"));
-        }
-        if read_more(stream, &mut text, &clock)? == 0 {
-            return Err(CUT_OFF);
-        }
-    };
-    let body = text.split_off(end + 4);
-    let head = String::from_utf8(text);
-    let head = head.map_err(|_| RequestError::new(400, "the headers are not UTF-8"))?;
-    let mut request = parse_head(&head)?;
-    request.body = body;
-    if request.header("transfer-encoding").is_some() {
-        return Err(RequestError::new(
-            411,
-            "a body needs a Content-Length; it cannot come in chunks",
-        ));
-    }
-    let length = match request.header("content-length") {
-        None => 0,
-        Some(length) => {
-            let length = length.parse::<usize>();
-            length.map_err(|_| RequestError::new(400, "the Content-Length is no number"))?
-        }
-    };
-    if length > LONGEST_BODY {
-        return Err(RequestError::new(413, "the body is longer than 4 MB"));
-    }
-    if request.header("expect").is_some() {
-        let _ = stream.write_all(b"HTTP/1.1 100 Continue\r\n\r\n");
-    }
-    while request.body.len() < length {
-        if read_more(stream, &mut request.body, &clock)? == 0 {
-            return Err(CUT_OFF);
-        }
-    }
-    request.body.truncate(length);
-    Ok(request)
-}
-
-/// Appends the bytes that have arrived to `text`, within the client's time limit. Returns their number.
-fn read_more(
-    stream: &mut Stream,
-    text: &mut Vec<u8>,
-    clock: &Clock,
-) -> Result<usize, RequestError> {
-    let late = RequestError::new(408, "the request was not complete after 5 seconds");
-    let left = REQUEST_TIMEOUT.saturating_sub(clock.elapsed());
-    if left.is_zero() || stream.set_read_timeout(left).is_err() {
-        return Err(late);
-    }
-    let mut bytes = [0; 8192];
-    let count = stream.read(&mut bytes).map_err(|_| late)?;
-    text.extend_from_slice(&bytes[..count]);
-    Ok(count)
-}
-
-/// Parses the request line and the headers.
-fn parse_head(head: &str) -> Result<Request, RequestError> {
-    let nonsense = || RequestError::new(400, "this is not HTTP");
-    let mut lines = head.split("\r\n");
-    let mut words = lines.next().unwrap_or_default().split(' ');
-    let (Some(method), Some(target), Some(version), None) =
-        (words.next(), words.next(), words.next(), words.next())
-    else {
-        return Err(nonsense());
-    };
-    if !version.starts_with("HTTP/1.") || !target.starts_with('/') {
-        return Err(nonsense());
-    }
-    let (path, query) = target.split_once('?').unwrap_or((target, ""));
-    let mut request = Request {
-        method: method.to_owned(),
-        path: path.to_owned(),
-        query: query.to_owned(),
-        ..Request::default()
-    };
-    for line in lines.filter(|line| !line.is_empty()) {
-        let (name, value) = line.split_once(':').ok_or_else(nonsense)?;
-        let (name, value) = (name.to_ascii_lowercase(), value.trim().to_owned());
-        let is_single = SINGLE.contains(&name.as_str());
-        if request.headers.insert(name, value).is_some() && is_single {
-            return Err(RequestError::new(
-                400,
-                "a header that may be there once is there twice",
-            ));
-        }
-    }
-    Ok(request)
 }
 
 /// Sends a complete response. `kind` is the content type.

@@ -22,6 +22,7 @@
 pub mod api;
 pub mod background_planner;
 pub mod background_preparer;
+mod background_task;
 pub mod belief_updates;
 pub mod clock;
 pub mod completion_signal;
@@ -35,6 +36,7 @@ pub mod messages;
 pub mod operator;
 pub mod process_world;
 pub mod realtime;
+mod request_check;
 pub mod request_queue;
 pub mod resume;
 pub mod run;

@@ -25,43 +25,47 @@ pub struct OperatorInterface(Option<Channels>);
 
 #[derive(Clone)]
 struct Channels {
-    queue: RequestQueue,
-    /// Status and trace for clients of the HTTP interface.
-    published: Option<(Status, TraceBuffer)>,
+    /// Queue of a run that accepts requests.
+    queue: Option<RequestQueue>,
+    status: Status,
+    buffer: TraceBuffer,
 }
 
 impl OperatorInterface {
     /// Creates an interface with a request queue, a status and a trace buffer.
     pub fn new(queue: RequestQueue, status: Status, buffer: TraceBuffer) -> Self {
-        let published = Some((status, buffer));
-        Self(Some(Channels { queue, published }))
+        Self(Some(Channels {
+            queue: Some(queue),
+            status,
+            buffer,
+        }))
     }
 
-    /// Creates an interface with a request queue only.
-    pub fn with_queue(queue: RequestQueue) -> Self {
+    /// Creates an interface to a run that accepts no requests.
+    pub fn read_only(status: Status, buffer: TraceBuffer) -> Self {
         Self(Some(Channels {
-            queue,
-            published: None,
+            queue: None,
+            status,
+            buffer,
         }))
     }
 
     /// Publishes the snapshot at which a resumed run begins.
     pub fn begin_at(&self, snapshot: &SnapshotLine) {
-        if let Some((status, buffer)) = self.0.as_ref().and_then(|it| it.published.as_ref()) {
+        if let Some(Channels { status, buffer, .. }) = &self.0 {
             status.begin_at(snapshot);
             buffer.add(&format!("{}\n", snapshot_text(snapshot)));
         }
     }
 
-    /// Returns the request queue.
+    /// Returns the request queue of a run that accepts requests.
     pub fn queue(&self) -> Option<&RequestQueue> {
-        self.0.as_ref().map(|channels| &channels.queue)
+        self.0.as_ref()?.queue.as_ref()
     }
 
     /// Returns the published status.
     pub fn status(&self) -> Option<&Status> {
-        let published = self.0.as_ref().and_then(|it| it.published.as_ref());
-        published.map(|(status, _)| status)
+        self.0.as_ref().map(|channels| &channels.status)
     }
 
     /// Returns a callback that publishes the belief state of the run.
@@ -106,12 +110,10 @@ impl<R: Recorder> Recorder for TeeRecorder<R> {
     fn record(&mut self, entry: &Entry<'_>) {
         self.inner.record(entry);
         if let Some(channels) = &self.channels {
-            if let Some((status, buffer)) = &channels.published {
-                status.record(entry);
-                let line = Line::of(&self.task, entry);
-                buffer.add(&format!("{}\n", line.text()));
-            }
-            let queue = &channels.queue;
+            channels.status.record(entry);
+            let line = Line::of(&self.task, entry);
+            channels.buffer.add(&format!("{}\n", line.text()));
+            let Some(queue) = &channels.queue else { return };
             match entry {
                 Entry::Passed { observations, .. } => {
                     self.unprocessed = observations.len();

@@ -19,7 +19,7 @@ use elbowroom::num::work::Stop;
 use crate::clock::Clock;
 
 /// Simulated clock that runs `factor` times as fast as the wall clock.
-pub struct Pace {
+pub struct ScaledClock {
     /// Runs since the first command or question to the world.
     clock: OnceLock<Clock>,
     factor: Rational,
@@ -27,7 +27,7 @@ pub struct Pace {
     stopped: Mutex<Duration>,
 }
 
-impl Pace {
+impl ScaledClock {
     /// Creates a clock that started with `since`, or starts with the first command or question to the world.
     pub fn new(factor: &Rational, since: Option<Clock>) -> Self {
         Self {
@@ -89,12 +89,12 @@ fn on_the_wall(time: &Rational, factor: &Rational) -> Duration {
     }
 }
 
-/// World decorator that lets time pass at a pace.
+/// World decorator that lets time pass on a scaled wall clock.
 pub struct Realtime<'a> {
     /// The simulated world.
     pub inner: &'a mut dyn World,
     /// Its clock.
-    pub pace: &'a Pace,
+    pub clock: &'a ScaledClock,
     /// Request that ends a pending wait.
     pub stop: &'a Stop,
 }
@@ -104,16 +104,16 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 impl World for Realtime<'_> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
-        self.pace.begin();
+        self.clock.begin();
         self.inner.command(now, command)
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        self.pace.begin();
+        self.clock.begin();
         loop {
-            let soon = self.pace.after(POLL_INTERVAL);
+            let soon = self.clock.after(POLL_INTERVAL);
             let passage = self.inner.wait(until.min(&soon))?;
-            std::thread::sleep(self.pace.left(&passage.now));
+            std::thread::sleep(self.clock.left(&passage.now));
             let is_over = !passage.observations.is_empty() || passage.now >= *until;
             if is_over || self.stop.is_requested() {
                 return Ok(passage);
@@ -131,16 +131,16 @@ impl World for Realtime<'_> {
 }
 
 /// Planner decorator that measures or fixes the planning time in the world.
-pub struct PacedPlanner<'a> {
+pub struct TimedPlanner<'a> {
     /// The planner.
     pub inner: Box<dyn Planner + 'a>,
     /// Clock of the world.
-    pub pace: &'a Pace,
+    pub clock: &'a ScaledClock,
     /// Planning time in the world.
     pub planning_time: &'a PlanningTime,
 }
 
-impl Planner for PacedPlanner<'_> {
+impl Planner for TimedPlanner<'_> {
     fn expect(&mut self, task: &Task, situation: &Situation) {
         self.inner.expect(task, situation);
     }
@@ -162,11 +162,11 @@ impl Planner for PacedPlanner<'_> {
         let clock = Clock::start();
         let mut answer = self.inner.plan(task, situation);
         match self.planning_time {
-            PlanningTime::Measured if self.pace.has_begun() => {
-                answer.seconds = Some(clock.seconds() * &self.pace.factor);
+            PlanningTime::Measured if self.clock.has_begun() => {
+                answer.seconds = Some(clock.seconds() * &self.clock.factor);
             }
             PlanningTime::Measured => answer.seconds = Some(Rational::ZERO),
-            PlanningTime::Seconds(seconds) => self.pace.stop(clock.elapsed(), seconds),
+            PlanningTime::Seconds(seconds) => self.clock.stop(clock.elapsed(), seconds),
         }
         answer
     }
@@ -174,7 +174,7 @@ impl Planner for PacedPlanner<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Pace, on_the_wall};
+    use super::{ScaledClock, on_the_wall};
     use elbowroom::num::Rational;
     use std::time::Duration;
 
@@ -192,14 +192,14 @@ mod tests {
 
     #[test]
     fn clock_stops_while_planning_exceeds_its_time() {
-        let pace = Pace::new(&Rational::from(10), None);
-        pace.stop(Duration::from_secs(5), &Rational::ONE);
-        assert_eq!(pace.stopped(), Duration::ZERO, "it does not run yet");
-        pace.begin();
+        let clock = ScaledClock::new(&Rational::from(10), None);
+        clock.stop(Duration::from_secs(5), &Rational::ONE);
+        assert_eq!(clock.stopped(), Duration::ZERO, "it does not run yet");
+        clock.begin();
         // Two seconds of planning: three in the world, 0.3 on the wall clock.
-        pace.stop(Duration::from_secs(2), &Rational::from(3));
-        assert_eq!(pace.stopped(), Duration::from_millis(1700));
-        pace.stop(Duration::from_millis(100), &Rational::from(3));
-        assert_eq!(pace.stopped(), Duration::from_millis(1700));
+        clock.stop(Duration::from_secs(2), &Rational::from(3));
+        assert_eq!(clock.stopped(), Duration::from_millis(1700));
+        clock.stop(Duration::from_millis(100), &Rational::from(3));
+        assert_eq!(clock.stopped(), Duration::from_millis(1700));
     }
 }

@@ -24,7 +24,7 @@ use crate::journal::{JournalFile, Segments};
 use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
 use crate::operator::{InteractiveWorld, OperatorInterface};
 use crate::process_world::{ProcessLimits, ProcessWorld};
-use crate::realtime::{Pace, PacedPlanner, Realtime};
+use crate::realtime::{Realtime, ScaledClock, TimedPlanner};
 use crate::trace_buffer::TraceBuffer;
 
 /// Application that embeds a run. The defaults have neither operators nor viewers.
@@ -261,7 +261,7 @@ impl RunInputs<'_> {
         let Some(factor) = &spec.realtime else {
             return self.run(world.as_mut(), recorder, |_: &Progression| {}, watcher);
         };
-        let pace = Pace::new(factor, self.since);
+        let world_clock = ScaledClock::new(factor, self.since);
         let begun = Clock::start();
         let clock = || begun.seconds();
         let continues = || !self.background.stop.is_requested();
@@ -270,7 +270,7 @@ impl RunInputs<'_> {
             Box::new(BackgroundPlanner::new(planner, spec, &self.background));
         let world = Realtime {
             inner: world.as_mut(),
-            pace: &pace,
+            clock: &world_clock,
             stop: &self.background.stop,
         };
         let mut world = self.interactive(world, factor);
@@ -279,9 +279,9 @@ impl RunInputs<'_> {
             .beginning_with(self.first_plan)
             .told_to(self.operator.listener())
             .prepared_by(BackgroundPreparer::new(spec, task, signal)?)
-            .planned_by(PacedPlanner {
+            .planned_by(TimedPlanner {
                 inner: planner,
-                pace: &pace,
+                clock: &world_clock,
                 planning_time: &spec.planning_time,
             })
             .recorded_by(recorder);

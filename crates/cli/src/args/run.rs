@@ -197,8 +197,8 @@ pub(crate) struct RunArgs {
     #[arg(conflicts_with = "replay")]
     pub(crate) serve: Option<Address>,
     /// Let those who know the token in this file pause, cancel and stop the run on that page
-    #[arg(long, value_name = "FILE", requires = "serve")]
-    pub(crate) control: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", alias = "control", requires = "serve")]
+    pub(crate) token: Option<PathBuf>,
     /// Go on with the run of a journal, whose program has died: the world is asked what became of
     /// what was under way; all other options are taken from the journal
     #[arg(long, value_name = "FILE", conflicts_with_all = IN_THE_TRACE, conflicts_with = "replay")]

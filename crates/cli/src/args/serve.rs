@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::Resettable;
 use clap::{Args, Subcommand};
 use elbowroom::num::Rational;
 
@@ -26,7 +27,10 @@ what comes of that: docs/serve.md.")]
     .help("Run a simulated world FACTOR times as fast as the wall clock (0.000001 to 1000000000); \
            by default as fast. A world process has a clock of its own")))]
 #[command(mut_arg("serve", |it| it.hide(true)))]
-#[command(mut_arg("control", |it| it.hide(true)))]
+#[command(mut_arg("token", |it| it
+    .requires(Resettable::Reset)
+    .help("Let those who know the token in this file change something: give goals and facts, pause, \
+           stop. Without it, the executive can only be looked at")))]
 #[command(mut_arg("replay", |it| it.hide(true)))]
 pub(crate) struct ServeArgs {
     #[command(flatten)]
@@ -38,10 +42,6 @@ pub(crate) struct ServeArgs {
     /// Listen at this Unix socket, too, which is made; only its owner can reach it
     #[arg(long, value_name = "PATH")]
     pub(crate) socket: Option<PathBuf>,
-    /// Let those who know the token in this file change something: give goals and facts, pause,
-    /// stop. Without it, the executive can only be looked at
-    #[arg(long, value_name = "FILE")]
-    pub(crate) token: Option<PathBuf>,
     /// Begin the journal anew when it is as long and the executive takes up a plan, or rests with
     /// nothing under way: in bytes, or with K, M or G; 10M unless it is given. `--resume` then goes on
     /// from there

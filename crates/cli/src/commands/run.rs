@@ -1,5 +1,6 @@
 //! `elbowroom run`: execute a plan in a world.
 
+mod page;
 mod progress_line;
 mod replay;
 pub(super) mod resume;
@@ -23,11 +24,11 @@ use elbowroom_executive::Error;
 use elbowroom_executive::background_planner::BackgroundSettings;
 use elbowroom_executive::clock::Clock;
 use elbowroom_executive::completion_signal::CompletionSignal;
+use elbowroom_executive::http::AccessControl;
 use elbowroom_executive::journal::{JournalFile, Segments};
 use elbowroom_executive::messages::escape_control;
 use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::process_world::{ProcessLimits, check_program};
-use elbowroom_executive::request_queue::RequestQueue;
 use elbowroom_executive::run::{JournaledOutcome, RunError, RunHost, RunInputs};
 use elbowroom_executive::trace_buffer::TraceBuffer;
 
@@ -39,6 +40,7 @@ use crate::interrupt::Interrupt;
 use crate::look::{BAD, styled};
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
+use page::Page;
 use progress_line::ProgressLine;
 use resume::ResumeHost;
 use spec::contradiction;
@@ -51,7 +53,10 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         return replay::run(path, arguments.json, output);
     }
     if let Some(path) = &arguments.resume {
-        return resume::run(path, arguments, &resume::StandaloneHost(arguments), output);
+        let host = resume::StandaloneHost::new(arguments);
+        let answer = resume::run(path, arguments, &host, output);
+        host.close();
+        return answer;
     }
     let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) else {
         return Err(Failure::new(
@@ -71,21 +76,24 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         Ok((&problem).into())
     };
     let (mut spec, world) = spec::of(arguments, domain, problem)?;
-    spec.is_attended = arguments.control.is_some();
+    spec.is_attended = arguments.token.is_some();
     let (task, first) = checked(arguments, &spec, world.as_ref(), output)?;
-    let operator = operator(arguments);
     let interrupt = Interrupt::listen_with_world();
+    let journal = journal(arguments, RESUME)?;
+    let page = Page::open(arguments, &spec, &task, &interrupt)?;
     let job = Job {
-        journal: journal(arguments, RESUME)?,
+        journal,
         started: &|| (),
         since,
         spec: &spec,
         task: &task,
         first,
         interrupt: &interrupt,
-        operator: &operator,
+        operator: &page.operator,
     };
-    job.execute(arguments, output)
+    let answer = job.execute(arguments, output);
+    page.close();
+    answer
 }
 
 /// Command that resumes a run that ends with its goal.
@@ -118,12 +126,18 @@ pub(super) fn background(arguments: &RunArgs, interrupt: &Interrupt) -> Backgrou
     }
 }
 
-/// Returns the channels for requests from the page of a run.
-pub(super) fn operator(arguments: &RunArgs) -> OperatorInterface {
-    match &arguments.control {
-        Some(_) => OperatorInterface::with_queue(RequestQueue::default()),
-        None => OperatorInterface::default(),
-    }
+/// Reads the token of the arguments, if there is one.
+///
+/// # Errors
+/// When the file cannot be read, other users can read it, or it does not contain a token.
+pub(super) fn access(
+    arguments: &RunArgs,
+    interrupt: &Interrupt,
+) -> Result<Option<AccessControl>, Error> {
+    let token = arguments.token.as_ref();
+    token
+        .map(|path| AccessControl::read(path, interrupt.stop().clone()))
+        .transpose()
 }
 
 /// The problem of a specification, and the plan to begin with. What is wrong with a file is told
@@ -276,9 +290,9 @@ impl RunHost for CommandHost<'_> {
         &self,
         spec: &RunSpec,
         task: &Arc<Task>,
-        operator: &OperatorInterface,
+        _: &OperatorInterface,
     ) -> Result<Option<TraceBuffer>, Error> {
-        let views = Viewers::open(self.arguments, spec, task, self.interrupt, operator)?;
+        let views = Viewers::open(self.arguments, spec, task)?;
         Ok(self.views.get_or_init(|| views).buffer().cloned())
     }
 

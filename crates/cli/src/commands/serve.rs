@@ -10,7 +10,7 @@ use elbowroom::pddl::{self, Source};
 
 use super::run::resume::{self, ResumeHost};
 use super::run::spec;
-use super::run::{Job, RESUME_SERVE, checked, journal};
+use super::run::{Job, RESUME_SERVE, access, checked, journal};
 use crate::args::ServeArgs;
 use crate::calendar::dated;
 use crate::exit::{Answer, Exit, Failure};
@@ -19,7 +19,6 @@ use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
 use elbowroom_executive::api::{self, ApiError, ApiRouter, Client};
 use elbowroom_executive::clock::Clock;
-use elbowroom_executive::http::AccessControl;
 use elbowroom_executive::journal::Segments;
 use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::{Error, make_persistent};
@@ -35,7 +34,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     check(arguments)?;
     let interrupt = Interrupt::listen_with_world();
     // A token that cannot be read is told before anything is done.
-    control(arguments, &interrupt)?;
+    access(&arguments.run, &interrupt)?;
     if let Some(journal) = &arguments.run.resume {
         let server = Server {
             arguments,
@@ -202,13 +201,6 @@ fn in_order(answer: Answer) -> Answer {
     })
 }
 
-fn control(arguments: &ServeArgs, interrupt: &Interrupt) -> Result<Option<AccessControl>, Error> {
-    let token = arguments.token.as_ref();
-    token
-        .map(|path| AccessControl::read(path, interrupt.stop().clone()))
-        .transpose()
-}
-
 /// What belongs to `elbowroom run` alone.
 fn check(arguments: &ServeArgs) -> Result<(), Failure> {
     let run = &arguments.run;
@@ -244,13 +236,18 @@ fn open(
     interrupt: &Interrupt,
     domain: &NamedText,
 ) -> Result<Arc<ApiRouter>, Error> {
-    let control = control(arguments, interrupt)?;
+    let control = access(&arguments.run, interrupt)?;
     let with_token = if control.is_some() {
         ""
     } else {
         "; to be looked at only, as there is no --token"
     };
-    let router = api::serve(arguments.http, arguments.socket.as_deref(), control, domain)?;
+    let router = api::serve(
+        arguments.http,
+        arguments.socket.as_deref(),
+        control,
+        Some(domain),
+    )?;
     let own = router.address();
     output::tell(&format!("listening at http://{own}/{with_token}"));
     if let Some(path) = &arguments.socket {

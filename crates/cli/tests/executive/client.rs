@@ -29,6 +29,15 @@ pub(crate) fn folder(name: &str) -> PathBuf {
     folder
 }
 
+/// Writes the token to a file that only its owner can read, and returns the path.
+pub(crate) fn write_token(folder: &Path) -> String {
+    let token = folder.join("token");
+    fs::write(&token, TOKEN).expect("written");
+    let for_owner = fs::Permissions::from_mode(0o600);
+    fs::set_permissions(&token, for_owner).expect("allowed");
+    token.display().to_string()
+}
+
 /// An executive.
 pub(crate) struct Executive {
     child: Option<Child>,
@@ -56,16 +65,17 @@ impl Executive {
     }
 
     fn with_token(folder: &Path, line: &[&str], most_blocks: Option<u32>) -> Self {
-        let token = folder.join("token");
-        fs::write(&token, TOKEN).expect("written");
-        let for_owner = fs::Permissions::from_mode(0o600);
-        fs::set_permissions(&token, for_owner).expect("allowed");
-        let token = token.display().to_string();
+        let token = write_token(folder);
         Self::launch(folder, &[line, &["--token", &token]].concat(), most_blocks)
     }
 
     pub(crate) fn without_token(folder: &Path, line: &[&str]) -> Self {
         Self::launch(folder, line, None)
+    }
+
+    /// Starts a run that ends with its goal and serves its page.
+    pub(crate) fn single_run(folder: &Path, line: &[&str]) -> Self {
+        Self::spawn(folder, &[&["run", "--serve"], line].concat(), None)
     }
 
     fn launch(folder: &Path, line: &[&str], most_blocks: Option<u32>) -> Self {
@@ -74,6 +84,11 @@ impl Executive {
         let has_journal = line.iter().any(|it| ["--journal", "--resume"].contains(it));
         let kept = ["--trace", &trace];
         let kept: &[&str] = if has_journal { &[] } else { &kept };
+        let serve = ["serve", "--http", "0", "--socket", &socket];
+        Self::spawn(folder, &[&serve, line, kept].concat(), most_blocks)
+    }
+
+    fn spawn(folder: &Path, line: &[&str], most_blocks: Option<u32>) -> Self {
         let mut command = Command::new("env");
         if let Some(most) = most_blocks {
             // The signal that would end the program is ignored, and writing fails.
@@ -84,9 +99,7 @@ impl Executive {
             .current_dir(root())
             .env("NO_COLOR", "1")
             .arg(env!("CARGO_BIN_EXE_elbowroom"))
-            .args(["serve", "--http", "0", "--socket", &socket])
             .args(line)
-            .args(kept)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()

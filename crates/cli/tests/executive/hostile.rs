@@ -91,6 +91,10 @@ fn pages_from_elsewhere_and_other_protocols_are_refused() {
         (format!("{get}\r\nUpgrade: websocket"), 400),
         (format!("{get}\r\nHost: localhost"), 400),
         (
+            format!("{get}\r\nContent-Length: 0\r\nContent-Length: 0"),
+            400,
+        ),
+        (
             format!("{get}\r\nContent-Length: 0\r\nContent-Length: 5"),
             400,
         ),

@@ -77,8 +77,8 @@ pub struct RunSpec {
         skip_serializing_if = "std::ops::Not::not"
     )]
     pub is_lasting: bool,
-    /// Whether the run can be paused and its goal abandoned (`elbowroom run --control`); left out
-    /// where it cannot.
+    /// The run accepts pauses, and its goal can be abandoned (`elbowroom run --token`). Omitted if
+    /// `false`.
     #[serde(
         default,
         rename = "attended",

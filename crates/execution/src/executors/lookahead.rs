@@ -6,8 +6,8 @@ use elbowroom_model::Task;
 use elbowroom_probability::Likelihoods;
 use elbowroom_probability::optimum::Table;
 
-use super::Registered;
 use super::adaptable::Adaptable;
+use super::{Goals, Registered};
 use crate::executor::Need;
 
 pub(super) const REGISTERED: Registered = Registered {
@@ -21,6 +21,7 @@ pub(super) const REGISTERED: Registered = Registered {
               most likely order again before each start if the plan is short.",
     paper: "goes beyond Ribeiro et al. (2021)",
     need: Need::PartialOrder,
+    goals: Goals::Fixed,
     make: |_, means| {
         Box::new(Adaptable::with_foresight(
             means.likelihoods,

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use elbowroom::execute::{misfit, obstacle_to_deadline, read_goal};
 use elbowroom::execution::Request;
 use elbowroom::execution::run::FIRST_GOAL;
 use elbowroom::executive::documents::{
@@ -18,24 +17,33 @@ use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use serde::de::DeserializeOwned;
 
-use super::router::{ApiError, ApiRouter};
+use super::router::{Accepted, ApiError, ApiRouter, ServedRun};
+use crate::error::Error;
 use crate::messages::counted;
+use crate::request_check::check;
 use crate::request_queue::{ExternalRequest, RequestStatus};
 
 /// Time limit for a client to wait until the run accepts its request.
 const ACCEPT_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Limit on the name of a goal, in bytes.
-const LONGEST_NAME: usize = 64;
-
 impl ApiRouter {
     /// Processes a request.
     pub(super) fn change(&self, method: &str, path: &str, body: &[u8]) -> Result<Taken, ApiError> {
+        let kind = match (method, path) {
+            ("PUT", _) | ("POST", "/v1/goals" | "/v1/facts" | "/v1/numbers") => {
+                Accepted::Everything
+            }
+            ("DELETE", _) | ("POST", "/v1/pause" | "/v1/resume") => Accepted::Pauses,
+            _ => Accepted::Nothing,
+        };
+        if let Ok(run) = self.run() {
+            run.check_accepts(kind)?;
+        }
         match (method, path) {
             ("PUT", "/v1/problem") => self.problem(read(body)?),
             ("POST", "/v1/goals") => self.goal(read(body)?),
             ("DELETE", path) => self.abandon(path.trim_start_matches("/v1/goals/")),
-            ("POST", "/v1/facts") => self.fact(&read(body)?),
+            ("POST", "/v1/facts") => self.fact(read(body)?),
             ("POST", "/v1/numbers") => self.number(read(body)?),
             ("POST", "/v1/pause") => {
                 self.submit(vec![ExternalRequest::Request(Request::Pause)], None)
@@ -54,13 +62,24 @@ impl ApiRouter {
         }
     }
 
+    /// Submits a request of a client if it is valid.
+    fn submit_checked(
+        &self,
+        request: ExternalRequest,
+        name: Option<String>,
+    ) -> Result<Taken, ApiError> {
+        let invalid = |error: Error| ApiError::new(422, error.message(), error.advice());
+        check(&request, &self.run()?.task).map_err(invalid)?;
+        self.submit(vec![request], name)
+    }
+
     /// Submits requests in this order, and waits up to two seconds until the run accepts them.
     fn submit(
         &self,
         requests: Vec<ExternalRequest>,
         name: Option<String>,
     ) -> Result<Taken, ApiError> {
-        let (status, _) = self.run()?;
+        let status = &self.run()?.status;
         if self.queue().has_journal_failed() {
             return Err(journal_failed());
         }
@@ -104,38 +123,17 @@ impl ApiRouter {
     }
 
     fn goal(&self, given: NewGoal) -> Result<Taken, ApiError> {
-        let (status, task) = self.run()?;
-        let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
-        let read = read_goal(task, &given.goal);
-        let read = read.map_err(|why| ApiError::new(422, why, help))?;
-        if let Some(why) = misfit(task.problem(), &read) {
-            return Err(ApiError::new(422, why, help));
-        }
-        let name = given.name.map(checked_name).transpose()?;
-        let name = name.unwrap_or_else(|| self.new_name(&status.goals()));
-        let goal = given.goal.trim().to_owned();
-        let value = given.value.map_or(Rational::ONE, |value| value.0);
-        if !value.is_positive() {
-            let help = "give a positive number, such as 2.5";
-            return Err(ApiError::new(
-                422,
-                "the value of a goal is not positive",
-                help,
-            ));
-        }
+        let status = &self.run()?.status;
         let deadline = deadline(&given.deadline, &given.within, &status.state().now.0)?;
-        if deadline.is_some()
-            && let Some(why) = obstacle_to_deadline(task, &read)
-        {
-            return Err(ApiError::new(422, why, "give the goal without a deadline"));
-        }
+        let open = status.goals();
+        let name = given.name.unwrap_or_else(|| self.new_name(&open));
         let request = Request::Pursue {
             name: name.clone(),
-            goal,
-            value,
+            goal: given.goal.trim().to_owned(),
+            value: given.value.map_or(Rational::ONE, |value| value.0),
             deadline,
         };
-        self.submit(vec![ExternalRequest::Request(request)], Some(name))
+        self.submit_checked(ExternalRequest::Request(request), Some(name))
     }
 
     /// Returns a name that no open goal has.
@@ -150,7 +148,7 @@ impl ApiRouter {
     }
 
     fn abandon(&self, name: &str) -> Result<Taken, ApiError> {
-        let open = self.run()?.0.goals();
+        let open = self.run()?.status.goals();
         // A pending request may add the goal.
         if !open.iter().any(|known| known == name) && self.queue().is_idle() {
             let help = match open.as_slice() {
@@ -164,51 +162,31 @@ impl ApiRouter {
         self.submit(vec![ExternalRequest::Request(request)], Some(name))
     }
 
-    fn fact(&self, given: &NewFact) -> Result<Taken, ApiError> {
-        let (_, task) = self.run()?;
-        let help = "write it as the problem does, such as (at rover base)";
-        let unknown = || {
-            let error = format!("the problem has no fact `{}`", given.fact.escape_debug());
-            ApiError::new(422, error, help)
-        };
-        let fact = task.fact_named(&given.fact).ok_or_else(unknown)?;
-        if task.is_derived(fact) {
-            let error = format!("`{}` follows from other facts", given.fact);
-            return Err(ApiError::new(422, error, "say those instead"));
-        }
-        let (fact, becomes) = (task.fact_name(fact), given.becomes);
-        self.submit(vec![ExternalRequest::Fact { fact, becomes }], None)
+    fn fact(&self, given: NewFact) -> Result<Taken, ApiError> {
+        let (fact, becomes) = (given.fact, given.becomes);
+        self.submit_checked(ExternalRequest::Fact { fact, becomes }, None)
     }
 
     fn number(&self, given: NewNumber) -> Result<Taken, ApiError> {
-        let (_, task) = self.run()?;
-        let unknown = || {
-            let error = format!(
-                "the problem has no fluent `{}`",
-                given.fluent.escape_debug()
-            );
-            ApiError::new(
-                422,
-                error,
-                "write it as the problem does, such as (charge rover)",
-            )
-        };
-        let fluent = task.fluent_named(&given.fluent).ok_or_else(unknown)?;
-        let (fluent, value) = (task.fluent_name(fluent), given.value.0);
-        self.submit(vec![ExternalRequest::Number { fluent, value }], None)
+        let (fluent, value) = (given.fluent, given.value.0);
+        self.submit_checked(ExternalRequest::Number { fluent, value }, None)
     }
 
     /// Starts the run with the initial problem, or changes the situation to that of a later problem with the same
     /// objects.
     fn problem(&self, given: NewProblem) -> Result<Taken, ApiError> {
-        let domain = self.domain().source();
+        let fixed = || {
+            let error = "this run has a problem of its own";
+            ApiError::new(409, error, "`elbowroom serve` accepts problems")
+        };
+        let domain = self.domain().ok_or_else(fixed)?.source();
         let read = pddl::read_problem(&domain, &Source::new("the problem", given.problem.as_str()));
         let (problem, _) = read.map_err(|mistakes| {
             let first = mistakes.errors().next().map(ToString::to_string);
             let help = "`elbowroom check DOMAIN PROBLEM` lists all mistakes";
             ApiError::new(422, first.unwrap_or_default(), help)
         })?;
-        let Ok((status, task)) = self.run() else {
+        let Ok(ServedRun { status, task, .. }) = self.run() else {
             let taken = self.initial_problem().give(given.problem)?;
             let until = (!taken).then(|| "it is read".to_owned());
             let name = None;
@@ -324,19 +302,6 @@ fn timed_facts(task: &Task) -> impl Iterator<Item = FactId> {
         Change::Add(fact) | Change::Delete(fact) => Some(*fact),
         Change::Update { .. } => None,
     })
-}
-
-/// Checks that a name can be part of a path.
-fn checked_name(name: String) -> Result<String, ApiError> {
-    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
-    if name.is_empty() || name.len() > LONGEST_NAME || !name.bytes().all(is_plain) {
-        return Err(ApiError::new(
-            422,
-            "this is no name for a goal",
-            "use up to 64 letters, digits, and `-`, `_` or `.`",
-        ));
-    }
-    Ok(name)
 }
 
 /// Parses a body.

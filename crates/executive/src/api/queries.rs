@@ -15,9 +15,9 @@ impl ApiRouter {
     /// Returns the state of the executive.
     pub(super) fn state(&self) -> State {
         match self.run() {
-            Ok((status, _)) => State {
+            Ok(run) => State {
                 unanswered: self.unanswered(),
-                ..status.state()
+                ..run.status.state()
             },
             Err(refused) => State {
                 now: Rational::ZERO.into(),

@@ -59,16 +59,35 @@ impl ApiError {
     }
 }
 
-/// HTTP interface of an executive.
+/// Requests that a run accepts beside its end, from the fewest to the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Accepted {
+    /// None.
+    Nothing,
+    /// Pauses, and the cancellation of its only goal.
+    Pauses,
+    /// Goals, facts, numbers, problems and pauses.
+    Everything,
+}
+
+/// Run whose interface is served.
+pub(super) struct ServedRun {
+    pub(super) status: Status,
+    /// The problem, with its own table of facts, so that requests do not change the numbers of the run.
+    pub(super) task: Task,
+    accepted: Accepted,
+}
+
+/// HTTP interface of an executive, or of a run that ends with its goal.
 pub struct ApiRouter {
     control: Option<AccessControl>,
     own: SocketAddr,
-    domain: NamedText,
+    /// Domain of the problems that clients may submit.
+    domain: Option<NamedText>,
     queue: RequestQueue,
     buffer: TraceBuffer,
-    /// Status and task of the run, once there is a problem. The task has its own table of facts, so that requests do not
-    /// change the numbers of the run.
-    run: OnceLock<(Status, Task)>,
+    /// The run, once there is a problem.
+    run: OnceLock<ServedRun>,
     initial: InitialProblem,
     /// Number of mutations in progress.
     changing: Mutex<usize>,
@@ -78,13 +97,23 @@ pub struct ApiRouter {
 }
 
 impl ApiRouter {
-    pub(super) fn new(control: Option<AccessControl>, own: SocketAddr, domain: &NamedText) -> Self {
+    /// Creates the interface of an executive for problems of `domain`. Without a domain, it is that of a run that ends
+    /// with its goal, whose whole trace is kept.
+    pub(super) fn new(
+        control: Option<AccessControl>,
+        own: SocketAddr,
+        domain: Option<NamedText>,
+    ) -> Self {
+        let buffer = match domain {
+            Some(_) => TraceBuffer::bounded(),
+            None => TraceBuffer::default(),
+        };
         Self {
             control,
             own,
-            domain: domain.clone(),
+            domain,
             queue: RequestQueue::default(),
-            buffer: TraceBuffer::bounded(),
+            buffer,
             run: OnceLock::new(),
             initial: InitialProblem::default(),
             changing: Mutex::new(0),
@@ -98,11 +127,6 @@ impl ApiRouter {
         &self.queue
     }
 
-    /// Returns the trace buffer.
-    pub fn buffer(&self) -> &TraceBuffer {
-        &self.buffer
-    }
-
     /// Returns the slot for the initial problem.
     pub fn initial_problem(&self) -> &InitialProblem {
         &self.initial
@@ -113,9 +137,9 @@ impl ApiRouter {
         self.own
     }
 
-    /// Returns the text of the domain.
-    pub(super) fn domain(&self) -> &NamedText {
-        &self.domain
+    /// Returns the domain of the problems that clients may submit.
+    pub(super) fn domain(&self) -> Option<&NamedText> {
+        self.domain.as_ref()
     }
 
     /// Connects the interface to a run, and writes the header of its trace.
@@ -127,19 +151,28 @@ impl ApiRouter {
         let mut header = |line: &str| self.buffer.add(line);
         let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
         written.map_err(|error| Error::new(format!("cannot show the run: {error}"), ""))?;
-        let _ = self.run.set((status.clone(), task.with_own_table()));
-        Ok(OperatorInterface::new(
-            self.queue.clone(),
-            status,
-            self.buffer.clone(),
-        ))
+        let accepted = match () {
+            () if spec.is_lasting => Accepted::Everything,
+            () if spec.is_attended => Accepted::Pauses,
+            () => Accepted::Nothing,
+        };
+        let _ = self.run.set(ServedRun {
+            status: status.clone(),
+            task: task.with_own_table(),
+            accepted,
+        });
+        let buffer = self.buffer.clone();
+        Ok(match accepted {
+            Accepted::Nothing => OperatorInterface::read_only(status, buffer),
+            _ => OperatorInterface::new(self.queue.clone(), status, buffer),
+        })
     }
 
-    /// Returns the status and the task of the run.
+    /// Returns the run.
     ///
     /// # Errors
     /// When there is no problem yet.
-    pub(super) fn run(&self) -> Result<&(Status, Task), ApiError> {
+    pub(super) fn run(&self) -> Result<&ServedRun, ApiError> {
         let waiting = "the executive has no problem yet";
         let help = "give it one: `elbowroom ctl problem FILE`, or PUT /v1/problem";
         self.run
@@ -236,7 +269,7 @@ impl ApiRouter {
             }
             ("POST", "/cancel") => {
                 self.allow(request)?;
-                for name in self.run()?.0.goals() {
+                for name in self.run()?.status.goals() {
                     self.change("DELETE", &format!("/v1/goals/{name}"), b"")?;
                 }
                 respond(
@@ -248,15 +281,17 @@ impl ApiRouter {
             }
             ("GET", "/v1/openapi.json") => respond(stream, 200, JSON, &text(&openapi())),
             ("GET", "/v1/state") => respond(stream, 200, JSON, &text(&self.state())),
-            ("GET", "/v1/goals") => respond(stream, 200, JSON, &text(&self.run()?.0.all_goals())),
-            ("GET", "/v1/plan") => respond(stream, 200, JSON, &text(&self.run()?.0.plan())),
-            ("GET", "/v1/guarantee") => {
-                respond(stream, 200, JSON, &text(&self.run()?.0.guarantee()))
+            ("GET", "/v1/goals") => {
+                respond(stream, 200, JSON, &text(&self.run()?.status.all_goals()))
             }
-            ("GET", "/v1/next") => respond(stream, 200, JSON, &text(&self.run()?.0.next())),
+            ("GET", "/v1/plan") => respond(stream, 200, JSON, &text(&self.run()?.status.plan())),
+            ("GET", "/v1/guarantee") => {
+                respond(stream, 200, JSON, &text(&self.run()?.status.guarantee()))
+            }
+            ("GET", "/v1/next") => respond(stream, 200, JSON, &text(&self.run()?.status.next())),
             ("GET", path) => return Err(no_such(path, "GET")),
             (method, path) => {
-                if !is_known(method, path) {
+                if !methods(path).any(|verb| verb == method) {
                     return Err(no_such(path, method));
                 }
                 self.allow(request)?;
@@ -300,6 +335,23 @@ impl ApiRouter {
     }
 }
 
+impl ServedRun {
+    /// Checks that the run accepts a kind of requests.
+    pub(super) fn check_accepts(&self, kind: Accepted) -> Result<(), ApiError> {
+        if kind <= self.accepted {
+            return Ok(());
+        }
+        let error = match self.accepted {
+            Accepted::Pauses => {
+                "this run has one goal, and accepts no other goals, problems, facts or numbers"
+            }
+            _ => "this run accepts no request but to stop",
+        };
+        let help = "`elbowroom serve` accepts goals, problems, facts, numbers and pauses";
+        Err(ApiError::new(409, error, help))
+    }
+}
+
 /// Guard of a mutation in progress.
 struct Changing<'a>(&'a ApiRouter);
 
@@ -329,11 +381,22 @@ fn first_line(request: &Request) -> Result<Option<usize>, ApiError> {
     })
 }
 
-/// Returns `true` if the interface has this method and path.
-fn is_known(method_name: &str, path: &str) -> bool {
-    METHODS
-        .iter()
-        .any(|method| method_name == method.verb && is_path(path, method.path))
+/// Methods and paths of the page of a run. They are no part of the `OpenAPI` document.
+const PAGE: [(&str, &str); 7] = [
+    ("GET", "/"),
+    ("GET", "/document"),
+    ("GET", "/events"),
+    ("POST", "/pause"),
+    ("POST", "/resume"),
+    ("POST", "/cancel"),
+    ("POST", "/stop"),
+];
+
+/// Returns the methods of a path.
+fn methods(path: &str) -> impl Iterator<Item = &'static str> {
+    let api = METHODS.iter().map(|method| (method.verb, method.path));
+    let known = PAGE.into_iter().chain(api);
+    known.filter_map(move |(verb, pattern)| is_path(path, pattern).then_some(verb))
 }
 
 fn is_path(path: &str, pattern: &str) -> bool {
@@ -345,11 +408,10 @@ fn is_path(path: &str, pattern: &str) -> bool {
 
 /// Returns the error for a path without this method.
 fn no_such(path: &str, method_name: &str) -> ApiError {
-    let mut own = METHODS.iter().filter(|method| is_path(path, method.path));
     let help = "GET /v1/openapi.json lists what can be asked";
-    match own.next() {
-        Some(method) => {
-            let error = format!("{path} is not for {method_name}, but for {}", method.verb);
+    match methods(path).next() {
+        Some(verb) => {
+            let error = format!("{path} is not for {method_name}, but for {verb}");
             ApiError::new(405, error, help)
         }
         None => ApiError::new(404, "there is nothing at this path", help),

@@ -12,8 +12,9 @@ use crate::error::Error;
 use crate::http::{self, AccessControl, Address, Listener};
 use crate::messages::plain;
 
-/// Serves the HTTP interface of an executive at a TCP address, and at a Unix socket if a path is given, until the
-/// program ends. Without `control`, clients can only read. `domain` is the domain of the problems that clients submit.
+/// Serves the HTTP interface of an executive or a run at a TCP address, and at a Unix socket if a path is given, until
+/// the program ends. Without `control`, clients can only read. `domain` is the domain of the problems that clients may
+/// submit to an executive; a run that ends with its goal has none.
 ///
 /// # Errors
 /// When an address is not available.
@@ -21,13 +22,13 @@ pub fn serve(
     address: Address,
     socket_path: Option<&Path>,
     control: Option<AccessControl>,
-    domain: &NamedText,
+    domain: Option<&NamedText>,
 ) -> Result<Arc<ApiRouter>, Error> {
     let address = address.0;
     let cannot = |why: &dyn fmt::Display| {
         Error::new(
             format!("cannot listen at {address}: {why}"),
-            "choose another port with --http; with port 0, a free one is taken",
+            "choose another port; with port 0, a free one is taken",
         )
     };
     let listener = TcpListener::bind(address).map_err(|error| cannot(&plain(&error)))?;
@@ -35,7 +36,7 @@ pub fn serve(
         .local_addr()
         .map_err(|error| cannot(&plain(&error)))?;
     let socket = socket_path.map(socket).transpose()?;
-    let router = Arc::new(ApiRouter::new(control, own, domain));
+    let router = Arc::new(ApiRouter::new(control, own, domain.cloned()));
     for (listener, is_local_only) in [
         (Some(Listener::Tcp(listener)), own.ip().is_loopback()),
         (socket, false),

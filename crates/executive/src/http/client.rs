@@ -1,6 +1,6 @@
 //! HTTP client for an executive.
 
-use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
+use std::io::{self, BufRead, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
 #[cfg(unix)]
 use std::os::unix::net::UnixStream;
@@ -11,6 +11,12 @@ use super::Stream;
 
 /// Timeout for the response.
 const RESPONSE_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// Limit on the status line and the headers of a response, in bytes.
+const LONGEST_HEAD: u64 = 64 << 10;
+
+/// Limit on the number of headers of a response.
+const MOST_HEADERS: usize = 100;
 
 /// Limit on a response, in bytes.
 const LONGEST_RESPONSE: u64 = 256 << 20;
@@ -122,14 +128,22 @@ pub fn send(
     stream.write_all(request.as_bytes())?;
     stream.flush()?;
     let mut body = BufReader::new(stream);
-    let mut line = String::new();
-    body.read_line(&mut line)?;
-    let status = line.split(' ').nth(1).and_then(|word| word.parse().ok());
-    let status = status.ok_or_else(|| io::Error::other("what answers there is not HTTP"))?;
-    loop {
-        line.clear();
-        if body.read_line(&mut line)? == 0 || line.trim().is_empty() {
-            return Ok(Response { status, body });
+    let status = read_head(&mut body)?;
+    Ok(Response { status, body })
+}
+
+/// Reads the status line and the headers of a response. Returns the status code.
+fn read_head(response: &mut impl BufRead) -> io::Result<u16> {
+    let nonsense = || io::Error::other("what answers there is not HTTP");
+    let mut limited = response.take(LONGEST_HEAD);
+    let mut head = Vec::new();
+    while limited.read_until(b'\n', &mut head)? > 0 {
+        let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
+        let mut parsed = httparse::Response::new(&mut headers);
+        let status = parsed.parse(&head).map_err(|_| nonsense())?;
+        if status.is_complete() {
+            return parsed.code.ok_or_else(nonsense);
         }
     }
+    Err(nonsense())
 }

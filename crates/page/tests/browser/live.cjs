@@ -78,7 +78,7 @@ test("a reader who looks back in time, filters or stops following is left alone"
 });
 
 test("only who knows the token may stop the run", async () => {
-  const { address, over } = served(1, "--control", file("token"));
+  const { address, over } = served(1, "--token", file("token"));
   const base = await address;
   for (const headers of [{}, { authorization: `Bearer ${TOKEN}x` }, { authorization: "Bearer" }]) {
     assert.equal((await fetch(`${base}stop`, { method: "POST", headers })).status, 401);
@@ -96,7 +96,7 @@ test("only who knows the token may stop the run", async () => {
 });
 
 test("a paused run starts nothing, and goes on when it is told to; its trace replays", async () => {
-  const { address, over } = served(4, "--control", file("token"), "--trace", file("paused.jsonl"));
+  const { address, over } = served(4, "--token", file("token"), "--trace", file("paused.jsonl"));
   const tab = await watched(await address, `#token=${TOKEN}`);
   const time = () => tab.evaluate(() => Number(document.getElementById("time").max));
   await tab.getByRole("button", { name: "pause" }).click();
@@ -124,7 +124,7 @@ test("a paused run starts nothing, and goes on when it is told to; its trace rep
 });
 
 test("a run whose goal is given up starts nothing more, and is over when what is under way has ended", async () => {
-  const { address, over } = served(4, "--control", file("token"), "--trace", file("cancelled.jsonl"));
+  const { address, over } = served(4, "--token", file("token"), "--trace", file("cancelled.jsonl"));
   const tab = await watched(await address, `#token=${TOKEN}`);
   await tab.waitForFunction(() => document.querySelectorAll("section tbody tr").length > 2);
   await tab.getByRole("button", { name: "cancel" }).click();
@@ -175,7 +175,7 @@ test("clients that say nothing, say nonsense or do not listen do not delay the r
 });
 
 test("it can be read at any width, in light and dark, while the run goes on", async () => {
-  const { child, address, over } = served(2, "--control", file("token"));
+  const { child, address, over } = served(2, "--token", file("token"));
   const base = await address;
   for (const [width, colorScheme] of [[1280, "light"], [400, "dark"]]) {
     const tab = await watched(base, `#token=${TOKEN}`, { viewport: { width, height: 900 }, colorScheme });

@@ -11,6 +11,7 @@ use elbowroom_executive::journal::Segments;
 use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::resume::{InterruptedRun, ResumeSettings};
 
+use super::page::Page;
 use super::{CommandHost, background, failure, limits};
 use crate::args::RunArgs;
 use crate::exit::{Answer, Failure};
@@ -53,14 +54,31 @@ pub(in crate::commands) trait ResumeHost {
 }
 
 /// Host of `elbowroom run`, which has no operators except on the page of the run.
-pub(in crate::commands) struct StandaloneHost<'a>(pub(in crate::commands) &'a RunArgs);
+pub(super) struct StandaloneHost<'a> {
+    arguments: &'a RunArgs,
+    page: OnceCell<Page>,
+}
+
+impl<'a> StandaloneHost<'a> {
+    pub(super) fn new(arguments: &'a RunArgs) -> Self {
+        let page = OnceCell::new();
+        Self { arguments, page }
+    }
+
+    /// Ends the HTTP interface, if there is one.
+    pub(super) fn close(&self) {
+        if let Some(page) = self.page.get() {
+            page.close();
+        }
+    }
+}
 
 impl ResumeHost for StandaloneHost<'_> {
     fn operator(
         &self,
         spec: &RunSpec,
-        _: &Arc<Task>,
-        _: &Interrupt,
+        task: &Arc<Task>,
+        interrupt: &Interrupt,
     ) -> Result<OperatorInterface, Error> {
         if spec.is_lasting {
             return Err(Error::new(
@@ -68,17 +86,14 @@ impl ResumeHost for StandaloneHost<'_> {
                 "go on with `elbowroom serve --resume`",
             ));
         }
-        if spec.is_attended && self.0.control.is_none() {
+        if spec.is_attended && self.arguments.token.is_none() {
             return Err(Error::new(
                 "this run can be paused from its page, and may be",
-                "give --serve and --control again",
+                "give --serve and --token again",
             ));
         }
-        Ok(if spec.is_attended {
-            super::operator(self.0)
-        } else {
-            OperatorInterface::default()
-        })
+        let page = Page::open(self.arguments, spec, task, interrupt)?;
+        Ok(self.page.get_or_init(|| page).operator.clone())
     }
 }
 

@@ -1,4 +1,4 @@
-//! Viewers of a run: browsers during the run, files for other viewers after it.
+//! Files for viewers of a run, written at its end.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -9,14 +9,11 @@ use elbowroom::report::trace::TraceWriter;
 use elbowroom_page::PageError;
 
 use crate::args::RunArgs;
-use crate::interrupt::Interrupt;
 use crate::output;
 use elbowroom_executive::Error;
-use elbowroom_executive::http::{AccessControl, PageServer};
-use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::trace_buffer::{TRACE_NAME, TraceBuffer};
 
-/// Browsers and files for viewers.
+/// Files for viewers.
 pub(super) struct Viewers<'a> {
     arguments: &'a RunArgs,
     buffer: Option<TraceBuffer>,
@@ -26,16 +23,14 @@ impl<'a> Viewers<'a> {
     /// Opens the viewers of the arguments.
     ///
     /// # Errors
-    /// When a file cannot be written, or the address of the page is not available.
+    /// When a file cannot be written.
     pub(super) fn open(
         arguments: &'a RunArgs,
         spec: &RunSpec,
         task: &Arc<Task>,
-        interrupt: &Interrupt,
-        operator: &OperatorInterface,
     ) -> Result<Self, Error> {
         let files = [&arguments.perfetto, &arguments.mcap];
-        if arguments.serve.is_none() && files.iter().all(|file| file.is_none()) {
+        if files.iter().all(|file| file.is_none()) {
             let buffer = None;
             return Ok(Self { arguments, buffer });
         }
@@ -45,29 +40,10 @@ impl<'a> Viewers<'a> {
             })?;
         }
         // Files for viewers contain the whole run.
-        let is_for_viewers = files.iter().any(|file| file.is_some());
-        let buffer = if spec.is_lasting && !is_for_viewers {
-            TraceBuffer::bounded()
-        } else {
-            TraceBuffer::default()
-        };
+        let buffer = TraceBuffer::default();
         let mut header = |line: &str| buffer.add(line);
         let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
         written.map_err(|error| Error::new(format!("cannot show the run: {error}"), ""))?;
-        if let Some(address) = arguments.serve {
-            let control = match &arguments.control {
-                Some(path) => Some(AccessControl::read(path, interrupt.stop().clone())?),
-                None => None,
-            };
-            let with_token = if control.is_some() {
-                "; with #token=TOKEN at its end, the run can be paused, cancelled and stopped there"
-            } else {
-                ""
-            };
-            let queue = operator.queue().cloned();
-            let own = PageServer::start(address, buffer.clone(), control, queue)?;
-            output::tell(&format!("the run is shown at http://{own}/{with_token}"));
-        }
         let buffer = Some(buffer);
         Ok(Self { arguments, buffer })
     }
@@ -77,11 +53,9 @@ impl<'a> Viewers<'a> {
         self.buffer.as_ref()
     }
 
-    /// Marks the run as finished on its page, and writes the files for viewers. Failures are warnings: the run itself
-    /// is complete.
+    /// Writes the files. Failures are warnings: the run itself is complete.
     pub(super) fn close(self) {
         let Some(buffer) = self.buffer else { return };
-        buffer.close();
         let trace = buffer.trace();
         let write = |file: &Path, made: Result<Vec<u8>, PageError>| match made {
             Ok(bytes) => output::write_bytes(file, &bytes)

@@ -1,0 +1,197 @@
+//! Checks of operators' requests against the problem of a run, before the run receives them.
+
+use elbowroom::execute::{misfit, obstacle_to_deadline, read_goal};
+use elbowroom::execution::Request;
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+
+use crate::error::Error;
+use crate::request_queue::ExternalRequest;
+
+/// Limit on the name of a goal, in bytes.
+const LONGEST_NAME: usize = 64;
+
+/// Checks a request. Reading a goal or a fact can add facts to the table of `task`, so that it must not be the table
+/// of the run.
+///
+/// # Errors
+/// When a goal, its name or its value is invalid, or a fact or fluent is unknown.
+pub(crate) fn check(request: &ExternalRequest, task: &Task) -> Result<(), Error> {
+    match request {
+        ExternalRequest::Request(Request::Pursue {
+            name,
+            goal,
+            value,
+            deadline,
+        }) => {
+            check_goal(goal, deadline.is_some(), task)?;
+            check_name(name)?;
+            check_value(value)
+        }
+        ExternalRequest::Request(Request::Abandon { .. } | Request::Pause | Request::Resume) => {
+            Ok(())
+        }
+        ExternalRequest::Fact { fact, .. } => check_fact(fact, task),
+        ExternalRequest::Number { fluent, .. } => check_fluent(fluent, task),
+    }
+}
+
+fn check_goal(goal: &str, has_deadline: bool, task: &Task) -> Result<(), Error> {
+    let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
+    let read = read_goal(task, goal).map_err(|why| Error::new(why, help))?;
+    if read.is_trivial() {
+        return Err(Error::new("the goal is empty", help));
+    }
+    if let Some(why) = misfit(task.problem(), &read) {
+        return Err(Error::new(why, help));
+    }
+    let obstacle = has_deadline.then(|| obstacle_to_deadline(task, &read));
+    match obstacle.flatten() {
+        Some(why) => Err(Error::new(why, "give the goal without a deadline")),
+        None => Ok(()),
+    }
+}
+
+/// Checks that a name can be part of a path.
+fn check_name(name: &str) -> Result<(), Error> {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
+    let is_path = [".", ".."].contains(&name);
+    if name.is_empty() || is_path || name.len() > LONGEST_NAME || !name.bytes().all(is_plain) {
+        return Err(Error::new(
+            "this is no name for a goal",
+            "use up to 64 letters, digits, and `-`, `_` or `.`, not dots alone",
+        ));
+    }
+    Ok(())
+}
+
+fn check_value(value: &Rational) -> Result<(), Error> {
+    if value.is_positive() {
+        return Ok(());
+    }
+    Err(Error::new(
+        "the value of a goal is not positive",
+        "give a positive number, such as 2.5",
+    ))
+}
+
+fn check_fact(text: &str, task: &Task) -> Result<(), Error> {
+    let Some(fact) = task.fact_named(text) else {
+        return Err(Error::new(
+            format!("the problem has no fact `{}`", text.escape_debug()),
+            "write it as the problem does, such as (at rover base)",
+        ));
+    };
+    if task.is_derived(fact) {
+        return Err(Error::new(
+            format!("`{}` follows from other facts", task.fact_name(fact)),
+            "say those instead",
+        ));
+    }
+    Ok(())
+}
+
+fn check_fluent(text: &str, task: &Task) -> Result<(), Error> {
+    let unknown = || {
+        Error::new(
+            format!("the problem has no fluent `{}`", text.escape_debug()),
+            "write it as the problem does, such as (charge rover)",
+        )
+    };
+    task.fluent_named(text).map(drop).ok_or_else(unknown)
+}
+
+#[cfg(test)]
+mod tests {
+    use elbowroom::execution::Request;
+    use elbowroom::model::Task;
+    use elbowroom::num::Rational;
+    use elbowroom::pddl::{Source, read_problem};
+
+    use super::check;
+    use crate::request_queue::ExternalRequest;
+
+    const DOMAIN: &str = "(define (domain d) (:requirements :typing :fluents :derived-predicates)
+        (:types robot place)
+        (:predicates (at ?r - robot ?p - place) (away ?r - robot))
+        (:functions (charge ?r - robot))
+        (:derived (away ?r - robot) (at ?r home))
+        (:constants home - place)
+        (:action go :parameters (?r - robot) :effect (at ?r home)))";
+    const PROBLEM: &str = "(define (problem p) (:domain d) (:objects r - robot)
+        (:init (= (charge r) 1)) (:goal (at r home)))";
+
+    fn task() -> Task {
+        let read = read_problem(&Source::new("d", DOMAIN), &Source::new("p", PROBLEM));
+        Task::new(read.expect("a correct problem").0)
+    }
+
+    fn pursue(name: &str, goal: &str, value: i64) -> ExternalRequest {
+        ExternalRequest::Request(Request::Pursue {
+            name: name.to_owned(),
+            goal: goal.to_owned(),
+            value: Rational::from(value),
+            deadline: None,
+        })
+    }
+
+    fn by_deadline(goal: &str) -> ExternalRequest {
+        ExternalRequest::Request(Request::Pursue {
+            name: "x".to_owned(),
+            goal: goal.to_owned(),
+            value: Rational::ONE,
+            deadline: Some(Rational::from(100)),
+        })
+    }
+
+    fn fact(fact: &str) -> ExternalRequest {
+        let (fact, becomes) = (fact.to_owned(), true);
+        ExternalRequest::Fact { fact, becomes }
+    }
+
+    fn number(fluent: &str) -> ExternalRequest {
+        let (fluent, value) = (fluent.to_owned(), Rational::ONE);
+        ExternalRequest::Number { fluent, value }
+    }
+
+    #[test]
+    fn valid_requests_pass() {
+        let task = task();
+        for request in [
+            pursue("goal-1", "(at r home)", 1),
+            pursue("a.b_c", "(away r)", 2),
+            by_deadline("(at r home)"),
+            ExternalRequest::Request(Request::Pause),
+            fact("(at r home)"),
+            number("(charge r)"),
+        ] {
+            assert_eq!(check(&request, &task), Ok(()), "{request:?}");
+        }
+    }
+
+    #[test]
+    fn invalid_requests_are_rejected_with_reason() {
+        let task = task();
+        let long = "x".repeat(65);
+        for (request, words) in [
+            (pursue("x", "(at r nowhere)", 1), "nowhere"),
+            (pursue("x", "(at home r)", 1), "home"),
+            (pursue("x", "(at r home)", 0), "not positive"),
+            (pursue("x", "(at r home)", -1), "not positive"),
+            (pursue("", "(at r home)", 1), "no name"),
+            (pursue("a/b", "(at r home)", 1), "no name"),
+            (pursue("..", "(at r home)", 1), "no name"),
+            (pursue("x", "(and)", 1), "empty"),
+            (by_deadline("(away r)"), "follows from other facts"),
+            (by_deadline("(>= (charge r) 1)"), "about numbers"),
+            (pursue(&long, "(at r home)", 1), "no name"),
+            (fact("(at r nowhere)"), "no fact"),
+            (fact("(away r)"), "follows from other facts"),
+            (number("(charge home)"), "no fluent"),
+        ] {
+            let error = check(&request, &task).expect_err(words);
+            assert!(error.message().contains(words), "{error}");
+            assert!(!error.advice().is_empty(), "{error}");
+        }
+    }
+}
