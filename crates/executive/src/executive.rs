@@ -55,6 +55,7 @@ impl Default for ExecutiveSettings {
             limits: ProcessLimits {
                 answer_timeout: Rational::from(3600),
                 is_strict: false,
+                restarts: 0,
             },
             planner_memory: Some(1000 << 20),
             warnings: WarningSink::default(),
@@ -219,13 +220,14 @@ impl Executive {
         };
         let limits = self.settings.limits.clone();
         let operator = self.operator_interface();
+        let warnings = self.settings.warnings.clone();
         let journal = match start {
             Start::Resumed(run) => {
                 let settings = ResumeSettings {
                     task: &self.task,
                     background,
                     limits,
-                    warnings: self.settings.warnings.clone(),
+                    warnings,
                 };
                 return run.resume(settings, self, &mut watcher);
             }
@@ -240,6 +242,7 @@ impl Executive {
             limits,
             since: None,
             observer: None,
+            warnings,
         };
         match journal {
             Some(file) => inputs.execute_journaled(file, self, &mut watcher),

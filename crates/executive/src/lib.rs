@@ -38,8 +38,10 @@ pub mod process_world;
 pub mod realtime;
 mod request_check;
 pub mod request_queue;
+mod restartable_world;
 pub mod resume;
 pub mod run;
+mod running_actions;
 pub mod trace_buffer;
 pub mod world_protocol;
 

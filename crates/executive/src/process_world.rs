@@ -37,6 +37,8 @@ pub struct ProcessLimits {
     pub answer_timeout: Rational,
     /// `true` if an invalid message ends the run. Otherwise it is recorded and ignored.
     pub is_strict: bool,
+    /// Number of times that the program is started again after it has ended or failed.
+    pub restarts: u32,
 }
 
 /// Child process that receives commands and reports observations.

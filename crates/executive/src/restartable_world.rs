@@ -314,7 +314,8 @@ impl World for RestartableWorld<'_> {
         }
         self.running.note(command);
         let told = (now - &self.shift).max(Rational::ZERO);
-        self.ask(|process| process.command(&told, command)).map(drop)
+        self.ask(|process| process.command(&told, command))
+            .map(drop)
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {

@@ -6,7 +6,6 @@
 
 mod elapsed;
 mod journal_replay;
-mod running_actions;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -15,13 +14,10 @@ use std::sync::Arc;
 use elbowroom::answers::run::run as execute;
 use elbowroom::answers::{RunRequest, Watcher};
 use elbowroom::execute::RunSpec;
-use elbowroom::execution::{
-    Command, Ending, Event, Observation, Passage, Ticket, World, WorldError,
-};
+use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
-use elbowroom::num::work::Stop;
 use elbowroom::report::trace::{Line, ReplayWorld, Stored};
 
 use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
@@ -32,11 +28,12 @@ use crate::error::{Error, WarningSink};
 use crate::journal::{DAMAGE_ADVICE, Journal, JournalFile, WallTime, is_journal};
 use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
 use crate::operator::InteractiveWorld;
-use crate::process_world::{ProcessLimits, ProcessWorld};
+use crate::process_world::ProcessLimits;
+use crate::restartable_world::{Launch, RestartableWorld};
 use crate::run::{JournaledOutcome, RunError, RunHost, ViewedRecorder, both};
+use crate::running_actions::{self, RunningActions};
 use elapsed::Elapsed;
 use journal_replay::{JournalReplay, ReplayRecorder, ReplayWatcher, ResumedPlanner};
-use running_actions::RunningActions;
 
 /// Run whose program has died, as its journal describes it.
 pub struct InterruptedRun {
@@ -200,24 +197,22 @@ impl InterruptedRun {
                 .prepared_by(BackgroundPreparer::new(&spec, task, &background.signal)?)
                 .told_to(both(operator.listener(), beliefs.listener()))
                 .recorded_by(ViewedRecorder::new(recorder, task, buffer, None));
+            let elapsed = Elapsed::of(&journal, &stored, snapshot.as_ref());
+            let launch = Launch {
+                command,
+                task,
+                limits,
+                stop: stop.clone(),
+                warnings,
+            };
+            let running = RunningActions::of(&stored, snapshot.as_ref());
+            let elapsed = Box::new(move || elapsed.until(WallTime::now()));
+            let since = (now.unwrap_or_default(), elapsed as _);
             let world = ResumedWorld {
                 journal: ReplayWorld::new(&stored, task),
                 left: stored.lines.iter().filter(|line| is_answer(line)).count(),
                 replay: Arc::clone(&replay),
-                running: RunningActions::of(&stored, snapshot.as_ref()),
-                elapsed: Elapsed::of(&journal, &stored, snapshot.as_ref()),
-                launch: Launch {
-                    command,
-                    task,
-                    limits,
-                    stop: stop.clone(),
-                    warnings,
-                },
-                process: None,
-                beliefs,
-                last: now.unwrap_or_default(),
-                shift: Rational::ZERO,
-                news: None,
+                process: RestartableWorld::resumed(launch, running, since, beliefs),
             };
             let world = JournaledWorld::new(world, health.clone());
             let signal = &background.signal;
@@ -231,9 +226,7 @@ impl InterruptedRun {
                 health,
             };
             let outcome = execute(request, &mut world, &mut watcher);
-            if let Some(process) = world.into_inner().into_inner().process {
-                process.stop();
-            }
+            world.into_inner().into_inner().process.stop();
             outcome?
         };
         if let Some(line) = replay.difference() {
@@ -278,124 +271,23 @@ fn is_answer(line: &Line) -> bool {
     matches!(line, Line::Passed(_) | Line::Looked(_))
 }
 
-/// Arguments for the start of the world process.
-struct Launch<'a> {
-    command: String,
-    task: &'a Arc<Task>,
-    limits: ProcessLimits,
-    stop: Stop,
-    warnings: WarningSink,
-}
-
 /// World that replays the journal, then starts the process.
 struct ResumedWorld<'a> {
     journal: ReplayWorld,
     /// Number of answers that the journal still has.
     left: usize,
     replay: Arc<JournalReplay>,
-    running: RunningActions,
-    /// Time since the end of the journal.
-    elapsed: Elapsed,
-    launch: Launch<'a>,
-    process: Option<ProcessWorld>,
-    beliefs: BeliefUpdates,
-    /// Current time of the run.
-    last: Rational,
-    /// Offset that is added to the times of a world that restarts at time 0.
-    shift: Rational,
-    /// Outcome of the actions that were running, until the run has received it.
-    news: Option<Vec<Observation>>,
+    process: RestartableWorld<'a>,
 }
 
-impl ResumedWorld<'_> {
-    /// Returns the process. Starts it at the first call, and requests the outcome of running actions.
-    fn process(&mut self) -> Result<&mut ProcessWorld, WorldError> {
+impl<'a> ResumedWorld<'a> {
+    /// Returns the world behind the journal, unless the replay has deviated.
+    fn process(&mut self) -> Result<&mut RestartableWorld<'a>, WorldError> {
         if self.replay.difference().is_some() {
             return Err(WorldError::new("the journal leads to other decisions"));
         }
-        if self.process.is_none() {
-            let launch = &self.launch;
-            let resumed = self.running.message(&self.last);
-            let world = ProcessWorld::resume(
-                &launch.command,
-                launch.task,
-                launch.limits.clone(),
-                launch.stop.clone(),
-                (&resumed, self.running.given),
-            );
-            let world = world.map_err(|error| WorldError::new(error.message()))?;
-            self.process = Some(world.with_beliefs(self.beliefs.clone()));
-            self.reconcile()?;
-        }
-        self.process
-            .as_mut()
-            .ok_or_else(|| WorldError::new("the world is not there"))
+        Ok(&mut self.process)
     }
-
-    /// Requests the outcome of running actions, and repeats cancellations.
-    fn reconcile(&mut self) -> Result<(), WorldError> {
-        let Some(world) = &mut self.process else {
-            return Ok(());
-        };
-        let tickets: Vec<u64> = self.running.open.keys().copied().collect();
-        let (passage, knows) = world.recall(&tickets)?;
-        if !knows {
-            // The clock of the world restarts at 0. That of the run has advanced with the wall clock, except for simulations.
-            self.shift = match self.elapsed.until(WallTime::now()) {
-                Ok(elapsed) => &self.last + elapsed - &passage.now,
-                Err(why) => {
-                    self.launch.warnings.warn(&format!(
-                        "the run resumes at {} s, the time of the last record of its journal: {why}",
-                        self.last.to_decimal(3)
-                    ));
-                    self.last.clone()
-                }
-            };
-        }
-        self.last = (&passage.now + &self.shift).max(self.last.clone());
-        let mut news = shifted(passage.observations, &self.shift);
-        for (ticket, open) in &self.running.open {
-            let is_told = news.iter().any(|it| is_about(&it.event, *ticket));
-            if !(knows && is_told) {
-                let why = if knows {
-                    "the world knows nothing of it after the restart"
-                } else {
-                    "it was under way when the run was cut off, and the world cannot say what became of it"
-                };
-                news.push(Observation {
-                    time: self.last.clone(),
-                    event: Event::Ended {
-                        ticket: Ticket(*ticket),
-                        ending: Ending::Failed {
-                            why: why.to_owned(),
-                        },
-                        measured: Vec::new(),
-                    },
-                });
-            }
-            // The world may have received the cancellation already. An action that it does not know may still run.
-            if open.is_cancelled || !is_told {
-                let ticket = Ticket(*ticket);
-                world.command(&self.last, &Command::Cancel { ticket })?;
-            }
-        }
-        self.news = Some(news);
-        Ok(())
-    }
-}
-
-fn is_about(event: &Event, about: u64) -> bool {
-    match event {
-        Event::Started { ticket, .. } | Event::Ended { ticket, .. } => ticket.0 == about,
-        _ => false,
-    }
-}
-
-fn shifted(mut observations: Vec<Observation>, shift: &Rational) -> Vec<Observation> {
-    for observation in &mut observations {
-        observation.time = &observation.time + shift;
-    }
-    observations
 }
 
 impl World for ResumedWorld<'_> {
@@ -403,47 +295,17 @@ impl World for ResumedWorld<'_> {
         if self.replay.has_last() {
             return Ok(());
         }
-        self.process()?;
-        let told = (now - &self.shift).max(Rational::ZERO);
-        if self.news.is_none() {
-            return self.process()?.command(&told, command);
-        }
-        // The decision was made before the outcome of running actions was known.
-        match command {
-            Command::Cancel { .. } => self.process()?.command(&told, command),
-            Command::Start { ticket, .. } => {
-                let why = "it was not started: the run was cut off just then".to_owned();
-                let time = self.last.clone();
-                let event = Event::Ended {
-                    ticket: *ticket,
-                    ending: Ending::Failed { why },
-                    measured: Vec::new(),
-                };
-                let news = self.news.get_or_insert_default();
-                news.push(Observation { time, event });
-                Ok(())
-            }
-        }
+        self.process()?.command(now, command)
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        if let Some(left) = self.left.checked_sub(1) {
-            self.left = left;
-            let passage = self.journal.wait(until)?;
-            self.last = passage.now.clone().max(self.last.clone());
-            return Ok(passage);
-        }
-        self.process()?;
-        if let Some(observations) = self.news.take() {
-            let now = self.last.clone();
-            return Ok(Passage { now, observations });
-        }
-        let shift = self.shift.clone();
-        let passage = self.process()?.wait(&(until - &shift))?;
-        Ok(Passage {
-            now: &passage.now + &shift,
-            observations: shifted(passage.observations, &shift),
-        })
+        let Some(left) = self.left.checked_sub(1) else {
+            return self.process()?.wait(until);
+        };
+        self.left = left;
+        let passage = self.journal.wait(until)?;
+        self.process.note_time(&passage.now);
+        Ok(passage)
     }
 
     fn look(
@@ -451,15 +313,10 @@ impl World for ResumedWorld<'_> {
         facts: &[FactId],
         fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
-        if let Some(left) = self.left.checked_sub(1) {
-            self.left = left;
-            return self.journal.look(facts, fluents);
-        }
-        let mut seen = shifted(self.process()?.look(facts, fluents)?, &self.shift.clone());
-        if let Some(mut news) = self.news.take() {
-            news.append(&mut seen);
-            return Ok(news);
-        }
-        Ok(seen)
+        let Some(left) = self.left.checked_sub(1) else {
+            return self.process()?.look(facts, fluents);
+        };
+        self.left = left;
+        self.journal.look(facts, fluents)
     }
 }

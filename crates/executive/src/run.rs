@@ -19,12 +19,13 @@ use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
 use crate::background_preparer::BackgroundPreparer;
 use crate::belief_updates::BeliefUpdates;
 use crate::clock::Clock;
-use crate::error::Error;
+use crate::error::{Error, WarningSink};
 use crate::journal::{JournalFile, Segments};
 use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
 use crate::operator::{InteractiveWorld, OperatorInterface};
-use crate::process_world::{ProcessLimits, ProcessWorld};
+use crate::process_world::ProcessLimits;
 use crate::realtime::{Realtime, ScaledClock, TimedPlanner};
+use crate::restartable_world::{Launch, RestartableWorld};
 use crate::trace_buffer::TraceBuffer;
 
 /// Application that embeds a run. The defaults have neither operators nor viewers.
@@ -130,9 +131,11 @@ pub struct RunInputs<'a> {
     pub since: Option<Clock>,
     /// Called for each entry after it is recorded, for example by a progress display.
     pub observer: Option<EntryObserver<'a>>,
+    /// Receiver of warnings.
+    pub warnings: WarningSink,
 }
 
-impl RunInputs<'_> {
+impl<'a> RunInputs<'a> {
     /// Executes a run without a journal. `trace` receives the lines of the trace, with their line feeds. `watcher` can
     /// end the run early.
     ///
@@ -154,10 +157,8 @@ impl RunInputs<'_> {
         let Some(command) = &self.spec.world_process else {
             return Ok(self.simulated(&mut writer, host, watcher)?);
         };
-        let (limits, stop) = (self.limits.clone(), self.background.stop.clone());
-        let world = ProcessWorld::start(command, task, limits, stop)?;
         let beliefs = BeliefUpdates::default();
-        let world = world.with_beliefs(beliefs.clone());
+        let world = RestartableWorld::start(self.launch(command), beliefs.clone())?;
         let mut world = self.interactive(world, &Rational::ONE);
         host.started();
         let outcome = self.run(&mut world, &mut writer, beliefs.listener(), watcher);
@@ -192,10 +193,9 @@ impl RunInputs<'_> {
         let health = JournalHealth::default();
         let buffer = host.open_viewers(spec, task, self.operator)?;
         let command = spec.world_process.as_deref().unwrap_or_default();
-        let (limits, stop) = (self.limits.clone(), self.background.stop.clone());
-        let world = ProcessWorld::start(command, task, limits, stop)?;
         let beliefs = BeliefUpdates::default();
-        let world = JournaledWorld::new(world.with_beliefs(beliefs.clone()), health.clone());
+        let world = RestartableWorld::start(self.launch(command), beliefs.clone())?;
+        let world = JournaledWorld::new(world, health.clone());
         let mut world = self.interactive(world, &Rational::ONE);
         host.started();
         let outcome = {
@@ -213,6 +213,17 @@ impl RunInputs<'_> {
             outcome: outcome?,
             journal_failure: file.failure(),
         })
+    }
+
+    /// Returns the arguments for the start of the world process.
+    fn launch(&self, command: &str) -> Launch<'a> {
+        Launch {
+            command: command.to_owned(),
+            task: self.task,
+            limits: self.limits.clone(),
+            stop: self.background.stop.clone(),
+            warnings: self.warnings.clone(),
+        }
     }
 
     /// Wraps a world for operators' requests and background planning.

@@ -95,6 +95,10 @@ pub(crate) struct RunArgs {
     #[arg(allow_negative_numbers = true)]
     #[arg(requires = "programs")]
     pub(crate) answer_within: Rational,
+    /// Start that program again up to N times after it has ended or failed. It is asked about the actions that were
+    /// running; those that it does not know have failed
+    #[arg(long, value_name = "N", default_value = "0", requires = "programs")]
+    pub(crate) restart_world: u32,
     /// End the run at the first message of that program that is malformed or names something that
     /// the problem does not have; otherwise such messages are recorded and ignored
     #[arg(long, requires = "programs")]
@@ -206,7 +210,7 @@ pub(crate) struct RunArgs {
     /// Replay a stored trace and say whether the decisions are the same; all other options are
     /// taken from the trace
     #[arg(long, value_name = "TRACE", conflicts_with_all = IN_THE_TRACE)]
-    #[arg(conflicts_with_all = ["answer_within", "strict_world"])]
+    #[arg(conflicts_with_all = ["answer_within", "restart_world", "strict_world"])]
     pub(crate) replay: Option<PathBuf>,
     /// Largest difference between a printed time or duration and that of a valid plan (T) that counts
     /// as rounding; 0 takes the plan as printed. By default one unit of the last printed digit, at

@@ -240,6 +240,7 @@ fn limits(arguments: &RunArgs) -> ProcessLimits {
     ProcessLimits {
         answer_timeout: arguments.answer_within.clone(),
         is_strict: arguments.strict_world,
+        restarts: arguments.restart_world,
     }
 }
 
@@ -330,6 +331,7 @@ impl Job<'_> {
             limits: limits(arguments),
             since: self.since,
             observer: Some(Box::new(move |entry| line.update(entry))),
+            warnings: output::warnings(),
         };
         let host = CommandHost {
             arguments,

@@ -68,26 +68,15 @@ fn goals_with_deadlines_are_achieved_or_fail() {
     }
     let both = json!({"goal": "(done b2)", "within": 5, "deadline": 1_000_000});
     assert_eq!(own.post("/v1/goals", &both).0, 422);
-    for (name, seconds) in [("soon", "0.001"), ("later", "100000")] {
+    let late = ("soon", "(not (open a1))", "0.001", (1, "failed"));
+    let in_time = ("later", "(done b2)", "100000", (0, "achieved"));
+    for (name, goal, seconds, (code, state)) in [late, in_time] {
         let (token, address) = (own.token(), own.address());
         let executive = ["--token", &token, "--to", &address, "--json"];
-        let goal = [
-            "goal",
-            "(done b2)",
-            "--name",
-            name,
-            "--within",
-            seconds,
-            "--wait",
-        ];
+        let goal = ["goal", goal, "--name", name, "--within", seconds, "--wait"];
         let told = ctl(&[&executive[..], &goal].concat());
         let text = String::from_utf8_lossy(&told.stdout).into_owned();
         let answer: Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{told:?}"));
-        let (code, state) = if name == "soon" {
-            (1, "failed")
-        } else {
-            (0, "achieved")
-        };
         assert_eq!(told.status.code(), Some(code), "{text}");
         assert_eq!(answer["state"], state, "{text}");
     }

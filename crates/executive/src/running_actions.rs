@@ -1,0 +1,154 @@
+//! Actions that run in the world of a run, as far as its program knows.
+
+use std::collections::BTreeMap;
+
+use elbowroom::execution::{Command, Event};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::line::{GivenLine, ObservationLine};
+use elbowroom::report::trace::{Line, SnapshotLine, Stored};
+use elbowroom::report::wire;
+use serde_json::{Value, json};
+
+/// Actions that were started and whose end is not in the journal.
+#[derive(Debug, Default)]
+pub(crate) struct RunningActions {
+    open: BTreeMap<u64, Open>,
+    /// Tickets below this one were issued.
+    given: u64,
+}
+
+/// Action without an end.
+#[derive(Debug)]
+struct Open {
+    action: String,
+    is_instantaneous: bool,
+    has_started: bool,
+    is_cancelled: bool,
+}
+
+/// Returns the tickets of the actions that were running at the snapshot.
+pub(crate) fn open(before: Option<&SnapshotLine>) -> impl Iterator<Item = u64> {
+    let starts = before.into_iter().flat_map(|it| &it.starts);
+    starts.filter(|it| it.is_open()).map(|it| it.ticket)
+}
+
+impl RunningActions {
+    pub(crate) fn of(stored: &Stored, before: Option<&SnapshotLine>) -> Self {
+        let starts = before.iter().flat_map(|it| &it.starts);
+        let open = starts.filter(|it| it.is_open()).map(|it| {
+            let open = Open {
+                action: it.action.clone(),
+                is_instantaneous: it.duration.is_none(),
+                has_started: it.started.is_some(),
+                is_cancelled: it.cancelled.is_some(),
+            };
+            (it.ticket, open)
+        });
+        let mut running = Self {
+            given: before.map_or(0, |it| it.started as u64),
+            open: open.collect(),
+        };
+        for line in &stored.lines {
+            match line {
+                Line::Command(line) => running.note_line(&line.command),
+                Line::Passed(line) => line.observations.iter().for_each(|it| running.read(it)),
+                Line::Looked(line) => line.observations.iter().for_each(|it| running.read(it)),
+                _ => {}
+            }
+        }
+        running
+    }
+
+    fn note_line(&mut self, command: &GivenLine) {
+        match command {
+            GivenLine::Start {
+                ticket,
+                action,
+                duration,
+            } => self.start(*ticket, action, duration.is_none()),
+            GivenLine::Cancel { ticket } => self.cancel(*ticket),
+        }
+    }
+
+    /// Records a command that the world receives.
+    pub(crate) fn note(&mut self, command: &Command) {
+        match command {
+            Command::Start {
+                ticket,
+                action,
+                duration,
+            } => self.start(ticket.0, &action.name, duration.is_none()),
+            Command::Cancel { ticket } => self.cancel(ticket.0),
+        }
+    }
+
+    fn start(&mut self, ticket: u64, action: &str, is_instantaneous: bool) {
+        self.given = self.given.max(ticket + 1);
+        let open = Open {
+            action: action.to_owned(),
+            is_instantaneous,
+            has_started: false,
+            is_cancelled: false,
+        };
+        self.open.insert(ticket, open);
+    }
+
+    fn cancel(&mut self, ticket: u64) {
+        if let Some(open) = self.open.get_mut(&ticket) {
+            open.is_cancelled = true;
+        }
+    }
+
+    fn read(&mut self, observation: &ObservationLine) {
+        match observation {
+            ObservationLine::Started { ticket, .. } => self.started(*ticket),
+            ObservationLine::Ended { ticket, .. } => self.ended(*ticket),
+            _ => {}
+        }
+    }
+
+    /// Records an observation of the world.
+    pub(crate) fn observe(&mut self, event: &Event) {
+        match event {
+            Event::Started { ticket, .. } => self.started(ticket.0),
+            Event::Ended { ticket, .. } => self.ended(ticket.0),
+            _ => {}
+        }
+    }
+
+    fn started(&mut self, ticket: u64) {
+        match self.open.get_mut(&ticket) {
+            Some(open) if open.is_instantaneous => self.ended(ticket),
+            Some(open) => open.has_started = true,
+            None => {}
+        }
+    }
+
+    fn ended(&mut self, ticket: u64) {
+        self.open.remove(&ticket);
+    }
+
+    /// Returns the tickets.
+    pub(crate) fn tickets(&self) -> Vec<u64> {
+        self.open.keys().copied().collect()
+    }
+
+    /// Returns the tickets, each with `true` if the action was cancelled.
+    pub(crate) fn open(&self) -> impl Iterator<Item = (u64, bool)> {
+        let open = self.open.iter();
+        open.map(|(ticket, open)| (*ticket, open.is_cancelled))
+    }
+
+    /// Tickets below this one were issued.
+    pub(crate) fn given(&self) -> u64 {
+        self.given
+    }
+
+    /// Returns the message about these actions for the world.
+    pub(crate) fn message(&self, now: &Rational) -> Value {
+        let open = self.open.iter().map(|(ticket, open)| {
+            json!({ "ticket": ticket, "action": open.action, "started": open.has_started })
+        });
+        json!({ "now": wire::number(now), "open": open.collect::<Vec<_>>() })
+    }
+}
