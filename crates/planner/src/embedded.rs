@@ -27,6 +27,7 @@ mod expressions;
 mod extract;
 mod formula;
 mod hash;
+mod invariants;
 mod landmarks;
 mod mutex;
 mod needless;

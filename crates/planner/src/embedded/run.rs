@@ -15,8 +15,10 @@ use elbowroom_model::Task;
 
 use super::answer::{Answer, Counts, Progress, Proof, Stopped};
 use super::compile::Compiled;
+use super::invariants::Invariants;
 use super::reasons::{self, Names};
 use super::relaxed;
+use super::root::root;
 use super::search::Search;
 use super::symmetry::Symmetry;
 use super::tuning::Technique;
@@ -196,6 +198,11 @@ impl<'a> Planner<'a> {
             left = Some(turns.saturating_sub(spent).max(1 + tuning.root_check_after));
             turn = usize::from(outcome != Outcome::WorkDone && outcome != Outcome::Better);
         }
+        if self.is_looking() && self.finds_invariants() {
+            self.progress.counts.memory -= taken(&entrants[0]);
+            entrants[0] = Entrant::new(entrants[0].strategy);
+            (turn, left) = (0, None);
+        }
         while self.is_looking() {
             turn = self.round(entrants, turn, (budget, left.filter(|_| turn == 0)));
             if entrants.iter().all(|entrant| entrant.is_over) {
@@ -216,6 +223,17 @@ impl<'a> Planner<'a> {
             budget = budget.min(tuning.improving_round);
         }
         First::Found { turn, budget }
+    }
+
+    /// Finds what no plan goes through. Whether there is anything like that: the first search then begins anew.
+    fn finds_invariants(&self) -> bool {
+        let compiled = self.frame.compiled;
+        let tuning = &compiled.tuning;
+        if !tuning.uses(Technique::Invariants) || compiled.is_symbolic {
+            return false;
+        }
+        let find = || Invariants::of(compiled, &root(compiled), tuning.most_invariant_work);
+        compiled.invariants.get_or_init(find).is_some()
     }
 
     /// Why a run ends whose searches are all over.

@@ -26,6 +26,7 @@ use super::answer::Counts;
 use super::apply::{Step, Stepper};
 use super::bound::MetricBound;
 use super::compile::Compiled;
+use super::invariants::Invariants;
 use super::relaxed::{Consumable, Relaxed, consumables};
 use super::root::root;
 use super::state::State;
@@ -73,6 +74,8 @@ pub(crate) struct Search<'a> {
     first_estimate: u32,
     /// The propositions seen before, if novelty decides.
     novelty: Option<Novelty>,
+    /// What no plan goes through, if that is known and used.
+    invariants: Option<&'a Invariants>,
     /// What is known of the landmarks, if they count.
     landmarks: SearchLandmarks,
     /// The consumable fluents, if they are to be spared.
@@ -132,6 +135,7 @@ impl<'a> Search<'a> {
         if let Some(step_costs) = &step_costs {
             relaxed.weigh(step_costs);
         }
+        let invariants = strategy.invariants(compiled);
         let is_timeless = compiled.timed.is_empty()
             && compiled.calendars.is_empty()
             && metric.is_none_or(MetricBound::is_timeless)
@@ -159,6 +163,7 @@ impl<'a> Search<'a> {
             best: (u32::MAX, u32::MAX),
             first_estimate: 0,
             novelty: strategy.novelty.map(|_| Novelty::new(compiled)),
+            invariants,
             landmarks: SearchLandmarks::Unknown,
             consumables: if strategy.saves_consumables {
                 consumables(compiled)
@@ -169,7 +174,9 @@ impl<'a> Search<'a> {
             step_costs,
             limit: None,
             horizon: NEVER,
-            has_lost: strategy.is_chronological || strategy.replaces_starts(compiled),
+            has_lost: strategy.is_chronological
+                || strategy.replaces_starts(compiled)
+                || invariants.is_some(),
             price: 1,
             labour: 0,
             weighed: 0,
@@ -360,6 +367,12 @@ impl<'a> Search<'a> {
         let projection = (self.strategy.compresses.is_none() && !state.network.is_empty())
             .then(|| Box::new(state.projection()));
         if self.is_known(hash, &state, projection.as_deref()) {
+            return Turn::Nothing;
+        }
+        if self
+            .invariants
+            .is_some_and(|known| known.is_dead_end(&state))
+        {
             return Turn::Nothing;
         }
         self.evaluated += 1;

@@ -1,0 +1,280 @@
+//! Pairs of atoms that no plan has together (`h²`, forwards and backwards).
+//!
+//! Forwards, the pairs are found that a sequence of choices may make true together (`h²` without costs; Haslum &
+//! Geffner, AIPS 2000). Backwards, those of them are found from which choices may lead to the goal: a state that has
+//! any other pair is a dead end. An action that no such path has is *spurious*. (Alcázar & Torralba, "A reminder about
+//! the importance of computing and exploiting invariants in planning", ICAPS 2015.)
+//!
+//! Starts and ends are operators, as in [`mutex`](super::mutex). A tile that is painted before the one behind it, which
+//! can then no longer be reached, is a pair that leads nowhere, and painting it from behind is spurious.
+//!
+//! Only searches that are incomplete anyway use this, so that no proof rests on it.
+
+mod model;
+mod table;
+
+use elbowroom_num::work;
+
+use super::compile::Compiled;
+use super::state::State;
+use model::{Model, Operator};
+use table::{Table, is_subset};
+
+/// See the module.
+#[derive(Debug)]
+pub(crate) struct Invariants {
+    model: Model,
+    /// By action.
+    pub(crate) is_spurious: Vec<bool>,
+    /// The pairs that a state may have, but no path to the goal.
+    dead: Table,
+    /// The atoms that have such a pair.
+    with_dead: Vec<usize>,
+}
+
+impl Invariants {
+    /// The invariants from a state on. `None` if they are not found with so much work, or are of no use.
+    pub(crate) fn of(compiled: &Compiled, state: &State, most_work: u64) -> Option<Self> {
+        let model = Model::of(compiled, most_work)?;
+        let mut finder = Finder::new(&model, most_work);
+        let reached = finder.reach(state)?;
+        let live = finder.lead_on(&reached)?;
+        let may_start = finder.is_live.iter().zip(&model.operators);
+        let may_start = may_start.filter(|(is_live, operator)| **is_live && operator.is_start);
+        let mut is_spurious: Vec<bool> = compiled
+            .actions
+            .iter()
+            .map(|action| action.start != super::compile::NONE)
+            .collect();
+        for (_, operator) in may_start {
+            is_spurious[operator.action as usize] = false;
+        }
+        let dead = reached.without(&live);
+        let atoms = 0..model.atom_count;
+        let with_dead: Vec<usize> = atoms.filter(|&atom| !dead.is_row_empty(atom)).collect();
+        let is_useful = !with_dead.is_empty() || is_spurious.contains(&true);
+        is_useful.then_some(Self {
+            model,
+            is_spurious,
+            dead,
+            with_dead,
+        })
+    }
+
+    /// Whether no plan goes through the state.
+    pub(crate) fn is_dead_end(&self, state: &State) -> bool {
+        if self.with_dead.is_empty() {
+            return false;
+        }
+        let held = self.model.atoms_of(state);
+        self.with_dead.iter().any(|&atom| {
+            table::contains(&held, atom) && table::intersects(self.dead.row(atom), &held)
+        })
+    }
+
+    /// The memory that they take, in bytes.
+    pub(crate) fn size(&self) -> usize {
+        self.dead.size()
+    }
+}
+
+/// What the pairs are found with.
+struct Finder<'a> {
+    model: &'a Model,
+    /// For each operator, in which round it was looked at last.
+    seen: Vec<u32>,
+    /// Whether the goal may be reached after the operator.
+    is_live: Vec<bool>,
+    /// Atoms that hold together with what an operator needs.
+    context: Vec<u64>,
+    /// Atoms that hold after it, too.
+    kept: Vec<u64>,
+    budget: work::Budget,
+}
+
+impl<'a> Finder<'a> {
+    fn new(model: &'a Model, most_work: u64) -> Self {
+        let words = model.atom_count.div_ceil(64);
+        Self {
+            model,
+            seen: vec![0; model.operators.len()],
+            is_live: vec![false; model.operators.len()],
+            context: vec![0; words],
+            kept: vec![0; words],
+            budget: work::Budget::new(most_work),
+        }
+    }
+
+    /// The pairs that may be true together after some choices. `None` if that takes too long.
+    fn reach(&mut self, state: &State) -> Option<Table> {
+        let mut reached = Table::new(self.model.atom_count);
+        let initial = self.model.atoms_of(state);
+        for atom in table::bits(&initial) {
+            reached.add(atom, &initial, 0);
+        }
+        self.until_nothing_changes(&mut reached, |finder, reached, operator, round| {
+            finder.apply(reached, operator, round)
+        })?;
+        Some(reached)
+    }
+
+    /// The pairs among these from which choices may lead to the goal. `None` if that takes too long.
+    fn lead_on(&mut self, reached: &Table) -> Option<Table> {
+        let model = self.model;
+        let mut live = Table::new(model.atom_count);
+        let mut ending = reached.all_of(&model.goal);
+        model.clear_running(&mut ending);
+        for atom in table::bits(&ending) {
+            let with: Vec<u64> = and(reached.row(atom), &ending);
+            live.add(atom, &with, 0);
+        }
+        self.seen.fill(0);
+        self.until_nothing_changes(&mut live, |finder, live, operator, round| {
+            finder.regress(reached, live, operator, round)
+        })?;
+        Some(live)
+    }
+
+    /// Looks at all operators, again and again.
+    fn until_nothing_changes(
+        &mut self,
+        table: &mut Table,
+        mut look: impl FnMut(&mut Self, &mut Table, usize, u32) -> bool,
+    ) -> Option<()> {
+        let mut round = 0;
+        loop {
+            round += 1;
+            let mut has_changed = false;
+            for operator in 0..self.model.operators.len() {
+                has_changed |= look(self, table, operator, round);
+                if self.budget.is_spent() {
+                    return None;
+                }
+            }
+            if !has_changed {
+                return Some(());
+            }
+        }
+    }
+
+    /// Whether one of the rows has changed since the operator was looked at, or it is the first time. None at all
+    /// may always have changed.
+    fn is_due(&mut self, table: &Table, operator: usize, atoms: &[usize], round: u32) -> bool {
+        let last = std::mem::replace(&mut self.seen[operator], round);
+        let is_due =
+            atoms.is_empty() || last == 0 || atoms.iter().any(|&atom| table.changed(atom) >= last);
+        work::spend(1 + atoms.len() as u64);
+        is_due
+    }
+
+    /// Adds the pairs that an operator makes true. Whether there are new ones.
+    fn apply(&mut self, reached: &mut Table, number: usize, round: u32) -> bool {
+        let model = self.model;
+        let operator = &model.operators[number];
+        if !self.is_due(reached, number, &operator.needs, round)
+            || !self.find_context(reached, operator)
+        {
+            return false;
+        }
+        for &atom in &operator.deletes {
+            table::remove(&mut self.context, atom);
+        }
+        if let Some(running) = operator.ends
+            && !self.may_run_twice(reached, running, operator.action)
+        {
+            table::remove(&mut self.context, running);
+        }
+        for &atom in operator.adds.iter().chain(&operator.may_add) {
+            table::insert(&mut self.context, atom);
+        }
+        let context = std::mem::take(&mut self.context);
+        let mut has_changed = false;
+        for &atom in operator.adds.iter().chain(&operator.may_add) {
+            has_changed |= reached.add_consistent(atom, &context, model.opposite(atom), round);
+        }
+        self.spend(context.len() * (1 + operator.adds.len()));
+        self.context = context;
+        has_changed
+    }
+
+    /// Adds the pairs from which an operator leads on. Whether there are new ones.
+    fn regress(&mut self, reached: &Table, live: &mut Table, number: usize, round: u32) -> bool {
+        let model = self.model;
+        let operator = &model.operators[number];
+        let ended = operator.ends.map(|running| {
+            (
+                running,
+                self.may_run_twice(reached, running, operator.action),
+            )
+        });
+        let is_lost = |atom: usize| {
+            operator.deletes.contains(&atom)
+                || operator.may_delete.contains(&atom)
+                || ended.is_some_and(|(running, _)| running == atom)
+        };
+        let needs = operator.needs.iter().copied();
+        let mut after: Vec<usize> = needs.filter(|&atom| !is_lost(atom)).collect();
+        after.extend(&operator.adds);
+        if !self.is_due(live, number, &after, round) || !live.has_all_pairs(&after) {
+            return false;
+        }
+        if !self.find_context(reached, operator) {
+            return false;
+        }
+        self.is_live[number] = true;
+        let with_after = live.all_of(&after);
+        let kept = self
+            .kept
+            .iter_mut()
+            .zip(self.context.iter().zip(&with_after));
+        for (kept, (context, with_after)) in kept {
+            *kept = context & with_after;
+        }
+        let mut lost = operator.deletes.clone();
+        lost.extend(&operator.may_delete);
+        lost.extend(ended.map(|(running, _)| running));
+        lost.retain(|&atom| table::contains(&self.context, atom));
+        for &atom in &lost {
+            table::insert(&mut self.kept, atom);
+        }
+        let mut has_changed = false;
+        for &atom in &lost {
+            let with = and(reached.row(atom), &self.kept);
+            has_changed |= live.add(atom, &with, round);
+        }
+        self.spend(self.context.len() * (2 + after.len() + 2 * lost.len()));
+        has_changed
+    }
+
+    /// Finds the atoms that may hold together with all that the operator needs. Whether it may happen at all.
+    fn find_context(&mut self, reached: &Table, operator: &Operator) -> bool {
+        self.spend(self.context.len() * (1 + operator.needs.len()));
+        if !reached.has_all_pairs(&operator.needs) {
+            return false;
+        }
+        self.context = reached.all_of(&operator.needs);
+        for &atom in &operator.breaks {
+            table::remove(&mut self.context, atom);
+        }
+        true
+    }
+
+    /// Whether an action may start while it is under way.
+    fn may_run_twice(&self, reached: &Table, running: usize, action: u32) -> bool {
+        let start = self.model.start_of(action);
+        start.is_some_and(|start| {
+            is_subset(&start.needs, reached.row(running)) && !start.excludes_itself
+        })
+    }
+
+    fn spend(&self, words: usize) {
+        work::spend(words as u64);
+    }
+}
+
+fn and(one: &[u64], other: &[u64]) -> Vec<u64> {
+    one.iter()
+        .zip(other)
+        .map(|(one, other)| one & other)
+        .collect()
+}
