@@ -32,7 +32,7 @@ mod unsupported;
 mod without_duration;
 
 use std::borrow::Borrow;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
@@ -46,7 +46,6 @@ pub(crate) use metric::Metric;
 pub use unsupported::Unsupported;
 
 use super::formula::{Formula, Numeric, Test};
-use super::invariants::Invariants;
 use super::time::{NEVER, Scale, Ticks};
 use super::tuning::Tuning;
 use super::windows::Windows;
@@ -116,8 +115,6 @@ pub(crate) struct Compiled {
     pub(crate) starts_depend_on_each_other: bool,
     /// Whether some value depends on when things happen.
     pub(crate) is_symbolic: bool,
-    /// Found once a search takes longer, for those that are incomplete anyway.
-    pub(crate) invariants: OnceLock<Option<Invariants>>,
 }
 
 /// A start, an end, or an instantaneous action.

@@ -12,10 +12,12 @@
 
 mod model;
 mod table;
+#[cfg(test)]
+mod tests;
 
 use elbowroom_num::work;
 
-use super::compile::Compiled;
+use super::compile::{Compiled, NONE};
 use super::state::State;
 use model::{Model, Operator};
 use table::{Table, is_subset};
@@ -44,7 +46,7 @@ impl Invariants {
         let mut is_spurious: Vec<bool> = compiled
             .actions
             .iter()
-            .map(|action| action.start != super::compile::NONE)
+            .map(|action| action.start != NONE)
             .collect();
         for (_, operator) in may_start {
             is_spurious[operator.action as usize] = false;
@@ -70,11 +72,6 @@ impl Invariants {
         self.with_dead.iter().any(|&atom| {
             table::contains(&held, atom) && table::intersects(self.dead.row(atom), &held)
         })
-    }
-
-    /// The memory that they take, in bytes.
-    pub(crate) fn size(&self) -> usize {
-        self.dead.size()
     }
 }
 

@@ -233,7 +233,7 @@ impl<'a> Planner<'a> {
             return false;
         }
         let find = || Invariants::of(compiled, &root(compiled), tuning.most_invariant_work);
-        compiled.invariants.get_or_init(find).is_some()
+        self.frame.invariants.get_or_init(find).is_some()
     }
 
     /// Why a run ends whose searches are all over.
@@ -273,7 +273,7 @@ impl<'a> Planner<'a> {
     /// for.
     fn begin(&mut self, entrant: &mut Entrant<'a>, allowance: Allowance) -> (Outcome, u64) {
         let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
-        let search = entrant.search(frame.compiled, symmetry);
+        let search = entrant.search(frame, symmetry);
         let mut base = self.progress.counts;
         let mut hear = |report| self.hear(&mut base, report);
         let mut strand = Strand::new(frame, None, unreported, &mut hear);
@@ -314,7 +314,7 @@ impl<'a> Planner<'a> {
             jobs.push(Box::new(move |tell: Tell<'_>| {
                 let own_task = own_task.map(Task::with_own_table);
                 let task = own_task.as_ref().unwrap_or(frame.task);
-                let search = entrant.search(compiled, symmetry);
+                let search = entrant.search(frame, symmetry);
                 let turns = left.unwrap_or_else(|| share(search, budget, compiled));
                 let mut strand = Strand::new(Frame { task, ..frame }, None, unreported, tell);
                 let (outcome, _, _) = strand.work(search, Allowance::turns(turns));

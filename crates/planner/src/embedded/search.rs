@@ -124,18 +124,26 @@ pub(crate) enum Turn {
 }
 
 impl<'a> Search<'a> {
-    pub(crate) fn new(compiled: &'a Compiled, symmetry: &'a Symmetry, strategy: Strategy) -> Self {
+    /// `invariants`: what is known of pairs, for an incomplete search.
+    pub(crate) fn new(
+        compiled: &'a Compiled,
+        (symmetry, invariants): (&'a Symmetry, Option<&'a Invariants>),
+        strategy: Strategy,
+    ) -> Self {
+        let invariants = invariants.filter(|_| !strategy.is_complete());
         let is_weighing = strategy.aim != Aim::Goal;
         let metric = compiled.metric.as_ref().filter(|_| is_weighing);
         let step_costs = metric.map(|metric| StepCosts::of(compiled, metric));
         let mut relaxed = strategy.relaxed(compiled);
+        if let Some(invariants) = invariants {
+            relaxed.leave_out(&invariants.is_spurious);
+        }
         let mut stepper = Stepper::new(compiled);
         stepper.is_chronological = strategy.is_chronological;
         stepper.joins = strategy.joins;
         if let Some(step_costs) = &step_costs {
             relaxed.weigh(step_costs);
         }
-        let invariants = strategy.invariants(compiled);
         let is_timeless = compiled.timed.is_empty()
             && compiled.calendars.is_empty()
             && metric.is_none_or(MetricBound::is_timeless)

@@ -24,6 +24,16 @@ pub(super) struct Operator {
     pub(super) excludes_itself: bool,
 }
 
+/// All operators are looked at so many times at least, both ways together.
+const FEWEST_ROUNDS: u64 = 8;
+
+impl Operator {
+    /// How many rows one look at it reads and writes.
+    fn size(&self) -> usize {
+        2 + self.needs.len() + self.adds.len()
+    }
+}
+
 /// The atoms and operators of a problem.
 ///
 /// An atom is that a fact is true, that it is false, if something needs that or the fact is a goal, or that an action
@@ -43,7 +53,7 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// `None` if a table of all pairs takes more work than so much.
+    /// `None` if there is so much of it that pairs surely take more work.
     pub(super) fn of(compiled: &Compiled, most_work: u64) -> Option<Self> {
         let fact_count = compiled.facts.len();
         let mut model = Self {
@@ -63,10 +73,6 @@ impl Model {
         model.number_falsehoods(compiled);
         model.first_running = fact_count + model.false_facts.len();
         model.atom_count = model.first_running + compiled.actions.len();
-        let words = model.atom_count as u64 * model.atom_count as u64 / 64;
-        if words > most_work / 8 {
-            return None;
-        }
         model.goal = model.literals(&compiled.goal.literals);
         let mut watching = vec![Vec::new(); 2 * fact_count];
         for (number, action) in compiled.actions.iter().enumerate() {
@@ -86,7 +92,9 @@ impl Model {
             let operator = model.operator(&snap, &watching);
             model.operators.push(operator);
         }
-        Some(model)
+        let words = model.atom_count.div_ceil(64) as u64;
+        let round: usize = model.operators.iter().map(Operator::size).sum();
+        (words * round as u64 <= most_work / FEWEST_ROUNDS).then_some(model)
     }
 
     /// The operator of an action's start.

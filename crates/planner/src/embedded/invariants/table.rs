@@ -21,11 +21,6 @@ impl Table {
         }
     }
 
-    /// The memory that it takes, in bytes.
-    pub(super) fn size(&self) -> usize {
-        8 * self.bits.len() + 4 * self.count
-    }
-
     pub(super) fn row(&self, atom: usize) -> &[u64] {
         &self.bits[atom * self.words..(atom + 1) * self.words]
     }

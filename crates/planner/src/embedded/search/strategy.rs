@@ -1,7 +1,6 @@
 //! How a search goes about it.
 
 use super::super::compile::{Compiled, Compressibility};
-use super::super::invariants::Invariants;
 use super::super::relaxed::Relaxed;
 use super::super::tuning::{Member, Technique, Tuning};
 
@@ -154,17 +153,8 @@ impl Strategy {
         if self.replenishes {
             relaxed.count_resources();
         }
-        if let Some(invariants) = self.invariants(compiled) {
-            relaxed.leave_out(&invariants.is_spurious);
-        }
         relaxed.lists_subgoals = self.novelty == Some(NoveltyOf::Successors);
         relaxed
-    }
-
-    /// The invariants, if it uses them, and they are known.
-    pub(super) fn invariants(self, compiled: &Compiled) -> Option<&Invariants> {
-        let invariants = compiled.invariants.get()?.as_ref();
-        invariants.filter(|_| !self.is_complete())
     }
 
     /// Compresses actions that are at least so safe.

@@ -5,7 +5,6 @@ mod dates;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::sync::OnceLock;
 
 use elbowroom_model::ground::{self, Change as ModelChange, Condition};
 use elbowroom_model::reachability::Grounding;
@@ -148,7 +147,6 @@ impl Builder<'_> {
             needs_joining: numbers.or(relaxation_incomplete_because).is_some(),
             starts_depend_on_each_other,
             is_symbolic,
-            invariants: OnceLock::new(),
         })
     }
 
