@@ -396,12 +396,8 @@ impl<'a> Search<'a> {
             self.has_lost |= self.strategy.compresses.is_some();
             return Turn::Nothing;
         };
-        self.symmetry
-            .thin_out(&state, self.is_timeless, &mut estimate.applicable);
-        let kept = &estimate.applicable;
-        estimate
-            .preferred
-            .retain(|step| kept.binary_search(step).is_ok());
+        let steps = (&mut estimate.applicable, &mut estimate.preferred);
+        self.symmetry.thin_out(&state, self.is_timeless, steps);
         let is_goal = is_goal(self.compiled, &state);
         let due = self.compiled.timed_until_goal.saturating_sub(state.timed);
         if state.symbolic.is_some() && !is_goal {
