@@ -54,6 +54,10 @@ impl Planner<'_> {
         }
         if !self.frame.compiled.is_symbolic {
             if tuning.uses(Technique::Width) {
+                if counts_landmarks && !needs_concurrency {
+                    // Without landmarks on the way to the goal it is over at once.
+                    add(Member::LandmarkWidth);
+                }
                 add(Member::Width);
             }
             if counts_landmarks && !needs_concurrency {
