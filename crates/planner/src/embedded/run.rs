@@ -198,7 +198,8 @@ impl<'a> Planner<'a> {
             left = Some(turns.saturating_sub(spent).max(1 + tuning.root_check_after));
             turn = usize::from(outcome != Outcome::WorkDone && outcome != Outcome::Better);
         }
-        if self.is_looking() && self.finds_invariants() {
+        if self.is_looking() && self.finds_invariants() && would_gain(&entrants[0]) {
+            // All others begin later.
             self.progress.counts.memory -= taken(&entrants[0]);
             entrants[0] = Entrant::new(entrants[0].strategy);
             (turn, left) = (0, None);
@@ -225,7 +226,7 @@ impl<'a> Planner<'a> {
         First::Found { turn, budget }
     }
 
-    /// Finds what no plan goes through. Whether there is anything like that: the first search then begins anew.
+    /// Finds what no plan goes through. Whether there is anything like that.
     fn finds_invariants(&self) -> bool {
         let compiled = self.frame.compiled;
         let tuning = &compiled.tuning;
@@ -448,6 +449,13 @@ impl<'a> Planner<'a> {
         let mut goes_on = || observe(progress).is_continue();
         reasons::pairs_proof(names, frame.compiled, &mut goes_on)
     }
+}
+
+/// Whether a search had better begin anew with invariants: it has not come nearer to the goal for a while.
+fn would_gain(entrant: &Entrant<'_>) -> bool {
+    let search = entrant.search.as_ref();
+    let is_stuck = search.is_some_and(|search| !search.has_come_nearer());
+    is_stuck && !entrant.is_over && !entrant.strategy.is_complete()
 }
 
 /// How many turns a search gets of a round.
