@@ -27,9 +27,9 @@ mod expressions;
 mod extract;
 mod formula;
 mod hash;
-mod invariants;
 mod landmarks;
 mod mutex;
+mod mutex_pairs;
 mod needless;
 mod network;
 mod pairs;
@@ -198,12 +198,12 @@ fn search_for_plans(
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }
-    let invariants = OnceLock::new();
+    let mutex_pairs = OnceLock::new();
     let frame = Frame::new(
         (task, constrained),
         situation,
         settings,
-        (&compiled, &invariants),
+        (&compiled, &mutex_pairs),
     );
     progress.counts.work = work::spent() - begin;
     Planner::new(frame, (&names, &symmetry), progress, observe).run()

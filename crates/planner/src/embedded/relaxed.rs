@@ -186,7 +186,7 @@ impl<'a> Relaxed<'a> {
         cost(start).max(cost(end))
     }
 
-    /// From now on, these actions do not start, by action.
+    /// Excludes the starts of these actions, by action number.
     pub(crate) fn leave_out(&mut self, is_left_out: &[bool]) {
         self.graph.leave_out(self.compiled, is_left_out);
     }

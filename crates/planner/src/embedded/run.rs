@@ -15,7 +15,7 @@ use elbowroom_model::Task;
 
 use super::answer::{Answer, Counts, Progress, Proof, Stopped};
 use super::compile::Compiled;
-use super::invariants::Invariants;
+use super::mutex_pairs::MutexPairs;
 use super::reasons::{self, Names};
 use super::relaxed;
 use super::root::root;
@@ -198,8 +198,8 @@ impl<'a> Planner<'a> {
             left = Some(turns.saturating_sub(spent).max(1 + tuning.root_check_after));
             turn = usize::from(outcome != Outcome::WorkDone && outcome != Outcome::Better);
         }
-        if self.is_looking() && self.finds_invariants() && would_gain(&entrants[0]) {
-            // All others begin later.
+        if self.is_looking() && self.finds_mutex_pairs() && is_stuck(&entrants[0]) {
+            // The other searches have not begun yet.
             self.progress.counts.memory -= taken(&entrants[0]);
             entrants[0] = Entrant::new(entrants[0].strategy);
             (turn, left) = (0, None);
@@ -226,15 +226,15 @@ impl<'a> Planner<'a> {
         First::Found { turn, budget }
     }
 
-    /// Finds what no plan goes through. Whether there is anything like that.
-    fn finds_invariants(&self) -> bool {
+    /// Computes mutex pairs. Returns `true` if there is a spurious action or a dead pair.
+    fn finds_mutex_pairs(&self) -> bool {
         let compiled = self.frame.compiled;
         let tuning = &compiled.tuning;
-        if !tuning.uses(Technique::Invariants) || compiled.is_symbolic {
+        if !tuning.uses(Technique::MutexPairs) || compiled.is_symbolic {
             return false;
         }
-        let find = || Invariants::of(compiled, &root(compiled), tuning.most_invariant_work);
-        self.frame.invariants.get_or_init(find).is_some()
+        let find = || MutexPairs::of(compiled, &root(compiled), tuning.most_mutex_pair_work);
+        self.frame.mutex_pairs.get_or_init(find).is_some()
     }
 
     /// Why a run ends whose searches are all over.
@@ -451,11 +451,13 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Whether a search had better begin anew with invariants: it has not come nearer to the goal for a while.
-fn would_gain(entrant: &Entrant<'_>) -> bool {
+/// Returns `true` if a search restarts with mutex pairs: it is incomplete, and its best estimate has not improved
+/// recently.
+fn is_stuck(entrant: &Entrant<'_>) -> bool {
     let search = entrant.search.as_ref();
-    let is_stuck = search.is_some_and(|search| !search.has_come_nearer());
-    is_stuck && !entrant.is_over && !entrant.strategy.is_complete()
+    let makes_no_progress =
+        |search: &Search<'_>| search.is_incomplete() && !search.has_come_nearer();
+    !entrant.is_over && !entrant.strategy.is_complete() && search.is_some_and(makes_no_progress)
 }
 
 /// How many turns a search gets of a round.

@@ -26,7 +26,7 @@ use super::answer::Counts;
 use super::apply::{Step, Stepper};
 use super::bound::MetricBound;
 use super::compile::Compiled;
-use super::invariants::Invariants;
+use super::mutex_pairs::MutexPairs;
 use super::relaxed::{Consumable, Relaxed, consumables};
 use super::root::root;
 use super::state::State;
@@ -74,8 +74,8 @@ pub(crate) struct Search<'a> {
     first_estimate: u32,
     /// The propositions seen before, if novelty decides.
     novelty: Option<Novelty>,
-    /// What no plan goes through, if that is known and used.
-    invariants: Option<&'a Invariants>,
+    /// Mutex pairs, in an incomplete search.
+    mutex_pairs: Option<&'a MutexPairs>,
     /// What is known of the landmarks, if they count.
     landmarks: SearchLandmarks,
     /// The consumable fluents, if they are to be spared.
@@ -124,19 +124,19 @@ pub(crate) enum Turn {
 }
 
 impl<'a> Search<'a> {
-    /// `invariants`: what is known of pairs, for an incomplete search.
+    /// Creates a search. A complete one ignores the mutex pairs.
     pub(crate) fn new(
         compiled: &'a Compiled,
-        (symmetry, invariants): (&'a Symmetry, Option<&'a Invariants>),
+        (symmetry, mutex_pairs): (&'a Symmetry, Option<&'a MutexPairs>),
         strategy: Strategy,
     ) -> Self {
-        let invariants = invariants.filter(|_| !strategy.is_complete());
+        let mutex_pairs = mutex_pairs.filter(|_| !strategy.is_complete());
         let is_weighing = strategy.aim != Aim::Goal;
         let metric = compiled.metric.as_ref().filter(|_| is_weighing);
         let step_costs = metric.map(|metric| StepCosts::of(compiled, metric));
         let mut relaxed = strategy.relaxed(compiled);
-        if let Some(invariants) = invariants {
-            relaxed.leave_out(&invariants.is_spurious);
+        if let Some(mutex_pairs) = mutex_pairs {
+            relaxed.leave_out(&mutex_pairs.is_spurious);
         }
         let mut stepper = Stepper::new(compiled);
         stepper.is_chronological = strategy.is_chronological;
@@ -171,7 +171,7 @@ impl<'a> Search<'a> {
             best: (u32::MAX, u32::MAX),
             first_estimate: 0,
             novelty: strategy.novelty.map(|_| Novelty::new(compiled)),
-            invariants,
+            mutex_pairs,
             landmarks: SearchLandmarks::Unknown,
             consumables: if strategy.saves_consumables {
                 consumables(compiled)
@@ -184,7 +184,7 @@ impl<'a> Search<'a> {
             horizon: NEVER,
             has_lost: strategy.is_chronological
                 || strategy.replaces_starts(compiled)
-                || invariants.is_some(),
+                || mutex_pairs.is_some(),
             price: 1,
             labour: 0,
             weighed: 0,
@@ -378,7 +378,7 @@ impl<'a> Search<'a> {
             return Turn::Nothing;
         }
         if self
-            .invariants
+            .mutex_pairs
             .is_some_and(|known| known.is_dead_end(&state))
         {
             return Turn::Nothing;

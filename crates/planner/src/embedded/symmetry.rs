@@ -60,8 +60,8 @@ impl Symmetry {
         }
     }
 
-    /// Leaves out steps to which others in the list are equivalent. Of the preferred steps, these others take the
-    /// places.
+    /// Removes steps that are equivalent to others in the list. Preferred steps are replaced by their equivalents in
+    /// the list.
     pub(crate) fn thin_out(
         &self,
         state: &State,
@@ -224,8 +224,8 @@ impl<'a> Finder<'a> {
                         after.chain(snap.marks.iter().copied()).collect()
                     };
                     let (a, b) = (all(a), all(b));
-                    // An exchange is its own inverse, so what only one of them has becomes what only the other
-                    // one has.
+                    // An exchange is its own inverse. It maps the annotations of only one snap to those of
+                    // only the other.
                     for &annotation in a.difference(&b) {
                         annotations.extend(b.difference(&a).map(|&other| (annotation, other)));
                     }

@@ -24,8 +24,8 @@ pub enum Technique {
     PreferredOperators,
     /// Temporal `h²`: dead ends by pairs of facts.
     DeadEnds,
-    /// `h²`, forwards and backwards: spurious actions and dead ends of incomplete searches.
-    Invariants,
+    /// Forward and backward `h²` in incomplete searches: spurious actions and dead ends.
+    MutexPairs,
     /// A search in which new states are expanded first (BFWS(f₂)).
     Novelty,
     /// A search for new successors (BFWS(f₅)).
@@ -74,7 +74,7 @@ impl Technique {
         (Self::Symmetry, "symmetry"),
         (Self::PreferredOperators, "preferred-operators"),
         (Self::DeadEnds, "dead-ends"),
-        (Self::Invariants, "invariants"),
+        (Self::MutexPairs, "mutex-pairs"),
         (Self::Novelty, "novelty"),
         (Self::Width, "width"),
         (Self::Landmarks, "landmarks"),
@@ -375,8 +375,8 @@ constants! {
     reasonable_orders: u8 = 0;
     /// How much work goes into finding mutex groups: so many parts of operators, about 50 ms. Not measured.
     most_mutex_work: u64 = 20_000_000;
-    /// How much work goes into finding invariants: so many words of tables, about a nanosecond each.
-    most_invariant_work: u64 = 200_000_000;
+    /// Work limit for mutex pairs, in words of tables (about 0.2 s).
+    most_mutex_pair_work: u64 = 200_000_000;
     /// How much work goes into finding landmarks: so many entries of sets of them, about half a second. Not
     /// measured; a search that finds none until then does without its turns.
     most_landmark_work: u64 = 100_000_000;

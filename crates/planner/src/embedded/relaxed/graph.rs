@@ -160,7 +160,7 @@ impl Graph {
         }
     }
 
-    /// Leaves out the starts of these actions, by action.
+    /// Excludes the starts of these actions, by action number.
     pub(crate) fn leave_out(&mut self, compiled: &Compiled, is_left_out: &[bool]) {
         for (number, operator) in self.operators.iter().enumerate() {
             let is_out = match operator.kind {
@@ -172,7 +172,7 @@ impl Graph {
                 Kind::End(_) | Kind::Timed(_) | Kind::Axiom => false,
             };
             if is_out {
-                // One more than ever are met.
+                // A precondition that is never met.
                 self.precondition_counts[number] += 1;
                 self.sources.retain(|&source| source != narrow(number));
             }

@@ -40,9 +40,9 @@ impl<'a> Entrant<'a> {
     /// The search.
     pub(super) fn search(&mut self, frame: Frame<'a>, symmetry: &'a Symmetry) -> &mut Search<'a> {
         let strategy = self.strategy;
-        let invariants = frame.invariants.get().and_then(Option::as_ref);
+        let mutex_pairs = frame.mutex_pairs.get().and_then(Option::as_ref);
         self.search
-            .get_or_insert_with(|| Search::new(frame.compiled, (symmetry, invariants), strategy))
+            .get_or_insert_with(|| Search::new(frame.compiled, (symmetry, mutex_pairs), strategy))
     }
 }
 

@@ -13,7 +13,7 @@ use super::super::bound::MetricBound;
 use super::super::compile::Compiled;
 use super::super::course::{delayed, judged_without_observers};
 use super::super::extract;
-use super::super::invariants::Invariants;
+use super::super::mutex_pairs::MutexPairs;
 use super::super::needless::without_needless;
 use super::super::search::{Aim, Search, Turn};
 use super::side_by_side::Tell;
@@ -46,8 +46,8 @@ pub(in super::super) struct Frame<'a> {
     pub(in super::super) situation: &'a Situation,
     pub(in super::super) settings: &'a Settings,
     pub(in super::super) compiled: &'a Compiled,
-    /// Found once a first plan takes longer, for searches that are incomplete anyway.
-    pub(in super::super) invariants: &'a OnceLock<Option<Invariants>>,
+    /// Mutex pairs for incomplete searches, computed once the first plan takes longer.
+    pub(in super::super) mutex_pairs: &'a OnceLock<Option<MutexPairs>>,
     /// The most work between two reports, in operators of estimates.
     pub(super) report_work: u64,
 }
@@ -57,7 +57,7 @@ impl<'a> Frame<'a> {
         (task, constrained): (&'a Task, Option<&'a Task>),
         situation: &'a Situation,
         settings: &'a Settings,
-        (compiled, invariants): (&'a Compiled, &'a OnceLock<Option<Invariants>>),
+        (compiled, mutex_pairs): (&'a Compiled, &'a OnceLock<Option<MutexPairs>>),
     ) -> Self {
         Self {
             task,
@@ -65,7 +65,7 @@ impl<'a> Frame<'a> {
             situation,
             settings,
             compiled,
-            invariants,
+            mutex_pairs,
             report_work: REPORT_WORK,
         }
     }

@@ -1,12 +1,12 @@
-//! A symmetric relation on atoms, and sets of atoms, in bits.
+//! Symmetric relation on atoms, and sets of atoms, as bit sets.
 
-/// See the module.
+/// Symmetric relation with one bit set for each atom.
 #[derive(Debug)]
 pub(super) struct Table {
     count: usize,
     words: usize,
     bits: Vec<u64>,
-    /// In which round each row was changed last.
+    /// Round of the last change, by row.
     changed: Vec<u32>,
 }
 
@@ -33,7 +33,7 @@ impl Table {
         self.row(atom).iter().all(|&word| word == 0)
     }
 
-    /// Adds the pairs of an atom with a set. Whether one is new.
+    /// Adds the pairs of an atom with a set. Returns `true` if one is new.
     pub(super) fn add(&mut self, atom: usize, set: &[u64], round: u32) -> bool {
         let mut has_changed = false;
         for (place, &word) in set.iter().enumerate() {
@@ -52,7 +52,7 @@ impl Table {
         has_changed
     }
 
-    /// The same, but never the pair with its opposite.
+    /// The same without the pair of the atom and its negation.
     pub(super) fn add_consistent(
         &mut self,
         atom: usize,
@@ -70,12 +70,12 @@ impl Table {
         }
     }
 
-    /// Whether each two of these atoms are a pair, and each one is with itself.
+    /// Returns `true` if each two of these atoms are a pair, and each atom with itself.
     pub(super) fn has_all_pairs(&self, atoms: &[usize]) -> bool {
         atoms.iter().all(|&atom| is_subset(atoms, self.row(atom)))
     }
 
-    /// The atoms that are pairs with all of these, and with themselves.
+    /// Returns the atoms that form pairs with all of these and with themselves.
     pub(super) fn all_of(&self, atoms: &[usize]) -> Vec<u64> {
         let Some((&first, rest)) = atoms.split_first() else {
             let mut all = vec![0; self.words];
@@ -93,7 +93,7 @@ impl Table {
         all
     }
 
-    /// The pairs that are not in the other table.
+    /// Removes the pairs of another table.
     pub(super) fn without(mut self, other: &Self) -> Self {
         for (own, other) in self.bits.iter_mut().zip(&other.bits) {
             *own &= !other;

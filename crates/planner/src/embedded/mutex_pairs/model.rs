@@ -1,4 +1,4 @@
-//! The atoms of a problem, and the starts, ends and timed initials as operators on them.
+//! Atoms and operators of a problem for `h²`. The operators are starts, ends and timed initials.
 
 use super::super::compile::{Action, Change, Compiled, NONE, Snap};
 use super::super::formula::{Formula, Literal};
@@ -12,23 +12,23 @@ pub(super) struct Operator {
     pub(super) is_start: bool,
     pub(super) needs: Vec<usize>,
     pub(super) adds: Vec<usize>,
-    /// By conditional effects.
+    /// Possible additions: conditional effects.
     pub(super) may_add: Vec<usize>,
     pub(super) deletes: Vec<usize>,
     pub(super) may_delete: Vec<usize>,
-    /// Actions under way that it does not allow, as it breaks their over-all conditions.
+    /// Running actions whose over-all conditions it violates.
     pub(super) breaks: Vec<usize>,
-    /// The action that it ends.
+    /// Atom of the running action that it ends.
     pub(super) ends: Option<usize>,
-    /// Whether the start is impossible while the action is under way.
+    /// `true` if the start is impossible while an instance is running.
     pub(super) excludes_itself: bool,
 }
 
-/// All operators are looked at so many times at least, both ways together.
+/// Assumed minimum number of evaluations of each operator, forward and backward together.
 const FEWEST_ROUNDS: u64 = 8;
 
 impl Operator {
-    /// How many rows one look at it reads and writes.
+    /// Number of table rows that one evaluation reads and writes.
     fn size(&self) -> usize {
         2 + self.needs.len() + self.adds.len()
     }
@@ -36,14 +36,15 @@ impl Operator {
 
 /// The atoms and operators of a problem.
 ///
-/// An atom is that a fact is true, that it is false, if something needs that or the fact is a goal, or that an action
-/// is under way. Derived facts are no atoms: they are taken to hold whenever they are needed.
+/// Atoms are facts, negated facts that occur in a condition, negated goals, and running actions. Derived facts are no
+/// atoms. They are assumed to hold in all conditions.
 #[derive(Debug)]
 pub(super) struct Model {
     pub(super) atom_count: usize,
     fact_count: usize,
-    /// The facts whose falsehood is an atom, and for each fact that atom.
+    /// Facts whose negation is an atom, in the order of these atoms.
     false_facts: Vec<u32>,
+    /// Position in `false_facts`, by fact; [`NONE`] if there is none.
     falsehood_of: Vec<u32>,
     first_running: usize,
     is_derived: Vec<bool>,
@@ -53,7 +54,7 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// `None` if there is so much of it that pairs surely take more work.
+    /// Returns `None` if the fixpoints would exceed `most_work`.
     pub(super) fn of(compiled: &Compiled, most_work: u64) -> Option<Self> {
         let fact_count = compiled.facts.len();
         let mut model = Self {
@@ -97,12 +98,12 @@ impl Model {
         (words * round as u64 <= most_work / FEWEST_ROUNDS).then_some(model)
     }
 
-    /// The operator of an action's start.
+    /// Returns the operator of an action's start.
     pub(super) fn start_of(&self, action: u32) -> Option<&Operator> {
         self.operators.get(self.start_of[action as usize] as usize)
     }
 
-    /// The atoms that a state has.
+    /// Returns the atoms of a state.
     pub(super) fn atoms_of(&self, state: &State) -> Vec<u64> {
         let mut held = vec![0; self.atom_count.div_ceil(64)];
         let words = held.len().min(state.facts.len());
@@ -118,7 +119,7 @@ impl Model {
         held
     }
 
-    /// The atom that excludes this one.
+    /// Returns the negation of a fact or negated fact, if it is an atom.
     pub(super) fn opposite(&self, atom: usize) -> Option<usize> {
         if atom < self.fact_count {
             let number = self.falsehood_of[atom];
@@ -128,7 +129,7 @@ impl Model {
         fact.map(|&fact| fact as usize)
     }
 
-    /// Takes out that any action is under way.
+    /// Removes all running actions from a set.
     pub(super) fn clear_running(&self, set: &mut [u64]) {
         for atom in self.first_running..self.atom_count {
             super::table::remove(set, atom);
@@ -174,7 +175,7 @@ impl Model {
         sorted(atoms.collect())
     }
 
-    /// What holds as long as an action is under way. If it may take no time, nothing does.
+    /// Returns the literals that hold while an action is running; none if its duration may be 0.
     fn lasting(&self, action: &Action) -> Vec<Literal> {
         let Formula { literals, .. } = &action.over_all;
         let lasts = action.end != NONE && action.duration.least.is_positive();
@@ -199,7 +200,7 @@ impl Model {
             operator.excludes_itself = action.exclusion != NONE;
             if action.end != NONE {
                 operator.adds.push(running);
-                // An instance under way goes on.
+                // A second instance is not excluded here.
                 operator.breaks.retain(|&atom| atom != running);
                 if lasts {
                     let before = compiled.needed_before_start(action);
@@ -240,7 +241,7 @@ impl Model {
                 Change::Update(_) | Change::Cost(_) => None,
             })
             .collect();
-        // What a conditional effect may change back is not sure.
+        // A conditional effect on the same fact makes an effect uncertain.
         let is_sure =
             |literal: &&Literal| !may_make.iter().any(|other| other.fact() == literal.fact());
         let sure: Vec<Literal> = made.iter().filter(is_sure).copied().collect();

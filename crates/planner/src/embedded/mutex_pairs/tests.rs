@@ -1,4 +1,4 @@
-//! The pairs are those of a plain fixpoint, and no plan goes through a dead end or has a spurious action.
+//! The pairs equal those of a plain fixpoint. No plan visits a dead end or has a spurious action.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use elbowroom_pddl::{Source, read_problem};
 use proptest::prelude::*;
 
 use super::model::{Model, Operator};
-use super::{Finder, Invariants, table};
+use super::{Finder, MutexPairs, table};
 use crate::embedded::apply::{Step, Stepper};
 use crate::embedded::compile::Compiled;
 use crate::embedded::pairs::tests::drafts;
@@ -17,7 +17,7 @@ use crate::embedded::testing::{choices, compiled};
 
 type PairSet = BTreeSet<(usize, usize)>;
 
-/// Fixpoints that look at all operators and all pairs, until nothing is new.
+/// Fixpoints over all operators and all pairs, without change tracking.
 struct Twin<'a> {
     model: &'a Model,
     reached: PairSet,
@@ -46,7 +46,7 @@ impl<'a> Twin<'a> {
         self.reached.contains(&(one, other))
     }
 
-    /// The atoms that may hold when the operator happens; none if it cannot.
+    /// Atoms that may hold together with the preconditions of an applicable operator.
     fn context(&self, operator: &Operator) -> Vec<usize> {
         let needs = &operator.needs;
         if !needs
@@ -70,7 +70,7 @@ impl<'a> Twin<'a> {
             .all(|&a| needs.iter().all(|&b| self.holds(a, b)))
     }
 
-    /// Whether the atom, which is true before the operator, surely is not afterwards.
+    /// Returns `true` if the operator certainly makes a true atom false.
     fn is_gone(&self, operator: &Operator, atom: usize) -> bool {
         let start = self.model.start_of(operator.action);
         let runs_twice = start.is_some_and(|start| {
@@ -85,7 +85,7 @@ impl<'a> Twin<'a> {
             || operator.ends == Some(atom)
     }
 
-    /// The pairs of which at least one was made by the operator.
+    /// Pairs after the operator with at least one atom that it made true.
     fn after(&self, operator: &Operator) -> PairSet {
         if !self.happens(operator) {
             return PairSet::new();
@@ -101,7 +101,7 @@ impl<'a> Twin<'a> {
         pairs
     }
 
-    /// The pairs from which the goal may be reached.
+    /// Pairs from which the goal may be reachable.
     fn live(&self) -> PairSet {
         let goal = &self.model.goal;
         let mut held = vec![u64::MAX; self.model.atom_count.div_ceil(64)];
@@ -111,11 +111,9 @@ impl<'a> Twin<'a> {
                 && self.holds(atom, atom)
                 && goal.iter().all(|&goal| self.holds(atom, goal))
         };
-        let is_possible = goal.iter().all(|&a| goal.iter().all(|&b| self.holds(a, b)));
         let ending: Vec<usize> = (0..self.model.atom_count).filter(may_end).collect();
         let mut live = product(&ending, &ending);
         live.retain(|&(one, other)| self.holds(one, other));
-        assert!(is_possible || live.len() <= ending.len() * ending.len());
         loop {
             let before = live.len();
             for operator in &self.model.operators {
@@ -145,7 +143,7 @@ impl<'a> Twin<'a> {
         after
     }
 
-    /// The pairs from which the operator leads to one of the pairs that are live.
+    /// Pairs from which the operator leads to live pairs only.
     fn before(&self, operator: &Operator, live: &PairSet) -> PairSet {
         if !self.is_live(operator, live) {
             return PairSet::new();
@@ -182,10 +180,10 @@ fn pairs_of(table: &table::Table, count: usize) -> PairSet {
     rows.collect()
 }
 
-/// Whether choices lead to the goal. No state on the way may be a dead end, and no action spurious.
+/// Returns `true` if a plan exists. Asserts that none of its states is a dead end, and none of its actions spurious.
 fn leads_to_goal(
     compiled: &Compiled,
-    invariants: &Invariants,
+    mutex_pairs: &MutexPairs,
     state: &State,
     left: usize,
     budget: &mut u32,
@@ -199,17 +197,17 @@ fn leads_to_goal(
             let Some(next) = Stepper::new(compiled).apply(state, step) else {
                 continue;
             };
-            if leads_to_goal(compiled, invariants, &next, left - 1, budget) {
+            if leads_to_goal(compiled, mutex_pairs, &next, left - 1, budget) {
                 is_on_the_way = true;
                 if let Step::Start(action) = step {
-                    let is_spurious = invariants.is_spurious[action as usize];
+                    let is_spurious = mutex_pairs.is_spurious[action as usize];
                     assert!(!is_spurious, "action {action} in {state:?}");
                 }
             }
         }
     }
     assert!(
-        !is_on_the_way || !invariants.is_dead_end(state),
+        !is_on_the_way || !mutex_pairs.is_dead_end(state),
         "{state:?}"
     );
     is_on_the_way
@@ -219,16 +217,16 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 256, ..ProptestConfig::default() })]
 
     #[test]
-    fn pairs_are_those_of_a_plain_fixpoint(draft in drafts()) {
+    fn pairs_equal_those_of_a_plain_fixpoint(draft in drafts()) {
         let task = draft.task();
         let compiled = compiled(&task);
         let state = root(&compiled);
         let model = Model::of(&compiled, u64::MAX).expect("no limit");
         let mut finder = Finder::new(&model, u64::MAX);
-        let reached = finder.reach(&state).expect("no limit");
+        let reached = finder.forward(&state).expect("no limit");
         let twin = Twin::of(&model, &state);
         prop_assert_eq!(pairs_of(&reached, model.atom_count), twin.reached.clone());
-        let live = finder.lead_on(&reached).expect("no limit");
+        let live = finder.backward(&reached).expect("no limit");
         let expected = twin.live();
         let is_live: Vec<bool> =
             model.operators.iter().map(|operator| twin.is_live(operator, &expected)).collect();
@@ -237,16 +235,16 @@ proptest! {
     }
 
     #[test]
-    fn no_plan_goes_through_a_dead_end(draft in drafts()) {
+    fn no_plan_visits_a_dead_end(draft in drafts()) {
         let task = draft.task();
         let compiled = compiled(&task);
-        if let Some(invariants) = Invariants::of(&compiled, &root(&compiled), u64::MAX) {
-            leads_to_goal(&compiled, &invariants, &root(&compiled), 6, &mut 3_000);
+        if let Some(mutex_pairs) = MutexPairs::of(&compiled, &root(&compiled), u64::MAX) {
+            leads_to_goal(&compiled, &mutex_pairs, &root(&compiled), 6, &mut 3_000);
         }
     }
 }
 
-/// A corridor whose tiles are painted from one side or the other: what is painted is never entered again.
+/// Corridor of tiles. A robot paints the next tile in either direction and cannot enter painted tiles.
 fn corridor() -> Task {
     let domain = "(define (domain corridor) (:requirements :typing :durative-actions)
         (:types tile)
@@ -273,12 +271,12 @@ fn corridor() -> Task {
 }
 
 #[test]
-fn a_tile_is_not_painted_before_those_behind_it() {
+fn painting_an_outer_tile_first_is_a_dead_end() {
     let compiled = compiled(&corridor());
     let start = root(&compiled);
-    let invariants = Invariants::of(&compiled, &start, u64::MAX).expect("there are dead ends");
-    // All that is left is painting from the side of the entrance.
-    let spurious = invariants
+    let mutex_pairs = MutexPairs::of(&compiled, &start, u64::MAX).expect("there are dead ends");
+    // Only painting from the side of the entrance is needed.
+    let spurious = mutex_pairs
         .is_spurious
         .iter()
         .filter(|is_spurious| **is_spurious);
@@ -287,11 +285,11 @@ fn a_tile_is_not_painted_before_those_behind_it() {
         .iter()
         .filter(|action| !action.over_all.literals.is_empty());
     assert_eq!((spurious.count(), paints.count()), (3, 6));
-    assert!(!invariants.is_dead_end(&start));
+    assert!(!mutex_pairs.is_dead_end(&start));
     let dead = (0..).zip(&compiled.actions).filter_map(|(number, _)| {
         let next = Stepper::new(&compiled).apply(&start, Step::Compressed(number))?;
-        Some(invariants.is_dead_end(&next))
+        Some(mutex_pairs.is_dead_end(&next))
     });
-    // From the entrance, a move is possible, and painting the next tile too early.
+    // Of the two possible steps, painting the next tile is one too early.
     assert_eq!(dead.filter(|is_dead| *is_dead).count(), 1);
 }

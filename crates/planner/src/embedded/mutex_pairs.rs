@@ -1,14 +1,14 @@
-//! Pairs of atoms that no plan has together (`h²`, forwards and backwards).
+//! Mutex pairs of forward and backward `h²`.
 //!
-//! Forwards, the pairs are found that a sequence of choices may make true together (`h²` without costs; Haslum &
-//! Geffner, AIPS 2000). Backwards, those of them are found from which choices may lead to the goal: a state that has
-//! any other pair is a dead end. An action that no such path has is *spurious*. (Alcázar & Torralba, "A reminder about
-//! the importance of computing and exploiting invariants in planning", ICAPS 2015.)
+//! Forward `h²` computes the pairs of atoms that a sequence of choices may make true together (Haslum & Geffner, AIPS
+//! 2000, without costs). Backward `h²` computes the pairs among these from which the goal may be reachable. A state with
+//! any other pair is a dead end. An action is *spurious* if each of its applications has such a pair before or after it.
+//! (Alcázar & Torralba, "A reminder about the importance of computing and exploiting invariants in planning", ICAPS 2015.)
 //!
-//! Starts and ends are operators, as in [`mutex`](super::mutex). A tile that is painted before the one behind it, which
-//! can then no longer be reached, is a pair that leads nowhere, and painting it from behind is spurious.
+//! Starts and ends are separate operators, as in [`mutex`](super::mutex). Example: robots paint tiles and cannot enter a
+//! painted tile. A painted tile, and a clear tile that is reached only across it, are a pair without a plan.
 //!
-//! Only searches that are incomplete anyway use this, so that no proof rests on it.
+//! Only incomplete searches use these pairs. No proof depends on them.
 
 mod model;
 mod table;
@@ -22,25 +22,26 @@ use super::state::State;
 use model::{Model, Operator};
 use table::{Table, is_subset};
 
-/// See the module.
+/// Spurious actions, and pairs of atoms that make a state a dead end.
 #[derive(Debug)]
-pub(crate) struct Invariants {
+pub(crate) struct MutexPairs {
     model: Model,
-    /// By action.
+    /// Spurious actions, by action number.
     pub(crate) is_spurious: Vec<bool>,
-    /// The pairs that a state may have, but no path to the goal.
+    /// Reachable pairs from which the goal is unreachable.
     dead: Table,
-    /// The atoms that have such a pair.
+    /// Atoms with at least one dead pair.
     with_dead: Vec<usize>,
 }
 
-impl Invariants {
-    /// The invariants from a state on. `None` if they are not found with so much work, or are of no use.
+impl MutexPairs {
+    /// Computes the pairs from an initial state on. Returns `None` if that exceeds `most_work`, or if nothing is
+    /// spurious or dead.
     pub(crate) fn of(compiled: &Compiled, state: &State, most_work: u64) -> Option<Self> {
         let model = Model::of(compiled, most_work)?;
         let mut finder = Finder::new(&model, most_work);
-        let reached = finder.reach(state)?;
-        let live = finder.lead_on(&reached)?;
+        let reached = finder.forward(state)?;
+        let live = finder.backward(&reached)?;
         let may_start = finder.is_live.iter().zip(&model.operators);
         let may_start = may_start.filter(|(is_live, operator)| **is_live && operator.is_start);
         let mut is_spurious: Vec<bool> = compiled
@@ -63,7 +64,7 @@ impl Invariants {
         })
     }
 
-    /// Whether no plan goes through the state.
+    /// Returns `true` if the state has a dead pair. No plan visits it then.
     pub(crate) fn is_dead_end(&self, state: &State) -> bool {
         if self.with_dead.is_empty() {
             return false;
@@ -75,16 +76,16 @@ impl Invariants {
     }
 }
 
-/// What the pairs are found with.
+/// Buffers and work budget of the two fixpoints.
 struct Finder<'a> {
     model: &'a Model,
-    /// For each operator, in which round it was looked at last.
-    seen: Vec<u32>,
-    /// Whether the goal may be reached after the operator.
+    /// Round of the last evaluation, by operator.
+    evaluated: Vec<u32>,
+    /// Operators after which the goal may be reachable.
     is_live: Vec<bool>,
-    /// Atoms that hold together with what an operator needs.
+    /// Buffer: atoms that may hold together with the preconditions of an operator.
     context: Vec<u64>,
-    /// Atoms that hold after it, too.
+    /// Buffer: atoms of the context that are compatible with its effects.
     kept: Vec<u64>,
     budget: work::Budget,
 }
@@ -94,7 +95,7 @@ impl<'a> Finder<'a> {
         let words = model.atom_count.div_ceil(64);
         Self {
             model,
-            seen: vec![0; model.operators.len()],
+            evaluated: vec![0; model.operators.len()],
             is_live: vec![false; model.operators.len()],
             context: vec![0; words],
             kept: vec![0; words],
@@ -102,21 +103,21 @@ impl<'a> Finder<'a> {
         }
     }
 
-    /// The pairs that may be true together after some choices. `None` if that takes too long.
-    fn reach(&mut self, state: &State) -> Option<Table> {
+    /// Computes the reachable pairs. Returns `None` if the budget is spent.
+    fn forward(&mut self, state: &State) -> Option<Table> {
         let mut reached = Table::new(self.model.atom_count);
         let initial = self.model.atoms_of(state);
         for atom in table::bits(&initial) {
             reached.add(atom, &initial, 0);
         }
-        self.until_nothing_changes(&mut reached, |finder, reached, operator, round| {
-            finder.apply(reached, operator, round)
+        self.fixpoint(&mut reached, |finder, reached, operator, round| {
+            finder.progress(reached, operator, round)
         })?;
         Some(reached)
     }
 
-    /// The pairs among these from which choices may lead to the goal. `None` if that takes too long.
-    fn lead_on(&mut self, reached: &Table) -> Option<Table> {
+    /// Computes the reachable pairs from which the goal may be reachable. Returns `None` if the budget is spent.
+    fn backward(&mut self, reached: &Table) -> Option<Table> {
         let model = self.model;
         let mut live = Table::new(model.atom_count);
         let mut ending = reached.all_of(&model.goal);
@@ -125,25 +126,25 @@ impl<'a> Finder<'a> {
             let with: Vec<u64> = and(reached.row(atom), &ending);
             live.add(atom, &with, 0);
         }
-        self.seen.fill(0);
-        self.until_nothing_changes(&mut live, |finder, live, operator, round| {
+        self.evaluated.fill(0);
+        self.fixpoint(&mut live, |finder, live, operator, round| {
             finder.regress(reached, live, operator, round)
         })?;
         Some(live)
     }
 
-    /// Looks at all operators, again and again.
-    fn until_nothing_changes(
+    /// Evaluates all operators in rounds until a fixpoint.
+    fn fixpoint(
         &mut self,
         table: &mut Table,
-        mut look: impl FnMut(&mut Self, &mut Table, usize, u32) -> bool,
+        mut evaluate: impl FnMut(&mut Self, &mut Table, usize, u32) -> bool,
     ) -> Option<()> {
         let mut round = 0;
         loop {
             round += 1;
             let mut has_changed = false;
             for operator in 0..self.model.operators.len() {
-                has_changed |= look(self, table, operator, round);
+                has_changed |= evaluate(self, table, operator, round);
                 if self.budget.is_spent() {
                     return None;
                 }
@@ -154,18 +155,18 @@ impl<'a> Finder<'a> {
         }
     }
 
-    /// Whether one of the rows has changed since the operator was looked at, or it is the first time. None at all
-    /// may always have changed.
+    /// Returns `true` if a row of these atoms has changed since the last evaluation of the operator, on the first
+    /// evaluation, and without atoms.
     fn is_due(&mut self, table: &Table, operator: usize, atoms: &[usize], round: u32) -> bool {
-        let last = std::mem::replace(&mut self.seen[operator], round);
+        let last = std::mem::replace(&mut self.evaluated[operator], round);
         let is_due =
             atoms.is_empty() || last == 0 || atoms.iter().any(|&atom| table.changed(atom) >= last);
         work::spend(1 + atoms.len() as u64);
         is_due
     }
 
-    /// Adds the pairs that an operator makes true. Whether there are new ones.
-    fn apply(&mut self, reached: &mut Table, number: usize, round: u32) -> bool {
+    /// Adds the pairs that an operator may make true. Returns `true` if one is new.
+    fn progress(&mut self, reached: &mut Table, number: usize, round: u32) -> bool {
         let model = self.model;
         let operator = &model.operators[number];
         if !self.is_due(reached, number, &operator.needs, round)
@@ -194,7 +195,7 @@ impl<'a> Finder<'a> {
         has_changed
     }
 
-    /// Adds the pairs from which an operator leads on. Whether there are new ones.
+    /// Adds the pairs from which an operator leads to live pairs only. Returns `true` if one is new.
     fn regress(&mut self, reached: &Table, live: &mut Table, number: usize, round: u32) -> bool {
         let model = self.model;
         let operator = &model.operators[number];
@@ -243,7 +244,8 @@ impl<'a> Finder<'a> {
         has_changed
     }
 
-    /// Finds the atoms that may hold together with all that the operator needs. Whether it may happen at all.
+    /// Computes the atoms that may hold together with the preconditions. Returns `false` if the operator is never
+    /// applicable.
     fn find_context(&mut self, reached: &Table, operator: &Operator) -> bool {
         self.spend(self.context.len() * (1 + operator.needs.len()));
         if !reached.has_all_pairs(&operator.needs) {
@@ -256,7 +258,7 @@ impl<'a> Finder<'a> {
         true
     }
 
-    /// Whether an action may start while it is under way.
+    /// Returns `true` if an action may start while an instance of it is running.
     fn may_run_twice(&self, reached: &Table, running: usize, action: u32) -> bool {
         let start = self.model.start_of(action);
         start.is_some_and(|start| {
