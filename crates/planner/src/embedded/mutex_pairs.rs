@@ -1,8 +1,8 @@
 //! Mutex pairs of forward and backward `h²`.
 //!
 //! Forward `h²` computes the pairs of atoms that a sequence of choices may make true together (Haslum & Geffner, AIPS
-//! 2000, without costs). Backward `h²` computes the pairs among these from which the goal may be reachable. A state with
-//! any other pair is a dead end. An action is *spurious* if each of its applications has such a pair before or after it.
+//! 2000, without costs). Backward `h²` computes the *live* pairs: a state with such a pair may lead to the goal. A state
+//! with any other pair is a dead end. An action is *spurious* if each of its applications has such a pair before or after it.
 //! (Alcázar & Torralba, "A reminder about the importance of computing and exploiting invariants in planning", ICAPS 2015.)
 //!
 //! Starts and ends are separate operators, as in [`mutex`](super::mutex). Example: robots paint tiles and cannot enter a
@@ -28,7 +28,7 @@ pub(crate) struct MutexPairs {
     model: Model,
     /// Spurious actions, by action number.
     pub(crate) is_spurious: Vec<bool>,
-    /// Reachable pairs from which the goal is unreachable.
+    /// Reachable pairs that are not live.
     dead: Table,
     /// Atoms with at least one dead pair.
     with_dead: Vec<usize>,
@@ -116,7 +116,7 @@ impl<'a> Finder<'a> {
         Some(reached)
     }
 
-    /// Computes the reachable pairs from which the goal may be reachable. Returns `None` if the budget is spent.
+    /// Computes the live pairs among the reachable ones. Returns `None` if the budget is spent.
     fn backward(&mut self, reached: &Table) -> Option<Table> {
         let model = self.model;
         let mut live = Table::new(model.atom_count);
@@ -195,7 +195,7 @@ impl<'a> Finder<'a> {
         has_changed
     }
 
-    /// Adds the pairs from which an operator leads to live pairs only. Returns `true` if one is new.
+    /// Adds the pairs whose successors by an operator are live. Returns `true` if one is new.
     fn regress(&mut self, reached: &Table, live: &mut Table, number: usize, round: u32) -> bool {
         let model = self.model;
         let operator = &model.operators[number];

@@ -103,7 +103,7 @@ impl<'a> Twin<'a> {
         pairs
     }
 
-    /// Pairs from which the goal may be reachable.
+    /// Live pairs.
     fn live(&self) -> PairSet {
         let goal = &self.model.goal;
         let mut held = vec![u64::MAX; self.model.atom_count.div_ceil(64)];
@@ -145,7 +145,7 @@ impl<'a> Twin<'a> {
         after
     }
 
-    /// Pairs from which the operator leads to live pairs only.
+    /// Pairs whose successors by the operator are live.
     fn before(&self, operator: &Operator, live: &PairSet) -> PairSet {
         if !self.is_live(operator, live) {
             return PairSet::new();
