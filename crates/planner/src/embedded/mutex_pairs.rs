@@ -35,11 +35,16 @@ pub(crate) struct MutexPairs {
 }
 
 impl MutexPairs {
-    /// Computes the pairs from an initial state on. Returns `None` if that exceeds `most_work`, or if nothing is
-    /// spurious or dead.
-    pub(crate) fn of(compiled: &Compiled, state: &State, most_work: u64) -> Option<Self> {
+    /// Computes the pairs from an initial state on. Returns `None` if that exceeds `most_work`, if nothing is
+    /// spurious or dead, or once `goes_on` returns `false`.
+    pub(crate) fn of(
+        compiled: &Compiled,
+        state: &State,
+        most_work: u64,
+        goes_on: &mut dyn FnMut() -> bool,
+    ) -> Option<Self> {
         let model = Model::of(compiled, most_work)?;
-        let mut finder = Finder::new(&model, most_work);
+        let mut finder = Finder::new(&model, most_work, goes_on);
         let reached = finder.forward(state)?;
         let live = finder.backward(&reached)?;
         let may_start = finder.is_live.iter().zip(&model.operators);
@@ -88,10 +93,16 @@ struct Finder<'a> {
     /// Buffer: atoms of the context that are compatible with its effects.
     kept: Vec<u64>,
     budget: work::Budget,
+    goes_on: &'a mut dyn FnMut() -> bool,
+    /// Work done before the last call of `goes_on`.
+    asked: u64,
 }
 
+/// Work between two calls of `goes_on`: some milliseconds.
+const WORK_BETWEEN_CALLS: u64 = 2_000_000;
+
 impl<'a> Finder<'a> {
-    fn new(model: &'a Model, most_work: u64) -> Self {
+    fn new(model: &'a Model, most_work: u64, goes_on: &'a mut dyn FnMut() -> bool) -> Self {
         let words = model.atom_count.div_ceil(64);
         Self {
             model,
@@ -100,6 +111,8 @@ impl<'a> Finder<'a> {
             context: vec![0; words],
             kept: vec![0; words],
             budget: work::Budget::new(most_work),
+            goes_on,
+            asked: 0,
         }
     }
 
@@ -145,6 +158,13 @@ impl<'a> Finder<'a> {
             let mut has_changed = false;
             for operator in 0..self.model.operators.len() {
                 has_changed |= evaluate(self, table, operator, round);
+                let used = self.budget.used();
+                if used - self.asked >= WORK_BETWEEN_CALLS {
+                    self.asked = used;
+                    if !(self.goes_on)() {
+                        return None;
+                    }
+                }
                 if self.budget.is_spent() {
                     return None;
                 }

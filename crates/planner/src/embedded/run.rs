@@ -227,14 +227,22 @@ impl<'a> Planner<'a> {
     }
 
     /// Computes mutex pairs. Returns `true` if there is a spurious action or a dead pair.
-    fn finds_mutex_pairs(&self) -> bool {
-        let compiled = self.frame.compiled;
+    fn finds_mutex_pairs(&mut self) -> bool {
+        let Self {
+            observe,
+            progress,
+            frame,
+            ..
+        } = self;
+        let compiled = frame.compiled;
         let tuning = &compiled.tuning;
         if !tuning.uses(Technique::MutexPairs) || compiled.is_symbolic {
             return false;
         }
-        let find = || MutexPairs::of(compiled, &root(compiled), tuning.most_mutex_pair_work);
-        self.frame.mutex_pairs.get_or_init(find).is_some()
+        let mut goes_on = || observe(progress).is_continue();
+        let most_work = tuning.most_mutex_pair_work;
+        let find = || MutexPairs::of(compiled, &root(compiled), most_work, &mut goes_on);
+        frame.mutex_pairs.get_or_init(find).is_some()
     }
 
     /// Why a run ends whose searches are all over.

@@ -224,7 +224,8 @@ proptest! {
         let compiled = compiled(&task);
         let state = root(&compiled);
         let model = Model::of(&compiled, u64::MAX).expect("no limit");
-        let mut finder = Finder::new(&model, u64::MAX);
+        let mut goes_on = || true;
+        let mut finder = Finder::new(&model, u64::MAX, &mut goes_on);
         let reached = finder.forward(&state).expect("no limit");
         let twin = Twin::of(&model, &state);
         prop_assert_eq!(pairs_of(&reached, model.atom_count), twin.reached.clone());
@@ -240,7 +241,8 @@ proptest! {
     fn no_plan_visits_a_dead_end(draft in drafts()) {
         let task = draft.task();
         let compiled = compiled(&task);
-        if let Some(mutex_pairs) = MutexPairs::of(&compiled, &root(&compiled), u64::MAX) {
+        let start = root(&compiled);
+        if let Some(mutex_pairs) = MutexPairs::of(&compiled, &start, u64::MAX, &mut || true) {
             leads_to_goal(&compiled, &mutex_pairs, &root(&compiled), 6, &mut 3_000);
         }
     }
@@ -276,7 +278,8 @@ fn corridor() -> Task {
 fn painting_an_outer_tile_first_is_a_dead_end() {
     let compiled = compiled(&corridor());
     let start = root(&compiled);
-    let mutex_pairs = MutexPairs::of(&compiled, &start, u64::MAX).expect("there are dead ends");
+    let mutex_pairs =
+        MutexPairs::of(&compiled, &start, u64::MAX, &mut || true).expect("there are dead ends");
     // The spurious actions paint tiles 1 and 2 from the far side.
     let spurious = mutex_pairs
         .is_spurious
