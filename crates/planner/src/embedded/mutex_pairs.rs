@@ -210,7 +210,7 @@ impl<'a> Finder<'a> {
         for &atom in operator.adds.iter().chain(&operator.may_add) {
             has_changed |= reached.add_consistent(atom, &context, model.opposite(atom), round);
         }
-        self.spend(context.len() * (1 + operator.adds.len()));
+        spend(context.len() * (1 + operator.adds.len()));
         self.context = context;
         has_changed
     }
@@ -260,14 +260,14 @@ impl<'a> Finder<'a> {
             let with = and(reached.row(atom), &self.kept);
             has_changed |= live.add(atom, &with, round);
         }
-        self.spend(self.context.len() * (2 + after.len() + 2 * lost.len()));
+        spend(self.context.len() * (2 + after.len() + 2 * lost.len()));
         has_changed
     }
 
     /// Computes the atoms that may hold together with the preconditions. Returns `false` if the operator is never
     /// applicable.
     fn find_context(&mut self, reached: &Table, operator: &Operator) -> bool {
-        self.spend(self.context.len() * (1 + operator.needs.len()));
+        spend(self.context.len() * (1 + operator.needs.len()));
         if !reached.has_all_pairs(&operator.needs) {
             return false;
         }
@@ -285,10 +285,11 @@ impl<'a> Finder<'a> {
             is_subset(&start.needs, reached.row(running)) && !start.excludes_itself
         })
     }
+}
 
-    fn spend(&self, words: usize) {
-        work::spend(words as u64);
-    }
+/// Counts accesses to words of tables.
+fn spend(words: usize) {
+    work::spend(words as u64);
 }
 
 fn and(one: &[u64], other: &[u64]) -> Vec<u64> {
