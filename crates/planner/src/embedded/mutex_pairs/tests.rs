@@ -81,12 +81,6 @@ impl<'a> Twin<'a> {
         operator.deletes.contains(&atom) || operator.ends == Some(atom) && !runs_twice()
     }
 
-    fn may_be_gone(&self, operator: &Operator, atom: usize) -> bool {
-        operator.deletes.contains(&atom)
-            || operator.may_delete.contains(&atom)
-            || operator.ends == Some(atom)
-    }
-
     /// Pairs after the operator with at least one atom that it made true.
     fn after(&self, operator: &Operator) -> PairSet {
         if !self.happens(operator) {
@@ -129,18 +123,16 @@ impl<'a> Twin<'a> {
     }
 
     fn is_live(&self, operator: &Operator, live: &PairSet) -> bool {
-        let after = self.sure_after(operator);
+        let after = Self::sure_after(operator);
         self.happens(operator)
             && after
                 .iter()
                 .all(|&a| after.iter().all(|&b| live.contains(&(a, b))))
     }
 
-    fn sure_after(&self, operator: &Operator) -> Vec<usize> {
+    fn sure_after(operator: &Operator) -> Vec<usize> {
         let needs = operator.needs.iter().copied();
-        let mut after: Vec<usize> = needs
-            .filter(|&need| !self.may_be_gone(operator, need))
-            .collect();
+        let mut after: Vec<usize> = needs.filter(|&need| !may_be_gone(operator, need)).collect();
         after.extend(&operator.adds);
         after
     }
@@ -150,20 +142,24 @@ impl<'a> Twin<'a> {
         if !self.is_live(operator, live) {
             return PairSet::new();
         }
-        let after = self.sure_after(operator);
+        let after = Self::sure_after(operator);
         let is_left = |&atom: &usize| {
-            self.may_be_gone(operator, atom)
+            may_be_gone(operator, atom)
                 || live.contains(&(atom, atom)) && after.iter().all(|&b| live.contains(&(atom, b)))
         };
         let context: Vec<usize> = self.context(operator).into_iter().filter(is_left).collect();
         let gone = context.iter().copied();
-        let gone: Vec<usize> = gone
-            .filter(|&atom| self.may_be_gone(operator, atom))
-            .collect();
+        let gone: Vec<usize> = gone.filter(|&atom| may_be_gone(operator, atom)).collect();
         let mut pairs = product(&gone, &context);
         pairs.retain(|&(one, other)| self.holds(one, other));
         pairs
     }
+}
+
+fn may_be_gone(operator: &Operator, atom: usize) -> bool {
+    operator.deletes.contains(&atom)
+        || operator.may_delete.contains(&atom)
+        || operator.ends == Some(atom)
 }
 
 fn product(one: &[usize], other: &[usize]) -> PairSet {
