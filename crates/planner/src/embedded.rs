@@ -29,6 +29,7 @@ mod formula;
 mod hash;
 mod landmarks;
 mod mutex;
+mod mutex_pairs;
 mod needless;
 mod network;
 mod pairs;
@@ -52,6 +53,7 @@ mod tuning;
 mod windows;
 
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 
 use elbowroom_model::reachability::{self, Grounding};
 use elbowroom_model::{Situation, Task};
@@ -196,7 +198,13 @@ fn search_for_plans(
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }
-    let frame = Frame::new((task, constrained), situation, settings, &compiled);
+    let mutex_pairs = OnceLock::new();
+    let frame = Frame::new(
+        (task, constrained),
+        situation,
+        settings,
+        (&compiled, &mutex_pairs),
+    );
     progress.counts.work = work::spent() - begin;
     Planner::new(frame, (&names, &symmetry), progress, observe).run()
 }

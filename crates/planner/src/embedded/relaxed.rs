@@ -186,6 +186,11 @@ impl<'a> Relaxed<'a> {
         cost(start).max(cost(end))
     }
 
+    /// Excludes the starts of these actions, by action number.
+    pub(crate) fn leave_out(&mut self, is_left_out: &[bool]) {
+        self.graph.leave_out(self.compiled, is_left_out);
+    }
+
     /// From now on, what a relaxed plan uses up is counted, and filled up.
     pub(crate) fn count_resources(&mut self) {
         self.resources = Resources::of(self.compiled, &self.graph);

@@ -15,8 +15,10 @@ use elbowroom_model::Task;
 
 use super::answer::{Answer, Counts, Progress, Proof, Stopped};
 use super::compile::Compiled;
+use super::mutex_pairs::MutexPairs;
 use super::reasons::{self, Names};
 use super::relaxed;
+use super::root::root;
 use super::search::Search;
 use super::symmetry::Symmetry;
 use super::tuning::Technique;
@@ -196,6 +198,12 @@ impl<'a> Planner<'a> {
             left = Some(turns.saturating_sub(spent).max(1 + tuning.root_check_after));
             turn = usize::from(outcome != Outcome::WorkDone && outcome != Outcome::Better);
         }
+        if self.is_looking() && self.finds_mutex_pairs() && is_stuck(&entrants[0]) {
+            // The other searches have not begun yet.
+            self.progress.counts.memory -= taken(&entrants[0]);
+            entrants[0] = Entrant::new(entrants[0].strategy);
+            (turn, left) = (0, None);
+        }
         while self.is_looking() {
             turn = self.round(entrants, turn, (budget, left.filter(|_| turn == 0)));
             if entrants.iter().all(|entrant| entrant.is_over) {
@@ -216,6 +224,25 @@ impl<'a> Planner<'a> {
             budget = budget.min(tuning.improving_round);
         }
         First::Found { turn, budget }
+    }
+
+    /// Computes mutex pairs. Returns `true` if there is a spurious action or a dead pair.
+    fn finds_mutex_pairs(&mut self) -> bool {
+        let Self {
+            observe,
+            progress,
+            frame,
+            ..
+        } = self;
+        let compiled = frame.compiled;
+        let tuning = &compiled.tuning;
+        if !tuning.uses(Technique::MutexPairs) || compiled.is_symbolic {
+            return false;
+        }
+        let mut goes_on = || observe(progress).is_continue();
+        let most_work = tuning.most_mutex_pair_work;
+        let find = || MutexPairs::of(compiled, &root(compiled), most_work, &mut goes_on);
+        frame.mutex_pairs.get_or_init(find).is_some()
     }
 
     /// Why a run ends whose searches are all over.
@@ -255,7 +282,7 @@ impl<'a> Planner<'a> {
     /// for.
     fn begin(&mut self, entrant: &mut Entrant<'a>, allowance: Allowance) -> (Outcome, u64) {
         let (frame, symmetry, unreported) = (self.frame, self.symmetry, self.unreported);
-        let search = entrant.search(frame.compiled, symmetry);
+        let search = entrant.search(frame, symmetry);
         let mut base = self.progress.counts;
         let mut hear = |report| self.hear(&mut base, report);
         let mut strand = Strand::new(frame, None, unreported, &mut hear);
@@ -296,7 +323,7 @@ impl<'a> Planner<'a> {
             jobs.push(Box::new(move |tell: Tell<'_>| {
                 let own_task = own_task.map(Task::with_own_table);
                 let task = own_task.as_ref().unwrap_or(frame.task);
-                let search = entrant.search(compiled, symmetry);
+                let search = entrant.search(frame, symmetry);
                 let turns = left.unwrap_or_else(|| share(search, budget, compiled));
                 let mut strand = Strand::new(Frame { task, ..frame }, None, unreported, tell);
                 let (outcome, _, _) = strand.work(search, Allowance::turns(turns));
@@ -430,6 +457,15 @@ impl<'a> Planner<'a> {
         let mut goes_on = || observe(progress).is_continue();
         reasons::pairs_proof(names, frame.compiled, &mut goes_on)
     }
+}
+
+/// Returns `true` if a search restarts with mutex pairs: it is incomplete, and its best estimate has not improved
+/// recently.
+fn is_stuck(entrant: &Entrant<'_>) -> bool {
+    let search = entrant.search.as_ref();
+    let makes_no_progress =
+        |search: &Search<'_>| search.is_incomplete() && !search.has_come_nearer();
+    !entrant.is_over && !entrant.strategy.is_complete() && search.is_some_and(makes_no_progress)
 }
 
 /// How many turns a search gets of a round.

@@ -26,6 +26,7 @@ use super::answer::Counts;
 use super::apply::{Step, Stepper};
 use super::bound::MetricBound;
 use super::compile::Compiled;
+use super::mutex_pairs::MutexPairs;
 use super::relaxed::{Consumable, Relaxed, consumables};
 use super::root::root;
 use super::state::State;
@@ -73,6 +74,8 @@ pub(crate) struct Search<'a> {
     first_estimate: u32,
     /// The propositions seen before, if novelty decides.
     novelty: Option<Novelty>,
+    /// Mutex pairs, in an incomplete search.
+    mutex_pairs: Option<&'a MutexPairs>,
     /// What is known of the landmarks, if they count.
     landmarks: SearchLandmarks,
     /// The consumable fluents, if they are to be spared.
@@ -121,11 +124,20 @@ pub(crate) enum Turn {
 }
 
 impl<'a> Search<'a> {
-    pub(crate) fn new(compiled: &'a Compiled, symmetry: &'a Symmetry, strategy: Strategy) -> Self {
+    /// Creates a search. A complete one ignores the mutex pairs.
+    pub(crate) fn new(
+        compiled: &'a Compiled,
+        (symmetry, mutex_pairs): (&'a Symmetry, Option<&'a MutexPairs>),
+        strategy: Strategy,
+    ) -> Self {
+        let mutex_pairs = mutex_pairs.filter(|_| !strategy.is_complete());
         let is_weighing = strategy.aim != Aim::Goal;
         let metric = compiled.metric.as_ref().filter(|_| is_weighing);
         let step_costs = metric.map(|metric| StepCosts::of(compiled, metric));
         let mut relaxed = strategy.relaxed(compiled);
+        if let Some(mutex_pairs) = mutex_pairs {
+            relaxed.leave_out(&mutex_pairs.is_spurious);
+        }
         let mut stepper = Stepper::new(compiled);
         stepper.is_chronological = strategy.is_chronological;
         stepper.joins = strategy.joins;
@@ -159,6 +171,7 @@ impl<'a> Search<'a> {
             best: (u32::MAX, u32::MAX),
             first_estimate: 0,
             novelty: strategy.novelty.map(|_| Novelty::new(compiled)),
+            mutex_pairs,
             landmarks: SearchLandmarks::Unknown,
             consumables: if strategy.saves_consumables {
                 consumables(compiled)
@@ -169,7 +182,9 @@ impl<'a> Search<'a> {
             step_costs,
             limit: None,
             horizon: NEVER,
-            has_lost: strategy.is_chronological || strategy.replaces_starts(compiled),
+            has_lost: strategy.is_chronological
+                || strategy.replaces_starts(compiled)
+                || mutex_pairs.is_some(),
             price: 1,
             labour: 0,
             weighed: 0,
@@ -362,6 +377,12 @@ impl<'a> Search<'a> {
         if self.is_known(hash, &state, projection.as_deref()) {
             return Turn::Nothing;
         }
+        if self
+            .mutex_pairs
+            .is_some_and(|known| known.is_dead_end(&state))
+        {
+            return Turn::Nothing;
+        }
         self.evaluated += 1;
         let (accepted, left) = self.left(parent, &state);
         let estimate = if self.needs_estimate(parent, left) {
@@ -375,12 +396,8 @@ impl<'a> Search<'a> {
             self.has_lost |= self.strategy.compresses.is_some();
             return Turn::Nothing;
         };
-        self.symmetry
-            .thin_out(&state, self.is_timeless, &mut estimate.applicable);
-        let kept = &estimate.applicable;
-        estimate
-            .preferred
-            .retain(|step| kept.binary_search(step).is_ok());
+        let steps = (&mut estimate.applicable, &mut estimate.preferred);
+        self.symmetry.thin_out(&state, self.is_timeless, steps);
         let is_goal = is_goal(self.compiled, &state);
         let due = self.compiled.timed_until_goal.saturating_sub(state.timed);
         if state.symbolic.is_some() && !is_goal {

@@ -5,6 +5,8 @@
 //! does not lead to, so only one is tried (Fox & Long, "The detection and exploitation of symmetry
 //! in planning problems", IJCAI 1999).
 
+use std::collections::BTreeSet;
+
 use elbowroom_model::Task;
 use elbowroom_model::problem::ObjectId;
 
@@ -58,11 +60,17 @@ impl Symmetry {
         }
     }
 
-    /// Leaves out steps to which others in the list are equivalent.
-    pub(crate) fn thin_out(&self, state: &State, is_timeless: bool, steps: &mut Vec<Step>) {
+    /// Removes steps that are equivalent to others in the list. Preferred steps are replaced by their equivalents in
+    /// the list.
+    pub(crate) fn thin_out(
+        &self,
+        state: &State,
+        is_timeless: bool,
+        (steps, preferred): (&mut Vec<Step>, &mut Vec<Step>),
+    ) {
         for exchange in &self.exchanges {
             if steps.len() < 2 {
-                return;
+                break;
             }
             if !exchange.preserves(state, is_timeless) {
                 continue;
@@ -77,7 +85,15 @@ impl Symmetry {
                 }
                 _ => true,
             });
+            for step in preferred.iter_mut() {
+                if let Step::Start(action) | Step::Compressed(action) = step {
+                    *action = exchange.image(*action).min(*action);
+                }
+            }
         }
+        preferred.sort_unstable();
+        preferred.dedup();
+        preferred.retain(|step| steps.binary_search(step).is_ok());
     }
 }
 
@@ -203,15 +219,15 @@ impl<'a> Finder<'a> {
             for (a, b) in [(from.start, to.start), (from.end, to.end)] {
                 if a != NONE && b != NONE {
                     let (a, b) = (self.compiled.snap(a), self.compiled.snap(b));
-                    let all = |snap: &Snap| -> Vec<u32> {
+                    let all = |snap: &Snap| -> BTreeSet<u32> {
                         let after = snap.after.iter().map(|entry| entry.0);
                         after.chain(snap.marks.iter().copied()).collect()
                     };
-                    for annotation in all(a)
-                        .into_iter()
-                        .filter(|annotation| !all(b).contains(annotation))
-                    {
-                        annotations.extend(all(b).into_iter().map(|other| (annotation, other)));
+                    let (a, b) = (all(a), all(b));
+                    // An exchange is its own inverse. It maps the annotations of only one snap to those of
+                    // only the other.
+                    for &annotation in a.difference(&b) {
+                        annotations.extend(b.difference(&a).map(|&other| (annotation, other)));
                     }
                 }
             }

@@ -160,6 +160,25 @@ impl Graph {
         }
     }
 
+    /// Excludes the starts of these actions, by action number.
+    pub(crate) fn leave_out(&mut self, compiled: &Compiled, is_left_out: &[bool]) {
+        for (number, operator) in self.operators.iter().enumerate() {
+            let is_out = match operator.kind {
+                Kind::Start(action) | Kind::Compressed(action) => is_left_out[action as usize],
+                Kind::Macro(number) => {
+                    let Macro { envelope, content } = compiled.macros[number as usize];
+                    is_left_out[envelope as usize] || is_left_out[content as usize]
+                }
+                Kind::End(_) | Kind::Timed(_) | Kind::Axiom => false,
+            };
+            if is_out {
+                // A precondition that is never met.
+                self.precondition_counts[number] += 1;
+                self.sources.retain(|&source| source != narrow(number));
+            }
+        }
+    }
+
     /// The cost of one more of an operator: an end needs another start.
     pub(crate) fn cost_of_repetition(&self, operator: u32) -> u32 {
         let data = &self.operators[operator as usize];

@@ -10,7 +10,6 @@
 //! other one when the leg is over, and of plans that are worth the same, the first strand's counts.
 
 use super::super::answer::Stopped;
-use super::super::compile::Compiled;
 use super::super::search::{Aim, Search, Strategy};
 use super::super::symmetry::Symmetry;
 use super::super::tuning::Technique;
@@ -39,14 +38,11 @@ impl<'a> Entrant<'a> {
     }
 
     /// The search.
-    pub(super) fn search(
-        &mut self,
-        compiled: &'a Compiled,
-        symmetry: &'a Symmetry,
-    ) -> &mut Search<'a> {
+    pub(super) fn search(&mut self, frame: Frame<'a>, symmetry: &'a Symmetry) -> &mut Search<'a> {
         let strategy = self.strategy;
+        let mutex_pairs = frame.mutex_pairs.get().and_then(Option::as_ref);
         self.search
-            .get_or_insert_with(|| Search::new(compiled, symmetry, strategy))
+            .get_or_insert_with(|| Search::new(frame.compiled, (symmetry, mutex_pairs), strategy))
     }
 }
 
@@ -107,7 +103,7 @@ impl<'a> Contest<'a> {
                 self.current += 1;
                 continue;
             }
-            let search = entrant.search(compiled, self.symmetry);
+            let search = entrant.search(self.frame, self.symmetry);
             let turns = share(search, self.budget, compiled);
             let left = self.left.take().unwrap_or(turns);
             let allowance = Allowance {

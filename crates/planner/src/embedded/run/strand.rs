@@ -1,7 +1,7 @@
 //! A strand of the work: a search, or what makes better plans of the best one, for a while. It knows
 //! the best plan that there was when it began, and tells others of its own plans by reports.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan, validate_from};
@@ -13,6 +13,7 @@ use super::super::bound::MetricBound;
 use super::super::compile::Compiled;
 use super::super::course::{delayed, judged_without_observers};
 use super::super::extract;
+use super::super::mutex_pairs::MutexPairs;
 use super::super::needless::without_needless;
 use super::super::search::{Aim, Search, Turn};
 use super::side_by_side::Tell;
@@ -45,6 +46,8 @@ pub(in super::super) struct Frame<'a> {
     pub(in super::super) situation: &'a Situation,
     pub(in super::super) settings: &'a Settings,
     pub(in super::super) compiled: &'a Compiled,
+    /// Mutex pairs for incomplete searches, computed once the first plan takes longer.
+    pub(in super::super) mutex_pairs: &'a OnceLock<Option<MutexPairs>>,
     /// The most work between two reports, in operators of estimates.
     pub(super) report_work: u64,
 }
@@ -54,7 +57,7 @@ impl<'a> Frame<'a> {
         (task, constrained): (&'a Task, Option<&'a Task>),
         situation: &'a Situation,
         settings: &'a Settings,
-        compiled: &'a Compiled,
+        (compiled, mutex_pairs): (&'a Compiled, &'a OnceLock<Option<MutexPairs>>),
     ) -> Self {
         Self {
             task,
@@ -62,6 +65,7 @@ impl<'a> Frame<'a> {
             situation,
             settings,
             compiled,
+            mutex_pairs,
             report_work: REPORT_WORK,
         }
     }

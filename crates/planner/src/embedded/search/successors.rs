@@ -97,7 +97,8 @@ impl Search<'_> {
         self.relaxed.horizon = NEVER;
         let estimate = self.relaxed.list(&state);
         let mut steps = estimate.map_or_else(Vec::new, |estimate| estimate.applicable);
-        self.symmetry.thin_out(&state, true, &mut steps);
+        let none = &mut Vec::new();
+        self.symmetry.thin_out(&state, true, (&mut steps, none));
         steps
     }
 
