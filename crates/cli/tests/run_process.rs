@@ -62,6 +62,53 @@ fn the_example_world_reports_a_cancel_at_once() {
     assert!(time < 60.0, "{report:#}");
 }
 
+/// A run in a world whose program ends in its first `lives` lives, and may be started again three times.
+fn in_dying_world(name: &str, lives: &str, more: &[&str]) -> Output {
+    let counter = temporary(name);
+    let script = "crates/cli/tests/files/dying_world.py";
+    let command = format!("python3 {script} {counter} 2 {lives}");
+    let mut run = vec!["run", DELIVERY[0], DELIVERY[1], "--world-process", &command];
+    run.extend(["--restart-world", "3"]);
+    let output = elbowroom(&[&run[..], more].concat());
+    fs::remove_file(counter).expect("the world has counted its lives");
+    output
+}
+
+#[test]
+fn a_world_that_has_ended_is_started_again() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped("there is no python3");
+        return;
+    }
+    let (trace, journal) = (temporary("again.jsonl"), temporary("again.journal"));
+    for (kind, file) in [("--trace", &trace), ("--journal", &journal)] {
+        let output = in_dying_world("again", "1", &[kind, file]);
+        assert!(output.status.success(), "{output:?}");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(
+            text.contains("failed: it was running when the world ended"),
+            "{text}"
+        );
+        let warnings = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(warnings.contains("restart 1 of 3"), "{warnings}");
+        let replayed = elbowroom(&["run", "--replay", file]);
+        assert!(replayed.status.success(), "{replayed:?}");
+        fs::remove_file(file).expect("the record is there");
+    }
+}
+
+#[test]
+fn a_world_that_ends_again_and_again_ends_the_run() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped("there is no python3");
+        return;
+    }
+    let output = in_dying_world("often", "9", &[]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    let warnings = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(warnings.contains("restart 3 of 3"), "{warnings}");
+}
+
 /// A run in a world that is this shell script, which has `seconds` for each answer.
 fn in_shell(name: &str, script: &str, seconds: &str) -> Output {
     let file = temporary(name);

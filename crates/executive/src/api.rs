@@ -1,6 +1,7 @@
 //! HTTP interface of an executive: `docs/serve.md`.
 
 mod initial_problem;
+mod monitoring;
 mod mutations;
 mod queries;
 mod router;

@@ -27,7 +27,7 @@ use crate::operator::OperatorInterface;
 use crate::process_world::ProcessLimits;
 use crate::request_check::check;
 use crate::request_queue::{ExternalRequest, RequestQueue, RequestStatus};
-use crate::resume::{InterruptedRun, ResumeSettings};
+use crate::resume::{InterruptedRun, JournaledRun, ResumeSettings};
 use crate::run::{JournaledOutcome, RunError, RunHost, RunInputs};
 use crate::trace_buffer::TraceBuffer;
 
@@ -128,9 +128,15 @@ impl Executive {
             Error::new(message, "check the path of the journal")
         };
         let text = fs::read_to_string(journal).map_err(|error| cannot(&error))?;
-        let run = InterruptedRun::read(journal, &text, text.len() as u64)?;
-        let spec = run.spec().clone();
-        Self::with_start(spec, settings, Start::Resumed(Box::new(run)))
+        match InterruptedRun::read(journal, &text, text.len() as u64)? {
+            JournaledRun::Interrupted(run) => {
+                Self::with_start(run.spec().clone(), settings, Start::Resumed(run))
+            }
+            JournaledRun::Achieved(_) => {
+                let message = format!("the run of {} has reached its goal", journal.display());
+                Err(Error::new(message, "there is nothing to resume").into())
+            }
+        }
     }
 
     fn with_start(

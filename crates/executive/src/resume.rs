@@ -14,11 +14,13 @@ use std::sync::Arc;
 use elbowroom::answers::run::run as execute;
 use elbowroom::answers::{RunRequest, Watcher};
 use elbowroom::execute::RunSpec;
+use elbowroom::execution::run::Verdict;
 use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, ReplayWorld, Stored};
+use serde_json::Value;
 
 use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
 use crate::background_preparer::BackgroundPreparer;
@@ -47,6 +49,14 @@ pub struct InterruptedRun {
     command: String,
 }
 
+/// Run of a journal.
+pub enum JournaledRun {
+    /// It can be resumed.
+    Interrupted(Box<InterruptedRun>),
+    /// It has reached its goal. Contains the last line of its trace.
+    Achieved(Value),
+}
+
 /// Settings for a resumed run, which its journal does not contain.
 pub struct ResumeSettings<'a> {
     /// The problem of the specification, with a new table of facts.
@@ -63,8 +73,8 @@ impl InterruptedRun {
     /// Reads a journal: its path, its text, and the length of the file in bytes.
     ///
     /// # Errors
-    /// When the text is no journal, the journal is damaged, or its run is finished.
-    pub fn read(path: &Path, text: &str, length: u64) -> Result<Self, Error> {
+    /// When the text is no journal, the journal is damaged, or its run is finished and has not reached its goal.
+    pub fn read(path: &Path, text: &str, length: u64) -> Result<JournaledRun, Error> {
         let name = path.display().to_string();
         if !is_journal(text) {
             return Err(Error::new(
@@ -99,6 +109,10 @@ impl InterruptedRun {
         if let Some(Line::Over(report)) = stored.lines.last()
             && !WITHOUT_PLAN.contains(&report.verdict.as_str())
         {
+            if report.verdict == Verdict::GoalReached.name() {
+                let report = serde_json::to_value(report).unwrap_or_default();
+                return Ok(JournaledRun::Achieved(report));
+            }
             return Err(Error::new(
                 format!("the run of {name} is over: {}", report.verdict),
                 "there is nothing to go on with; `elbowroom report` shows what was done",
@@ -110,14 +124,14 @@ impl InterruptedRun {
         let Some(command) = spec.world_process.clone() else {
             return Err(unreadable(&name, "its world was no process", OTHER_VERSION));
         };
-        Ok(Self {
+        Ok(JournaledRun::Interrupted(Box::new(Self {
             path: path.to_owned(),
             journal,
             length,
             stored,
             spec,
             command,
-        })
+        })))
     }
 
     /// Returns the specification of the run.

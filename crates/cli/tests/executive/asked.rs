@@ -22,10 +22,26 @@ fn a_world_that_stands_still_is_named() {
     let mut own = Executive::start(&place, &line);
     let state = own.await_state(|state| state["activity"] == "executing");
     assert_eq!(state["unanswered"], Value::Null, "{state}");
+    assert_eq!(own.get("/v1/ready"), (200, json!("ready\n")));
     let robot = fs::read_to_string(place.join("pid")).expect("a pid");
     signal(&robot, "STOP");
     let state = own.await_state(|state| state["unanswered"].is_u64());
     assert_eq!(state["activity"], "executing", "{state}");
+    let (status, why) = own.get("/v1/ready");
+    let names_silence = why.as_str().is_some_and(|why| why.contains("not answered"));
+    assert!(status == 503 && names_silence, "{status} {why}");
+    assert_eq!(own.get("/v1/health"), (200, json!("ok\n")));
+    let (status, metrics) = own.get("/metrics");
+    let metrics = metrics.as_str().unwrap_or_default();
+    assert_eq!(status, 200, "{metrics}");
+    for line in [
+        "elbowroom_ready 0",
+        "elbowroom_activity{activity=\"executing\"} 1",
+        "elbowroom_activity{activity=\"resting\"} 0",
+        "elbowroom_goals{state=\"pursued\"} 1",
+    ] {
+        assert!(metrics.lines().any(|it| it == line), "{line}\n{metrics}");
+    }
     let (status, answer) = own.post("/v1/pause", &Value::Null);
     assert_eq!((status, &answer["taken"]), (202, &json!(false)), "{answer}");
     let until = answer["until"].as_str().expect("what it waits for");

@@ -92,6 +92,23 @@ pub const METHODS: &[Method] = &[
         ),
     ),
     get(
+        "/v1/health",
+        "200 as long as the executive serves requests",
+        Answer::Other("text/plain", "ok"),
+    ),
+    get(
+        "/v1/ready",
+        "200 if the executive can start actions; 503 with the reason if it has not begun, has ended, or the \
+         world does not answer",
+        Answer::Other("text/plain", "ready, or the reason"),
+    ),
+    get(
+        "/metrics",
+        "Metrics for Prometheus: time, activity, goals by state, running actions, plans, doubts, silence of the \
+         world",
+        Answer::Other("text/plain", "Prometheus text format, version 0.0.4"),
+    ),
+    get(
         "/v1/openapi.json",
         "This description",
         Answer::Other("application/json", "An OpenAPI document"),

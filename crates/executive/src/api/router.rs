@@ -26,6 +26,7 @@ use super::initial_problem::InitialProblem;
 const JSON: &str = "application/json";
 const TEXT: &str = "text/plain; charset=utf-8";
 const HTML: &str = "text/html; charset=utf-8";
+const METRICS: &str = "text/plain; version=0.0.4; charset=utf-8";
 
 /// Page until the run begins. It reloads itself.
 const WAITING: &str = "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
@@ -279,6 +280,12 @@ impl ApiRouter {
                     "All goals are abandoned; nothing more is started.\n",
                 )
             }
+            ("GET", "/v1/health") => respond(stream, 200, TEXT, "ok\n"),
+            ("GET", "/v1/ready") => match self.obstacle_to_readiness() {
+                None => respond(stream, 200, TEXT, "ready\n"),
+                Some(why) => respond(stream, 503, TEXT, &format!("{why}\n")),
+            },
+            ("GET", "/metrics") => respond(stream, 200, METRICS, &self.metrics()),
             ("GET", "/v1/openapi.json") => respond(stream, 200, JSON, &text(&openapi())),
             ("GET", "/v1/state") => respond(stream, 200, JSON, &text(&self.state())),
             ("GET", "/v1/goals") => {

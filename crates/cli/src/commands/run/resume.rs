@@ -9,19 +9,20 @@ use elbowroom::model::Task;
 use elbowroom_executive::Error;
 use elbowroom_executive::journal::Segments;
 use elbowroom_executive::operator::OperatorInterface;
-use elbowroom_executive::resume::{InterruptedRun, ResumeSettings};
+use elbowroom_executive::resume::{InterruptedRun, JournaledRun, ResumeSettings};
+use serde_json::Value;
 
 use super::page::Page;
 use super::{CommandHost, background, failure, limits};
 use crate::args::RunArgs;
-use crate::exit::{Answer, Failure};
+use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 
-/// Reads the journal of a run that can be resumed.
-fn interrupted_run(path: &Path) -> Result<InterruptedRun, Failure> {
+/// Reads the journal of a run.
+fn journaled_run(path: &Path) -> Result<JournaledRun, Failure> {
     // Opening a named pipe could block forever.
     if std::fs::metadata(path).is_ok_and(|it| !it.is_file()) {
         return Err(Failure::new(
@@ -97,6 +98,19 @@ impl ResumeHost for StandaloneHost<'_> {
     }
 }
 
+/// Prints that there is nothing to resume. A supervisor must not start the command again.
+fn achieved(path: &Path, report: &Value, arguments: &RunArgs, output: &mut Output) -> Answer {
+    if arguments.json {
+        output.json(report)?;
+    } else {
+        let name = path.display();
+        output::print(&format!(
+            "done: the run of {name} has reached its goal before; `elbowroom report {name}` shows what was done\n"
+        ))?;
+    }
+    Ok(Exit::Yes)
+}
+
 /// Resumes the run of a journal.
 pub(in crate::commands) fn run(
     path: &Path,
@@ -104,7 +118,10 @@ pub(in crate::commands) fn run(
     host: &dyn ResumeHost,
     output: &mut Output,
 ) -> Answer {
-    let interrupted = interrupted_run(path)?;
+    let interrupted = match journaled_run(path)? {
+        JournaledRun::Interrupted(run) => run,
+        JournaledRun::Achieved(report) => return achieved(path, &report, arguments, output),
+    };
     let threads = super::spec::threads_of(arguments, &interrupted.spec().planner)?;
     let interrupted = interrupted.with_threads(threads);
     let spec = interrupted.spec().clone();
