@@ -45,28 +45,28 @@ impl Task {
     /// The task of a problem: its initial state, timed happenings and goal, made ground; ε is
     /// 0.001.
     pub fn new(problem: impl Into<Arc<Problem>>) -> Self {
-        Self::of(problem.into(), Arc::default())
+        Self::of(&problem.into(), Arc::default())
     }
 
     /// The task of a problem that extends this task's: with the same objects, and with further predicates, functions
     /// and actions after its own. Facts and fluents keep their numbers.
     #[must_use]
     pub fn extended(&self, problem: impl Into<Arc<Problem>>) -> Self {
-        Self::of(problem.into(), Arc::clone(&self.table)).with_epsilon(self.epsilon.clone())
+        Self::of(&problem.into(), Arc::clone(&self.table)).with_epsilon(self.epsilon.clone())
     }
 
-    fn of(problem: Arc<Problem>, table: Arc<RwLock<Table>>) -> Self {
+    fn of(problem: &Arc<Problem>, table: Arc<RwLock<Table>>) -> Self {
         let mut task = Self {
-            problem: Arc::clone(&problem),
+            problem: Arc::clone(problem),
             epsilon: Self::default_epsilon(),
-            domains: Arc::new(Domains::of(&problem)),
+            domains: Arc::new(Domains::of(problem)),
             table,
             initial: State::default(),
             timed: Vec::new(),
             goal: Condition::TRUE,
             constraints: Arc::default(),
             autonomous: Arc::default(),
-            rules_of_predicate: Arc::new(rules_of_predicate(&problem)),
+            rules_of_predicate: Arc::new(rules_of_predicate(problem)),
         };
         let mut initial = State::default();
         let (timed, goal, constraints, autonomous) = task.grounding(|grounder| {
@@ -180,24 +180,26 @@ impl Task {
 
     /// The same task with deadlines, on its clock: each condition holds at some moment from the situation in which a
     /// plan begins until the deadline. Unlike for constraints of the problem, nothing that was before that situation
-    /// counts. If the problem has constraints of its own, plans in mid-execution are refused, as without deadlines.
+    /// counts. A task with constraints of its own stays as it is.
     #[must_use]
     pub fn with_deadlines<'c>(
         &self,
         deadlines: impl IntoIterator<Item = (Rational, &'c problem::Condition)>,
     ) -> Self {
         let mut task = self.clone();
-        let own = self.grounding(|grounder| grounder.constraints());
-        let mut constraints = Constraints {
-            begin_now: own.is_empty(),
-            ..own
+        if !self.constraints.is_empty() && !self.constraints.begin_now {
+            return task;
+        }
+        let ground = |condition| {
+            self.grounding(|grounder| grounder.ground_condition(condition, &mut Vec::new()))
         };
-        let deadlines = deadlines.into_iter().map(|(deadline, condition)| {
-            let condition = self.grounding(|it| it.ground_condition(condition, &mut Vec::new()));
-            Modal::Within(deadline, condition)
+        let deadlines = deadlines.into_iter();
+        let within = deadlines.map(|(deadline, it)| Modal::Within(deadline, ground(it)));
+        task.constraints = Arc::new(Constraints {
+            hard: within.collect(),
+            begin_now: true,
+            ..Constraints::default()
         });
-        constraints.hard.extend(deadlines);
-        task.constraints = Arc::new(constraints);
         task
     }
 

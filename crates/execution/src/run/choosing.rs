@@ -76,9 +76,10 @@ impl Run<'_> {
         let is_left = |goal: &OpenGoal| goal.is_pursued() && !is_achieved(goal);
         let is_momentary = |goal: &OpenGoal| goal.deadline.is_some() && is_achieved(goal);
         let is_any_left = lasting.goals.iter().any(is_left);
-        let is_to_close = match is_any_left {
-            true => lasting.goals.iter().any(is_achieved),
-            false => lasting.goals.iter().any(is_momentary),
+        let is_to_close = if is_any_left {
+            lasting.goals.iter().any(is_achieved)
+        } else {
+            lasting.goals.iter().any(is_momentary)
         };
         if !is_to_close {
             return;

@@ -8,7 +8,7 @@ use std::time::Duration;
 use elbowroom::execution::Request;
 use elbowroom::execution::run::FIRST_GOAL;
 use elbowroom::executive::documents::{
-    Activity, GivenNumber, NewFact, NewGoal, NewNumber, NewProblem, State, Taken,
+    Activity, NewFact, NewGoal, NewNumber, NewProblem, State, Taken,
 };
 use elbowroom::executive::goal_text;
 use elbowroom::model::ground::{Change, FactId};
@@ -124,7 +124,7 @@ impl ApiRouter {
 
     fn goal(&self, given: NewGoal) -> Result<Taken, ApiError> {
         let status = &self.run()?.status;
-        let deadline = deadline(&given.deadline, &given.within, &status.state().now.0)?;
+        let deadline = deadline(&given, &status.state().now.0)?;
         let open = status.goals();
         let name = given.name.unwrap_or_else(|| self.new_name(&open));
         let request = Request::Pursue {
@@ -199,13 +199,9 @@ impl ApiRouter {
 }
 
 /// Returns the deadline of a goal that is given now.
-fn deadline(
-    deadline: &Option<GivenNumber>,
-    within: &Option<GivenNumber>,
-    now: &Rational,
-) -> Result<Option<Rational>, ApiError> {
+fn deadline(given: &NewGoal, now: &Rational) -> Result<Option<Rational>, ApiError> {
     let refused = |error: String, help| Err(ApiError::new(422, error, help));
-    match (deadline, within) {
+    match (&given.deadline, &given.within) {
         (Some(_), Some(_)) => refused(
             "the goal has a deadline and a time within which it is to be achieved".to_owned(),
             "leave out one of them",

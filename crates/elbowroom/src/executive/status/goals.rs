@@ -112,7 +112,8 @@ impl GoalList {
         for goal in &mut self.open {
             let is_pursued = goal.state == PURSUED;
             let is_unplanned = is_pursued && !is_certain;
-            goal.state = if is_unplanned { UNPLANNED } else { IMPOSSIBLE }.to_owned();
+            let state = if is_unplanned { UNPLANNED } else { IMPOSSIBLE };
+            state.clone_into(&mut goal.state);
             goal.since = Exact(now.clone());
             if is_pursued {
                 goal.why = (!why.is_empty()).then(|| why.to_owned());
