@@ -26,7 +26,7 @@ const FIRST_DELAY: Duration = Duration::from_millis(500);
 /// Longest delay before a restart.
 const LONGEST_DELAY: Duration = Duration::from_secs(30);
 
-/// Time without a failure after which the number of restarts and the delay begin anew.
+/// Time without a failure after which the count of restarts returns to 0.
 const RELIABLE_AFTER: Duration = Duration::from_secs(600);
 
 /// Interval between two checks for a request to stop the run.

@@ -138,8 +138,7 @@ pub struct Constraints {
     pub soft: Vec<SoftConstraint>,
     /// Whether the states before the task's beginning count, and are not known.
     pub(crate) is_past_lost: bool,
-    /// Whether no state before the task's beginning counts: the constraints are deadlines of goals that are not
-    /// achieved yet ([`Task::with_deadlines`](crate::Task::with_deadlines)).
+    /// `true` if earlier states do not matter: the constraints are deadlines of goals that are not achieved yet ([`Task::with_deadlines`](crate::Task::with_deadlines)).
     pub(crate) begin_now: bool,
 }
 

@@ -178,9 +178,8 @@ impl Task {
         task
     }
 
-    /// The same task with deadlines, on its clock: each condition holds at some moment from the situation in which a
-    /// plan begins until the deadline. Unlike for constraints of the problem, nothing that was before that situation
-    /// counts. A task with constraints of its own stays as it is.
+    /// The same task with deadlines, on its clock: each condition holds at some moment between the beginning
+    /// of a plan and the deadline. Unlike for constraints of the problem, states before the plan do not matter. A task with constraints of its own stays as it is.
     #[must_use]
     pub fn with_deadlines<'c>(
         &self,

@@ -365,7 +365,7 @@ pub enum ObservationLine {
         /// Its value, if it is not 1.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         value: Option<Exact>,
-        /// The time by which it is to be achieved.
+        /// Its deadline on the world's clock, if there is one.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         deadline: Option<Exact>,
         /// The time.

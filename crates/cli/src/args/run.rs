@@ -95,7 +95,7 @@ pub(crate) struct RunArgs {
     #[arg(allow_negative_numbers = true)]
     #[arg(requires = "programs")]
     pub(crate) answer_within: Rational,
-    /// Start that program again up to N times after it has ended or failed. It is asked about the actions that were
+    /// Number of restarts of that program after it has ended or failed. It answers for the actions that were
     /// running; those that it does not know have failed
     #[arg(long, value_name = "N", default_value = "0", requires = "programs")]
     pub(crate) restart_world: u32,

@@ -125,7 +125,7 @@ pub(crate) enum CtlCommand {
         /// values are pursued
         #[arg(long, value_name = "V")]
         value: Option<Rational>,
-        /// Time, by the world's clock, by which it is to be achieved; if it is not, it is closed as failed
+        /// Deadline on the world's clock; a goal that is not achieved until then is closed as failed
         #[arg(long, value_name = "T", conflicts_with = "within")]
         deadline: Option<Rational>,
         /// The deadline in seconds from now

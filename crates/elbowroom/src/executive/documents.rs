@@ -176,7 +176,7 @@ documents! {
         pub goal: String,
         /// Its value, a positive number.
         pub value: Exact,
-        /// The time, by the world's clock, by which it is to be achieved, if there is one.
+        /// Its deadline on the world's clock, if there is one.
         pub deadline: Option<Exact>,
         /// `pursued`; `set-aside` while others are pursued; `impossible` if no plan exists, or `unplanned` if none was found,
         /// from where the executive rests; `achieved`, `cancelled`, or `failed` if it was not achieved by its deadline.
@@ -302,8 +302,8 @@ documents! {
         /// values are pursued.
         [optional serde(default)]
         pub value: Option<GivenNumber>,
-        /// The time, by the world's clock, by which it is to be achieved. Plans achieve it by then, and if it is not, it is
-        /// closed as failed. By default it may take as long as it takes.
+        /// Its deadline on the world's clock. Plans achieve it until then; otherwise it is closed as failed. By default
+        /// there is none.
         [optional serde(default)]
         pub deadline: Option<GivenNumber>,
         /// The deadline in seconds from now, in place of `deadline`; a positive number.

@@ -65,8 +65,8 @@ impl Run<'_> {
         lasting.is_some_and(|lasting| lasting.choosing.is_some())
     }
 
-    /// Closes the goals that are achieved while others are still pursued. If none is left, but the plan need not keep
-    /// those that are achieved, they are closed, too.
+    /// Closes the goals that are achieved while others are still pursued. If none is left, closes
+    /// those that the plan need not keep, because they have deadlines.
     pub(super) fn close_achieved_goals(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;

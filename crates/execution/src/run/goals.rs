@@ -20,7 +20,7 @@ pub(super) struct OpenGoal {
     pub(super) condition: problem::Condition,
     /// Its value, a positive number.
     pub(super) value: Rational,
-    /// The time by which it is to be achieved.
+    /// Its deadline on the world's clock, if there is one.
     pub(super) deadline: Option<Rational>,
     /// The same condition, grounded.
     pub(super) ground: Condition,

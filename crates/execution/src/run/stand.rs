@@ -102,7 +102,7 @@ pub struct GivenGoal {
     pub text: Option<String>,
     /// Its value, a positive number.
     pub value: Rational,
-    /// The time by which it is to be achieved.
+    /// Its deadline on the world's clock, if there is one.
     pub deadline: Option<Rational>,
     /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
     pub aside: Option<String>,

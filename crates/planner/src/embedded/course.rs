@@ -284,7 +284,7 @@ impl Search<'_> {
         }
     }
 
-    /// Returns the situation in which plans of the extended task begin.
+    /// Returns the situation for plans of the extended task.
     fn begin(&self, free: &Task) -> Situation {
         if *self.situation == Situation::initial(self.task) {
             return Situation::initial(free);

@@ -75,7 +75,7 @@ pub struct GoalLine {
     /// Its value, if it is not 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<Exact>,
-    /// The time by which it is to be achieved.
+    /// Its deadline on the world's clock, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deadline: Option<Exact>,
     /// The reason for which it is set aside while others are pursued; none if it is pursued.
