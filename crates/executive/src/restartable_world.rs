@@ -52,7 +52,7 @@ pub(crate) struct RestartableWorld<'a> {
     beliefs: BeliefUpdates,
     /// Time since the end of the journal, until the process of a resumed run is started.
     elapsed: Option<Elapsed<'a>>,
-    /// Runs since the last answer.
+    /// Runs since the world has reported its time.
     answered: Clock,
     /// Current time of the run.
     last: Rational,
@@ -200,7 +200,8 @@ impl<'a> RestartableWorld<'a> {
             // The world may have received the cancellation already. An action that it does not know may still run.
             if is_cancelled || !is_told {
                 let ticket = Ticket(ticket);
-                world.command(&self.last, &Command::Cancel { ticket })?;
+                let told = (&self.last - &self.shift).max(Rational::ZERO);
+                world.command(&told, &Command::Cancel { ticket })?;
             }
         }
         for observation in &news {
@@ -258,10 +259,7 @@ impl<'a> RestartableWorld<'a> {
             Err(error) => Err(error),
         };
         match answer {
-            Ok(answer) => {
-                self.answered = Clock::start();
-                Ok(Some(answer))
-            }
+            Ok(answer) => Ok(Some(answer)),
             Err(failure) => self.restart(failure).map(|()| None),
         }
     }
@@ -338,6 +336,7 @@ impl World for RestartableWorld<'_> {
             observations: shifted(passage.observations, &self.shift),
         };
         self.note_time(&passage.now);
+        self.answered = Clock::start();
         for observation in &passage.observations {
             self.running.observe(&observation.event);
         }

@@ -16,6 +16,7 @@ use elbowroom::answers::{RunRequest, Watcher};
 use elbowroom::execute::RunSpec;
 use elbowroom::execution::run::Verdict;
 use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
+use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -186,6 +187,9 @@ impl InterruptedRun {
         if let Some(snapshot) = &snapshot {
             operator.begin_at(snapshot);
         }
+        if let Some(status) = operator.status() {
+            status.set_replayed(true);
+        }
         let stop = &background.stop;
         let health = JournalHealth::default();
         let beliefs = BeliefUpdates::default();
@@ -227,6 +231,7 @@ impl InterruptedRun {
                 left: stored.lines.iter().filter(|line| is_answer(line)).count(),
                 replay: Arc::clone(&replay),
                 process: RestartableWorld::resumed(launch, running, since, beliefs),
+                status: operator.status().cloned(),
             };
             let world = JournaledWorld::new(world, health.clone());
             let signal = &background.signal;
@@ -292,6 +297,8 @@ struct ResumedWorld<'a> {
     left: usize,
     replay: Arc<JournalReplay>,
     process: RestartableWorld<'a>,
+    /// Published status of the run.
+    status: Option<Status>,
 }
 
 impl<'a> ResumedWorld<'a> {
@@ -299,6 +306,9 @@ impl<'a> ResumedWorld<'a> {
     fn process(&mut self) -> Result<&mut RestartableWorld<'a>, WorldError> {
         if self.replay.difference().is_some() {
             return Err(WorldError::new("the journal leads to other decisions"));
+        }
+        if let Some(status) = self.status.take() {
+            status.set_replayed(false);
         }
         Ok(&mut self.process)
     }

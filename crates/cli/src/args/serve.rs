@@ -123,13 +123,13 @@ pub(crate) enum CtlCommand {
         name: Option<String>,
         /// Its value, a positive number [default: 1]; if not all goals can be reached together, those with the greatest sum of
         /// values are pursued
-        #[arg(long, value_name = "V")]
+        #[arg(long, value_name = "V", allow_negative_numbers = true)]
         value: Option<Rational>,
         /// Deadline on the world's clock; a goal that is not achieved until then is closed as failed
-        #[arg(long, value_name = "T", conflicts_with = "within")]
+        #[arg(long, value_name = "T", conflicts_with = "within", allow_negative_numbers = true)]
         deadline: Option<Rational>,
         /// The deadline in seconds from now
-        #[arg(long, value_name = "S")]
+        #[arg(long, value_name = "S", allow_negative_numbers = true)]
         within: Option<Rational>,
         /// Wait until the goal is closed, or impossible from where the executive rests: exit code 0 if it is achieved, 1
         /// if it is cancelled, failed or impossible, 3 if the executive rests because no plan was found

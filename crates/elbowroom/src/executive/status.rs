@@ -37,6 +37,8 @@ struct Known {
     is_planning: bool,
     is_paused: bool,
     is_over: bool,
+    /// The journal of a resumed run is replayed.
+    is_replayed: bool,
     /// Why it rests, if it does.
     rest: Option<String>,
     /// Why a plan is made.
@@ -139,6 +141,16 @@ impl Status {
             state.in_doubt = in_doubt(&belief);
         }
         state
+    }
+
+    /// Sets whether the run replays its journal, so that its state is one of the past.
+    pub fn set_replayed(&self, is_replayed: bool) {
+        self.known().is_replayed = is_replayed;
+    }
+
+    /// Returns whether the run replays its journal.
+    pub fn is_replayed(&self) -> bool {
+        self.known().is_replayed
     }
 
     /// The world's clock says so, though nothing has happened.
@@ -245,16 +257,19 @@ impl Known {
     fn state(&self) -> State {
         let activity = match () {
             () if self.is_over => Activity::Over,
+            () if self.is_replayed => Activity::Beginning,
             () if self.is_paused => Activity::Paused,
             () if self.rest.is_some() => Activity::Resting,
             () if self.is_planning => Activity::Planning,
             () if self.plans == 0 => Activity::Beginning,
             () => Activity::Executing,
         };
+        let replayed = self.is_replayed.then(|| "the journal is replayed".to_owned());
+        let why = replayed.or_else(|| self.rest.clone());
         State {
             now: Exact(self.now.clone()),
             unanswered: None,
-            why: self.rest.clone().or_else(|| self.why.clone()),
+            why: why.or_else(|| self.why.clone()),
             activity,
             goals: self.goals.open(),
             running: self.running.values().cloned().collect(),

@@ -148,9 +148,11 @@ impl ApiRouter {
     }
 
     fn abandon(&self, name: &str) -> Result<Taken, ApiError> {
-        let open = self.run()?.status.goals();
-        // A pending request may add the goal.
-        if !open.iter().any(|known| known == name) && self.queue().is_idle() {
+        let status = &self.run()?.status;
+        let open = status.goals();
+        // A pending request, or the journal that is replayed, may add the goal.
+        let is_known = open.iter().any(|known| known == name) || !self.queue().is_idle();
+        if !is_known && !status.is_replayed() {
             let help = match open.as_slice() {
                 [] => "no goals are open".to_owned(),
                 open => format!("these are open: {}", open.join(", ")),
