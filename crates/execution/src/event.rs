@@ -126,6 +126,11 @@ pub enum Request {
         /// Its name.
         name: String,
     },
+    /// To cancel a running action. What its end means for the plan is found out when the world reports it.
+    CancelAction {
+        /// The ticket of its start.
+        ticket: Ticket,
+    },
     /// To start nothing more; what is under way goes on.
     Pause,
     /// To go on after a pause.

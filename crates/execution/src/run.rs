@@ -390,7 +390,7 @@ impl<'a> Run<'a> {
     }
 
     /// The same for actions that are cancelled.
-    fn cancel(&mut self, tickets: Vec<Ticket>) {
+    pub(crate) fn cancel(&mut self, tickets: Vec<Ticket>) {
         let mut commands = Vec::with_capacity(tickets.len());
         for ticket in tickets {
             let command = Command::Cancel { ticket };

@@ -28,9 +28,13 @@ pub(crate) fn check(request: &ExternalRequest, task: &Task) -> Result<(), Error>
             check_name(name)?;
             check_value(value)
         }
-        ExternalRequest::Request(Request::Abandon { .. } | Request::Pause | Request::Resume) => {
-            Ok(())
-        }
+        ExternalRequest::Request(
+            Request::Abandon { .. }
+            | Request::CancelAction { .. }
+            | Request::Pause
+            | Request::Resume,
+        )
+        | ExternalRequest::Outcome { .. } => Ok(()),
         ExternalRequest::Fact { fact, .. } => check_fact(fact, task),
         ExternalRequest::Number { fluent, .. } => check_fluent(fluent, task),
     }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use elbowroom::execution::{Event, Observation, Request};
+use elbowroom::execution::{Ending, Event, Observation, Request, Ticket};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 
@@ -25,6 +25,13 @@ pub enum ExternalRequest {
         fact: String,
         /// Its truth.
         becomes: bool,
+    },
+    /// Outcome of a running action, as somebody has seen it.
+    Outcome {
+        /// The ticket of its start.
+        ticket: Ticket,
+        /// `true` if it has succeeded.
+        succeeded: bool,
     },
     /// Observation of a numeric fluent.
     Number {
@@ -148,6 +155,16 @@ impl RequestQueue {
             ExternalRequest::Fact { fact, becomes } => Some(Event::Fact {
                 fact: task.fact_named(&fact)?,
                 truth: becomes,
+            }),
+            ExternalRequest::Outcome { ticket, succeeded } => Some(Event::Ended {
+                ticket,
+                ending: if succeeded {
+                    Ending::Succeeded
+                } else {
+                    let why = "an operator has reported it as failed".to_owned();
+                    Ending::Failed { why }
+                },
+                measured: Vec::new(),
             }),
             ExternalRequest::Number { fluent, value } => Some(Event::Value {
                 fluent: task.fluent_named(&fluent)?,

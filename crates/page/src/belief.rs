@@ -146,6 +146,7 @@ impl<'t> Belief<'t> {
             | ObservationLine::Feedback { .. }
             | ObservationLine::Goal { .. }
             | ObservationLine::Abandon { .. }
+            | ObservationLine::CancelAction { .. }
             | ObservationLine::Pause { .. }
             | ObservationLine::Resume { .. }
             | ObservationLine::PlanMade { .. }

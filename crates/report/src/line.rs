@@ -378,6 +378,13 @@ pub enum ObservationLine {
         /// The time.
         time: Exact,
     },
+    /// A running action is to be cancelled.
+    CancelAction {
+        /// The ticket of its start.
+        ticket: u64,
+        /// The time.
+        time: Exact,
+    },
     /// A lasting run is to start nothing more.
     Pause {
         /// The time.

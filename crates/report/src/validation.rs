@@ -384,7 +384,7 @@ impl<'a> Validation<'a> {
                 }
             }
             Request::Abandon { name } => self.goals.retain(|known| known.name != *name),
-            Request::Pause | Request::Resume => {}
+            Request::CancelAction { .. } | Request::Pause | Request::Resume => {}
         }
     }
 

@@ -126,7 +126,12 @@ pub(crate) enum CtlCommand {
         #[arg(long, value_name = "V", allow_negative_numbers = true)]
         value: Option<Rational>,
         /// Deadline on the world's clock; a goal that is not achieved until then is closed as failed
-        #[arg(long, value_name = "T", conflicts_with = "within", allow_negative_numbers = true)]
+        #[arg(
+            long,
+            value_name = "T",
+            conflicts_with = "within",
+            allow_negative_numbers = true
+        )]
         deadline: Option<Rational>,
         /// The deadline in seconds from now
         #[arg(long, value_name = "S", allow_negative_numbers = true)]
@@ -141,6 +146,15 @@ pub(crate) enum CtlCommand {
         /// Its name; that of the problem's own goal is `problem`
         #[arg(value_name = "NAME")]
         name: String,
+    },
+    /// Say that a running action is done or has failed, or have it cancelled
+    Action {
+        /// The number of its start; `ctl state` lists the running actions with their numbers
+        #[arg(value_name = "TICKET")]
+        ticket: u64,
+        /// What becomes of it; `cancelled` asks the world to cancel it
+        #[arg(value_name = "OUTCOME", value_parser = ["done", "failed", "cancelled"])]
+        becomes: String,
     },
     /// Say that a fact is true, or is not
     Fact {

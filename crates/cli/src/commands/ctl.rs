@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use elbowroom::answers::exact::{INFINITY, MINUS_INFINITY};
 use elbowroom::executive::documents::{
-    GivenNumber, GoalNow, GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow,
-    PlanNow, Refusal, State, StepNow, Taken,
+    GivenNumber, GoalNow, GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewOutcome,
+    NewProblem, NextNow, PlanNow, Refusal, State, StepNow, Taken,
 };
 use elbowroom::num::{End, Rational};
 use elbowroom::report::exact::Exact;
@@ -69,6 +69,14 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
                 ));
             }
             client.change(output, ("DELETE", &format!("/v1/goals/{name}")), NOTHING)
+        }
+        CtlCommand::Action { ticket, becomes } => {
+            let (ticket, becomes) = (*ticket, becomes.clone());
+            client.change(
+                output,
+                ("POST", "/v1/actions"),
+                Some(&NewOutcome { ticket, becomes }),
+            )
         }
         CtlCommand::Fact { fact, becomes } => {
             let (fact, becomes) = (fact.clone(), *becomes);
@@ -343,8 +351,9 @@ fn state(state: &State) -> String {
     for running in &state.running {
         let _ = write!(
             text,
-            "  running {} since {}",
+            "  running {} (ticket {}) since {}",
             running.action,
+            running.ticket,
             nearest(&running.since.0)
         );
         if let Some(planned) = &running.planned {

@@ -1,4 +1,4 @@
-//! Several goals at once, and clients that wait for one.
+//! Several goals at once, clients that wait for one, and operators who act on single actions.
 
 use serde_json::{Value, json};
 
@@ -80,4 +80,29 @@ fn goals_with_deadlines_are_achieved_or_fail() {
         assert_eq!(told.status.code(), Some(code), "{text}");
         assert_eq!(answer["state"], state, "{text}");
     }
+}
+
+#[test]
+fn operators_report_and_cancel_running_actions() {
+    let own = simulated("operators");
+    let mut reported = Vec::new();
+    for becomes in ["failed", "cancelled", "done"] {
+        let is_new = |state: &Value| {
+            let ticket = state["running"][0]["ticket"].as_u64();
+            ticket.is_some_and(|ticket| !reported.contains(&ticket))
+        };
+        let state = own.await_state(is_new);
+        let ticket = state["running"][0]["ticket"].as_u64().expect("a ticket");
+        let outcome = json!({"ticket": ticket, "becomes": becomes});
+        let (status, answer) = own.post("/v1/actions", &outcome);
+        assert_eq!(status, 200, "{answer}");
+        reported.push(ticket);
+    }
+    let (status, answer) = own.post("/v1/actions", &json!({"ticket": 99, "becomes": "done"}));
+    assert_eq!(status, 404, "{answer}");
+    let (status, answer) = own.post("/v1/actions", &json!({"ticket": 0, "becomes": "lost"}));
+    assert_eq!(status, 422, "{answer}");
+    own.await_state(|state| state["activity"] == "resting");
+    let (_, all) = own.get("/v1/goals");
+    assert_eq!(all["goals"][0]["state"], "achieved", "{all}");
 }

@@ -311,6 +311,15 @@ documents! {
         pub within: Option<GivenNumber>,
     }
 
+    /// The end of a running action.
+    #[serde(deny_unknown_fields)]
+    pub struct NewOutcome {
+        /// The number of its start.
+        pub ticket: u64,
+        /// `done` or `failed`, as somebody has seen it; `cancelled` if the world is to cancel it.
+        pub becomes: String,
+    }
+
     /// A fact as it is from now on.
     #[serde(deny_unknown_fields)]
     pub struct NewFact {

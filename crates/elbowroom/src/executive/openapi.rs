@@ -3,8 +3,8 @@
 use serde_json::{Map, Value, json};
 
 use super::documents::{
-    GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow, PlanNow, Refusal,
-    State, Taken,
+    GoalsNow, GuaranteeNow, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, NextNow, PlanNow,
+    Refusal, State, Taken,
 };
 use super::schema::Described;
 
@@ -126,6 +126,12 @@ pub const METHODS: &[Method] = &[
         Some(NewGoal::schema),
     ),
     change("DELETE", "/v1/goals/{name}", "That goal is abandoned", None),
+    change(
+        "POST",
+        "/v1/actions",
+        "A running action is done or has failed, or is to be cancelled",
+        Some(NewOutcome::schema),
+    ),
     change(
         "POST",
         "/v1/facts",

@@ -264,7 +264,9 @@ impl Known {
             () if self.plans == 0 => Activity::Beginning,
             () => Activity::Executing,
         };
-        let replayed = self.is_replayed.then(|| "the journal is replayed".to_owned());
+        let replayed = self
+            .is_replayed
+            .then(|| "the journal is replayed".to_owned());
         let why = replayed.or_else(|| self.rest.clone());
         State {
             now: Exact(self.now.clone()),
@@ -565,6 +567,7 @@ impl Known {
                 self.goals.give(&given, &self.now);
             }
             Request::Abandon { name } => self.goals.cancel(name, "abandoned", &self.now),
+            Request::CancelAction { .. } => {}
             Request::Pause => self.is_paused = true,
             Request::Resume => self.is_paused = false,
         }

@@ -9,6 +9,7 @@
 //! | a goal of a name that is open | it takes the place of the earlier one; a plan is made from here |
 //! | a goal is abandoned | a plan is made for the others; without others, nothing more is started |
 //! | a fact or value | believed; the plan goes on while it works with it, and else a plan is made from here |
+//! | an action is cancelled | the world is told; its end is an outcome like any other |
 //! | a pause | nothing is started or planned any more; what is under way goes on, what it does is followed, and who stays silent for too long is given up. Time passes, deadlines too |
 //! | the end of a pause | the plan goes on where it still can; else a plan is made from here |
 //!
@@ -152,6 +153,9 @@ impl<'a> Run<'a> {
 
     /// Takes in a request.
     pub(super) fn asked_for(&mut self, request: &Request) -> Remark {
+        if let Request::CancelAction { ticket } = request {
+            return self.cancel_on_request(*ticket);
+        }
         let Some(lasting) = &mut self.lasting else {
             return Some("this run takes no requests; nothing was made of it");
         };
@@ -199,6 +203,7 @@ impl<'a> Run<'a> {
                 self.turn(format!("`{name}` is abandoned"), false);
                 None
             }
+            Request::CancelAction { .. } => None,
             Request::Pause if lasting.is_paused => Some("it is paused already"),
             Request::Resume if !lasting.is_paused => Some("it is not paused"),
             Request::Pause | Request::Resume => {
@@ -206,6 +211,14 @@ impl<'a> Run<'a> {
                 None
             }
         }
+    }
+
+    fn cancel_on_request(&mut self, ticket: Ticket) -> Remark {
+        if !self.account.open_tickets().any(|open| open == ticket) {
+            return Some("no action with that ticket is running");
+        }
+        self.cancel(vec![ticket]);
+        None
     }
 
     /// Whether the goals are not, or no longer, those of the problem.

@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use elbowroom::execution::Request;
 use elbowroom::execution::run::FIRST_GOAL;
+use elbowroom::execution::{Request, Ticket};
 use elbowroom::executive::documents::{
-    Activity, NewFact, NewGoal, NewNumber, NewProblem, State, Taken,
+    Activity, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, State, Taken,
 };
 use elbowroom::executive::goal_text;
 use elbowroom::model::ground::{Change, FactId};
@@ -33,7 +33,9 @@ impl ApiRouter {
             ("PUT", _) | ("POST", "/v1/goals" | "/v1/facts" | "/v1/numbers") => {
                 Accepted::Everything
             }
-            ("DELETE", _) | ("POST", "/v1/pause" | "/v1/resume") => Accepted::Pauses,
+            ("DELETE", _) | ("POST", "/v1/actions" | "/v1/pause" | "/v1/resume") => {
+                Accepted::Pauses
+            }
             _ => Accepted::Nothing,
         };
         if let Ok(run) = self.run() {
@@ -43,6 +45,7 @@ impl ApiRouter {
             ("PUT", "/v1/problem") => self.problem(read(body)?),
             ("POST", "/v1/goals") => self.goal(read(body)?),
             ("DELETE", path) => self.abandon(path.trim_start_matches("/v1/goals/")),
+            ("POST", "/v1/actions") => self.action(&read(body)?),
             ("POST", "/v1/facts") => self.fact(read(body)?),
             ("POST", "/v1/numbers") => self.number(read(body)?),
             ("POST", "/v1/pause") => {
@@ -162,6 +165,35 @@ impl ApiRouter {
         let name = name.to_owned();
         let request = Request::Abandon { name: name.clone() };
         self.submit(vec![ExternalRequest::Request(request)], Some(name))
+    }
+
+    fn action(&self, given: &NewOutcome) -> Result<Taken, ApiError> {
+        let ticket = Ticket(given.ticket);
+        let outcome = |succeeded| ExternalRequest::Outcome { ticket, succeeded };
+        let request = match given.becomes.as_str() {
+            "done" => outcome(true),
+            "failed" => outcome(false),
+            "cancelled" => ExternalRequest::Request(Request::CancelAction { ticket }),
+            other => {
+                let error = format!("`{}` is no outcome of an action", other.escape_debug());
+                let help = "say `done`, `failed` or `cancelled`";
+                return Err(ApiError::new(422, error, help));
+            }
+        };
+        let running = self.run()?.status.state().running;
+        if !running.iter().any(|it| it.ticket == given.ticket) && self.queue().is_idle() {
+            let running = running
+                .iter()
+                .map(|it| format!("{} {}", it.ticket, it.action));
+            let running: Vec<String> = running.collect();
+            let help = match running.as_slice() {
+                [] => "no action is running".to_owned(),
+                running => format!("these are running: {}", running.join(", ")),
+            };
+            let error = format!("no action with the ticket {} is running", given.ticket);
+            return Err(ApiError::new(404, error, help));
+        }
+        self.submit(vec![request], None)
     }
 
     fn fact(&self, given: NewFact) -> Result<Taken, ApiError> {

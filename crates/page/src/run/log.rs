@@ -262,6 +262,10 @@ fn observation<'a>(observation: &'a ObservationLine, bars: &Bars) -> (&'a Ration
             name, goal, time, ..
         } => (&time.0, format!("asked for: {name}: {goal}")),
         ObservationLine::Abandon { name, time } => (&time.0, format!("asked to abandon: {name}")),
+        ObservationLine::CancelAction { ticket, time } => (
+            &time.0,
+            format!("asked to cancel the action of ticket {ticket}"),
+        ),
         ObservationLine::Pause { time } => (&time.0, "asked to pause".to_owned()),
         ObservationLine::Resume { time } => (&time.0, "asked to go on".to_owned()),
         ObservationLine::PlanMade { time } => (&time.0, "the plan is there".to_owned()),

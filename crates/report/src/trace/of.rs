@@ -3,7 +3,7 @@
 use elbowroom_execution::run::{ExecutedStep, Report, Verdict};
 use elbowroom_execution::{
     Command, Decision, Ending, Entry, Event, GoalChange, Measured, Mission, Observation, Order,
-    Planned, Reason, Request, WarningCause,
+    Planned, Reason, Request, Ticket, WarningCause,
 };
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -279,6 +279,10 @@ impl ObservationLine {
                 name: name.clone(),
                 time,
             },
+            Request::CancelAction { ticket } => Self::CancelAction {
+                ticket: ticket.0,
+                time,
+            },
             Request::Pause => Self::Pause { time },
             Request::Resume => Self::Resume { time },
         }
@@ -312,6 +316,10 @@ impl ObservationLine {
             Self::Abandon { name, time } => {
                 let name = name.clone();
                 (Request::Abandon { name }, time)
+            }
+            Self::CancelAction { ticket, time } => {
+                let ticket = Ticket(*ticket);
+                (Request::CancelAction { ticket }, time)
             }
             Self::Pause { time } => (Request::Pause, time),
             Self::Resume { time } => (Request::Resume, time),
