@@ -37,8 +37,8 @@ struct Known {
     is_planning: bool,
     is_paused: bool,
     is_over: bool,
-    /// The journal of a resumed run is replayed.
-    is_replayed: bool,
+    /// The reason for which the state is one of the past, if it is.
+    past: Option<&'static str>,
     /// Why it rests, if it does.
     rest: Option<String>,
     /// Why a plan is made.
@@ -145,12 +145,12 @@ impl Status {
 
     /// Sets whether the run replays its journal, so that its state is one of the past.
     pub fn set_replayed(&self, is_replayed: bool) {
-        self.known().is_replayed = is_replayed;
+        self.known().past = is_replayed.then_some("the journal is replayed");
     }
 
     /// Returns whether the run replays its journal.
     pub fn is_replayed(&self) -> bool {
-        self.known().is_replayed
+        self.known().past.is_some()
     }
 
     /// The world's clock says so, though nothing has happened.
@@ -257,17 +257,15 @@ impl Known {
     fn state(&self) -> State {
         let activity = match () {
             () if self.is_over => Activity::Over,
-            () if self.is_replayed => Activity::Beginning,
+            () if self.past.is_some() => Activity::Beginning,
             () if self.is_paused => Activity::Paused,
             () if self.rest.is_some() => Activity::Resting,
             () if self.is_planning => Activity::Planning,
             () if self.plans == 0 => Activity::Beginning,
             () => Activity::Executing,
         };
-        let replayed = self
-            .is_replayed
-            .then(|| "the journal is replayed".to_owned());
-        let why = replayed.or_else(|| self.rest.clone());
+        let past = self.past.map(str::to_owned);
+        let why = past.or_else(|| self.rest.clone());
         State {
             now: Exact(self.now.clone()),
             unanswered: None,
