@@ -322,8 +322,8 @@ impl<'a> Run<'a> {
     /// One decision; what follows from it goes onto the agenda.
     fn decide_and_follow(&mut self) -> Result<(), Stop> {
         self.heed()?;
+        self.close_momentary_goals();
         self.close_achieved_goals();
-        self.close_late_goals();
         if self.tend_search()? || self.attend()? {
             return Ok(());
         }
@@ -359,7 +359,7 @@ impl<'a> Run<'a> {
             // The plan has done what it was made for, and another one is in the making.
             Decision::GoalReached if self.search.is_some() => self.let_go_of_plan(),
             Decision::GoalReached => match self.belief.outlook() {
-                Outlook::Awaited(time) => self.wait(Some(time))?,
+                Outlook::Awaited(time) => self.wait(Some(self.moment_until(time)))?,
                 Outlook::Reached | Outlook::Unmet => self.goal_reached(),
             },
         }
@@ -454,6 +454,14 @@ impl<'a> Run<'a> {
         outlook.filter(|outlook| *outlook != Outlook::Unmet)
     }
 
+    /// Returns the next time at which timed initials may achieve a goal, which is `time` if all goals are to stay true: one
+    /// with a deadline may hold for a moment before.
+    fn moment_until(&self, time: Rational) -> Rational {
+        let next = self.belief.next_timed().cloned();
+        let next = next.filter(|_| self.next_deadline_of_a_goal().is_some());
+        next.unwrap_or(time)
+    }
+
     /// What to do instead of planning, if no plan is needed: take the goal for reached, or wait for
     /// the timed initials that it depends on, and ask again.
     fn go_without_plan(&mut self, reason: &Reason) -> bool {
@@ -461,8 +469,9 @@ impl<'a> Run<'a> {
             None | Some(Outlook::Unmet) => return false,
             Some(Outlook::Reached) => self.goal_reached(),
             Some(Outlook::Awaited(time)) => {
+                let until = self.moment_until(time);
                 self.agenda.push(Todo::Replan(reason.clone()));
-                self.agenda.push(Todo::Pass(time));
+                self.agenda.push(Todo::Pass(until));
             }
         }
         self.news.clear();

@@ -28,6 +28,17 @@ pub(crate) fn check(request: &ExternalRequest, task: &Task) -> Result<(), Error>
             check_name(name)?;
             check_value(value)
         }
+        ExternalRequest::GoalWithin {
+            name,
+            goal,
+            value,
+            within,
+        } => {
+            check_goal(goal, true, task)?;
+            check_name(name)?;
+            check_value(value)?;
+            check_within(within)
+        }
         ExternalRequest::Request(
             Request::Abandon { .. }
             | Request::CancelAction { .. }
@@ -76,6 +87,16 @@ fn check_value(value: &Rational) -> Result<(), Error> {
     Err(Error::new(
         "the value of a goal is not positive",
         "give a positive number, such as 2.5",
+    ))
+}
+
+fn check_within(within: &Rational) -> Result<(), Error> {
+    if within.is_positive() {
+        return Ok(());
+    }
+    Err(Error::new(
+        "the time within which the goal is to be achieved is not positive",
+        "give the seconds from now, such as 60",
     ))
 }
 

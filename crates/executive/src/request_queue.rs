@@ -19,6 +19,17 @@ const MOST_PENDING: usize = 1000;
 pub enum ExternalRequest {
     /// Request about goals or dispatching.
     Request(Request),
+    /// Goal with a deadline that counts from the time at which the run receives it.
+    GoalWithin {
+        /// Name of the goal.
+        name: String,
+        /// The goal in PDDL.
+        goal: String,
+        /// Its value, a positive number.
+        value: Rational,
+        /// Time until its deadline, in seconds.
+        within: Rational,
+    },
     /// Observation of a fact.
     Fact {
         /// The fact in PDDL, such as `(open door)`.
@@ -152,6 +163,17 @@ impl RequestQueue {
         };
         let events = requests.into_iter().filter_map(|request| match request {
             ExternalRequest::Request(request) => Some(Event::Asked(request)),
+            ExternalRequest::GoalWithin {
+                name,
+                goal,
+                value,
+                within,
+            } => Some(Event::Asked(Request::Pursue {
+                name,
+                goal,
+                value,
+                deadline: Some(now + &within),
+            })),
             ExternalRequest::Fact { fact, becomes } => Some(Event::Fact {
                 fact: task.fact_named(&fact)?,
                 truth: becomes,

@@ -162,7 +162,9 @@ impl<'a> RestartableWorld<'a> {
         let tickets = self.running.tickets();
         let (passage, knows) = world.recall(&tickets)?;
         let is_resumed = self.elapsed.is_some();
-        if !knows {
+        if knows {
+            self.shift = Rational::ZERO;
+        } else {
             // The clock of the world restarts at 0. That of the run has advanced with the wall clock, except for
             // simulations.
             let elapsed = match self.elapsed.take() {
@@ -348,9 +350,14 @@ impl World for RestartableWorld<'_> {
         facts: &[FactId],
         fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
-        let seen = self.ask(|process| process.look(facts, fluents))?;
+        // A world that was started again has to answer, too.
+        let seen = loop {
+            if let Some(seen) = self.ask(|process| process.look(facts, fluents))? {
+                break seen;
+            }
+        };
         let mut news = self.news.take().unwrap_or_default();
-        news.extend(shifted(seen.unwrap_or_default(), &self.shift));
+        news.extend(shifted(seen, &self.shift));
         Ok(news)
     }
 }

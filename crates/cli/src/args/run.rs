@@ -98,6 +98,7 @@ pub(crate) struct RunArgs {
     /// Number of restarts of that program after it has ended or failed. It answers for the actions that were
     /// running; those that it does not know have failed
     #[arg(long, value_name = "N", default_value = "0", requires = "programs")]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) restart_world: u32,
     /// End the run at the first message of that program that is malformed or names something that
     /// the problem does not have; otherwise such messages are recorded and ignored

@@ -152,7 +152,7 @@ pub(crate) enum CtlCommand {
         /// The number of its start; `ctl state` lists the running actions with their numbers
         #[arg(value_name = "TICKET")]
         ticket: u64,
-        /// What becomes of it; `cancelled` asks the world to cancel it
+        /// Its outcome; `cancelled` asks the world to cancel it
         #[arg(value_name = "OUTCOME", value_parser = ["done", "failed", "cancelled"])]
         becomes: String,
     },

@@ -1,4 +1,4 @@
-//! Several goals at once, clients that wait for one, and operators who act on single actions.
+//! Several goals at once, clients that wait for one, and requests about single actions.
 
 use serde_json::{Value, json};
 

@@ -65,34 +65,19 @@ impl Run<'_> {
         lasting.is_some_and(|lasting| lasting.choosing.is_some())
     }
 
-    /// Closes the goals that are achieved while others are still pursued. If none is left, closes
-    /// those that the plan need not keep, because they have deadlines.
+    /// Closes the goals that are achieved while others are still pursued.
     pub(super) fn close_achieved_goals(&mut self) {
-        let Some(lasting) = &mut self.lasting else {
+        let Some(lasting) = self.lasting.as_mut().filter(|it| it.goals.len() > 1) else {
             return;
         };
         let belief = &self.belief;
         let is_achieved = |goal: &OpenGoal| belief.is_certain(&goal.ground) == Ok(true);
         let is_left = |goal: &OpenGoal| goal.is_pursued() && !is_achieved(goal);
-        let is_momentary = |goal: &OpenGoal| goal.deadline.is_some() && is_achieved(goal);
-        let is_any_left = lasting.goals.iter().any(is_left);
-        let is_to_close = if is_any_left {
-            lasting.goals.iter().any(is_achieved)
-        } else {
-            lasting.goals.iter().any(is_momentary)
-        };
-        if !is_to_close {
+        if !lasting.goals.iter().any(is_left) || !lasting.goals.iter().any(is_achieved) {
             return;
         }
         let (achieved, left): (Vec<_>, Vec<_>) = lasting.goals.drain(..).partition(is_achieved);
         lasting.goals = left;
-        if !is_any_left {
-            self.record_achieved(&achieved);
-            self.pursue_all();
-            let names = names_of(&achieved).unwrap_or_default();
-            self.turn(format!("{names} is reached"), false);
-            return;
-        }
         self.lost.has_closed_goals = self.search.is_some();
         self.record_achieved(&achieved);
         self.set_goal();
@@ -109,14 +94,58 @@ impl Run<'_> {
         deadlines.filter(|it| **it > self.now).min().cloned()
     }
 
-    /// Closes the goals whose deadlines have passed. The others are pursued without them.
-    pub(super) fn close_late_goals(&mut self) {
+    /// Closes the goals whose deadlines are before this time, in their order. All that happened up to the deadlines is
+    /// known.
+    pub(super) fn close_goals_due_before(&mut self, time: &Rational) {
+        let goals = self.lasting.iter().flat_map(|it| &it.goals);
+        let deadlines = goals.filter_map(|goal| goal.deadline.clone());
+        let due: BTreeSet<Rational> = deadlines.filter(|it| it < time).collect();
+        for deadline in due {
+            let _ = self.belief.advance(&deadline);
+            self.close_goals_due(&deadline);
+        }
+    }
+
+    /// Closes the goals with deadlines that are achieved, because they need not stay true, and those whose deadlines are
+    /// now.
+    pub(super) fn close_momentary_goals(&mut self) {
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        let belief = &self.belief;
+        let is_achieved = |goal: &mut OpenGoal| {
+            goal.deadline.is_some() && belief.is_certain(&goal.ground) == Ok(true)
+        };
+        let achieved: Vec<OpenGoal> = lasting.goals.extract_if(.., is_achieved).collect();
+        self.record_achieved(&achieved);
+        let is_any_left = self.lasting.iter().flat_map(|it| &it.goals);
+        let is_any_left = is_any_left.filter(|goal| goal.is_pursued()).count() > 0;
+        if let Some(names) = names_of(&achieved) {
+            if is_any_left && self.search.is_none() && !self.is_choosing_goals() {
+                // The plan continues with the others.
+                self.set_goal();
+            } else if is_any_left {
+                self.lost.has_closed_goals = self.search.is_some();
+                self.set_goal();
+                if self.search.is_none() {
+                    self.choose_anew(false);
+                }
+            } else {
+                self.pursue_all();
+                self.turn(format!("{names} is reached"), false);
+            }
+        }
+        self.close_goals_due(&self.now.clone());
+    }
+
+    /// Closes the goals with deadlines up to this time. The others are pursued without them.
+    fn close_goals_due(&mut self, time: &Rational) {
         let now = &self.now;
         let Some(lasting) = &mut self.lasting else {
             return;
         };
-        let is_late = |goal: &mut OpenGoal| goal.deadline.as_ref().is_some_and(|it| it <= now);
-        let mut late: Vec<OpenGoal> = lasting.goals.extract_if(.., is_late).collect();
+        let is_due = |goal: &mut OpenGoal| goal.deadline.as_ref().is_some_and(|it| it <= time);
+        let mut late: Vec<OpenGoal> = lasting.goals.extract_if(.., is_due).collect();
         late.retain(|goal| {
             // It may have been achieved at this very moment.
             let is_achieved = self.belief.is_certain(&goal.ground) == Ok(true);

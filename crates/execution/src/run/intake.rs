@@ -25,19 +25,25 @@ impl Run<'_> {
     /// Believes what is reported, as far as it can be believed, and notes what is new.
     pub(super) fn take_in(&mut self, observations: Vec<Observation>) {
         let timed_before = self.belief.timed_past();
-        for observation in observations {
+        for (index, observation) in observations.iter().enumerate() {
+            let left = observations[index..].iter().map(|it| &it.time);
+            if let Some(earliest) = left.min() {
+                self.close_goals_due_before(&earliest.clone());
+            }
             let planned = self.planned_window(&observation.event);
-            let remark = self.take(&observation);
+            let remark = self.take(observation);
             self.ports.recorder.record(&Entry::Taken {
                 now: &self.now,
-                observation: &observation,
+                observation,
                 planned: &planned,
                 remark,
             });
         }
         // Time passes for the belief when everything that happened in it is known.
         let now = self.now.clone();
+        self.close_goals_due_before(&now);
         let _ = self.belief.advance(&now);
+        self.close_momentary_goals();
         self.note_timed_at_rest(timed_before);
         (self.listener)(&self.belief);
     }

@@ -127,16 +127,38 @@ impl ApiRouter {
 
     fn goal(&self, given: NewGoal) -> Result<Taken, ApiError> {
         let status = &self.run()?.status;
-        let deadline = deadline(&given, &status.state().now.0)?;
         let open = status.goals();
         let name = given.name.unwrap_or_else(|| self.new_name(&open));
-        let request = Request::Pursue {
-            name: name.clone(),
-            goal: given.goal.trim().to_owned(),
-            value: given.value.map_or(Rational::ONE, |value| value.0),
-            deadline,
+        let goal = given.goal.trim().to_owned();
+        let value = given.value.map_or(Rational::ONE, |value| value.0);
+        let refused = |error: String, help| Err(ApiError::new(422, error, help));
+        let request = match (given.deadline, given.within) {
+            (Some(_), Some(_)) => {
+                let error = "the goal has a deadline and a time within which it is to be achieved";
+                return refused(error.to_owned(), "leave out one of them");
+            }
+            (Some(deadline), None) if deadline.0 <= status.state().now.0 => {
+                let now = status.state().now.0.to_decimal(3);
+                let error = format!("the deadline has passed: it is {now}");
+                return refused(
+                    error,
+                    "give a later time, or the seconds from now (`within`)",
+                );
+            }
+            (None, Some(within)) => ExternalRequest::GoalWithin {
+                name: name.clone(),
+                goal,
+                value,
+                within: within.0,
+            },
+            (deadline, None) => ExternalRequest::Request(Request::Pursue {
+                name: name.clone(),
+                goal,
+                value,
+                deadline: deadline.map(|it| it.0),
+            }),
         };
-        self.submit_checked(ExternalRequest::Request(request), Some(name))
+        self.submit_checked(request, Some(name))
     }
 
     /// Returns a name that no open goal has.
@@ -229,27 +251,6 @@ impl ApiRouter {
         let state = status.state();
         check_further(&problem, task, &state)?;
         self.submit(requests_for(&Task::new(problem), task, &state), None)
-    }
-}
-
-/// Returns the deadline of a goal that is given now.
-fn deadline(given: &NewGoal, now: &Rational) -> Result<Option<Rational>, ApiError> {
-    let refused = |error: String, help| Err(ApiError::new(422, error, help));
-    match (&given.deadline, &given.within) {
-        (Some(_), Some(_)) => refused(
-            "the goal has a deadline and a time within which it is to be achieved".to_owned(),
-            "leave out one of them",
-        ),
-        (None, Some(within)) if !within.0.is_positive() => refused(
-            "the time within which the goal is to be achieved is not positive".to_owned(),
-            "give the seconds from now, such as 60",
-        ),
-        (Some(deadline), None) if deadline.0 <= *now => refused(
-            format!("the deadline has passed: it is {}", now.to_decimal(3)),
-            "give a later time, or the seconds from now (`within`)",
-        ),
-        (None, Some(within)) => Ok(Some(now + &within.0)),
-        (deadline, None) => Ok(deadline.as_ref().map(|it| it.0.clone())),
     }
 }
 

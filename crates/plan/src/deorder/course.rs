@@ -8,7 +8,7 @@
 
 use std::collections::BTreeSet;
 
-use elbowroom_model::ground::{Body, Condition, Effect, FactId};
+use elbowroom_model::ground::{Body, Change, Condition, Effect, FactId};
 use elbowroom_model::{Footprint, Modal, Task};
 use elbowroom_num::Rational;
 
@@ -84,7 +84,11 @@ fn turns(
         written.any(|fact| facts.contains(fact))
     });
     for &node in &nodes {
-        let is_guarded = |effect: &Effect| !effect.guard.is_trivial();
+        let concerns = |effect: &Effect| match &effect.change {
+            Change::Add(fact) | Change::Delete(fact) => facts.contains(fact),
+            Change::Update { .. } => false,
+        };
+        let is_guarded = |effect: &Effect| !effect.guard.is_trivial() && concerns(effect);
         if effects(plan, node).iter().any(is_guarded) {
             return Err(unsupported(
                 "trajectory constraints on what conditional effects change",

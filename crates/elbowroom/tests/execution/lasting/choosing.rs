@@ -233,3 +233,41 @@ fn a_deadline_that_is_added_to_a_running_plan_is_met() {
         ],
     );
 }
+
+/// A room that timed initials open and close.
+fn with_opening_hours(timed: &str) -> Arc<Task> {
+    let domain = "(define (domain hours) (:requirements :durative-actions)
+      (:predicates (open) (idle) (done))
+      (:durative-action work :parameters () :duration (= ?duration 10)
+        :condition (at start (idle)) :effect (at end (done))))";
+    let problem =
+        format!("(define (problem p) (:domain hours) (:init (idle) {timed}) (:goal (and)))");
+    let source = |text: &str| Source::new("test", text);
+    let read = pddl::read_problem(&source(domain), &source(&problem));
+    Arc::new(Task::new(read.expect("a correct test").0))
+}
+
+#[test]
+fn a_goal_that_timed_initials_achieve_for_a_moment_is_closed_then() {
+    let task = with_opening_hours("(at 6 (open)) (at 9 (not (open))) (at 20 (open))");
+    let told = run(&task, 100, vec![(0, pursue_by("open", "(open)", 12))]);
+    assert_has(&told, &["6: `open` achieved"]);
+}
+
+#[test]
+fn a_goal_that_timed_initials_achieve_too_late_has_failed() {
+    let task = with_opening_hours("(at 12 (open))");
+    let told = run(&task, 100, vec![(0, pursue_by("open", "(open)", 11))]);
+    assert_has(&told, &["11: `open` failed"]);
+    assert!(!has(&told, "achieved"), "{:#?}", told.notes);
+}
+
+#[test]
+fn a_goal_without_deadline_is_still_confirmed_beside_one_with_a_deadline() {
+    let script = vec![
+        (0, pursue("lab", "(at lab)")),
+        (0, pursue_by("same", "(at lab)", 50)),
+    ];
+    let told = run(&rooms("(and)"), 100, script);
+    assert_has(&told, &["10: `same` achieved", "rest: goal-reached lab"]);
+}
