@@ -37,7 +37,7 @@ pub enum ExternalRequest {
         /// Its truth.
         becomes: bool,
     },
-    /// Outcome of a running action, as somebody has seen it.
+    /// Outcome of a running action that an operator has observed.
     Outcome {
         /// The ticket of its start.
         ticket: Ticket,

@@ -350,7 +350,7 @@ impl World for RestartableWorld<'_> {
         facts: &[FactId],
         fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
-        // A world that was started again has to answer, too.
+        // After a restart the question is repeated.
         let seen = loop {
             if let Some(seen) = self.ask(|process| process.look(facts, fluents))? {
                 break seen;

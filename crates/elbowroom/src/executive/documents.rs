@@ -316,7 +316,7 @@ documents! {
     pub struct NewOutcome {
         /// The number of its start.
         pub ticket: u64,
-        /// `done` or `failed`, as somebody has seen it; `cancelled` if the world is to cancel it.
+        /// `done` or `failed`, as it was observed; `cancelled` to have the world cancel it.
         pub becomes: String,
     }
 

@@ -25,16 +25,22 @@ impl Run<'_> {
     /// Believes what is reported, as far as it can be believed, and notes what is new.
     pub(super) fn take_in(&mut self, observations: Vec<Observation>) {
         let timed_before = self.belief.timed_past();
-        for (index, observation) in observations.iter().enumerate() {
-            let left = observations[index..].iter().map(|it| &it.time);
-            if let Some(earliest) = left.min() {
-                self.close_goals_due_before(&earliest.clone());
+        // The earliest time of each observation and those behind it; the last one comes first.
+        let mut earliest: Vec<Rational> = Vec::with_capacity(observations.len());
+        for observation in observations.iter().rev() {
+            let time = &observation.time;
+            let time = earliest.last().map_or(time, |later| later.min(time));
+            earliest.push(time.clone());
+        }
+        for observation in observations {
+            if let Some(time) = earliest.pop() {
+                self.close_goals_due_before(&time);
             }
             let planned = self.planned_window(&observation.event);
-            let remark = self.take(observation);
+            let remark = self.take(&observation);
             self.ports.recorder.record(&Entry::Taken {
                 now: &self.now,
-                observation,
+                observation: &observation,
                 planned: &planned,
                 remark,
             });

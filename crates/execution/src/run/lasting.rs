@@ -9,7 +9,7 @@
 //! | a goal of a name that is open | it takes the place of the earlier one; a plan is made from here |
 //! | a goal is abandoned | a plan is made for the others; without others, nothing more is started |
 //! | a fact or value | believed; the plan goes on while it works with it, and else a plan is made from here |
-//! | an action is cancelled | the world is told; its end is an outcome like any other |
+//! | an action is cancelled | the world receives the cancellation; its end is an outcome like any other |
 //! | a pause | nothing is started or planned any more; what is under way goes on, what it does is followed, and who stays silent for too long is given up. Time passes, deadlines too |
 //! | the end of a pause | the plan goes on where it still can; else a plan is made from here |
 //!
