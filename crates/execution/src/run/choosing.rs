@@ -78,8 +78,13 @@ impl Run<'_> {
         }
         let (achieved, left): (Vec<_>, Vec<_>) = lasting.goals.drain(..).partition(is_achieved);
         lasting.goals = left;
+        self.continue_without(&achieved);
+    }
+
+    /// Continues with the other goals after these, which were achieved.
+    fn continue_without(&mut self, achieved: &[OpenGoal]) {
         self.lost.has_closed_goals = self.search.is_some();
-        self.record_achieved(&achieved);
+        self.record_achieved(achieved);
         self.set_goal();
         if self.search.is_none() && self.is_choosing_goals() {
             // Sets that had no plan because of the closed goals may have one now.
@@ -117,56 +122,46 @@ impl Run<'_> {
             goal.deadline.is_some() && belief.is_certain(&goal.ground) == Ok(true)
         };
         let achieved: Vec<OpenGoal> = lasting.goals.extract_if(.., is_achieved).collect();
-        self.record_achieved(&achieved);
-        let is_any_left = self.lasting.iter().flat_map(|it| &it.goals);
-        let is_any_left = is_any_left.filter(|goal| goal.is_pursued()).count() > 0;
-        if let Some(names) = names_of(&achieved) {
-            if is_any_left && self.search.is_none() && !self.is_choosing_goals() {
-                // The plan continues with the others.
-                self.set_goal();
-            } else if is_any_left {
-                self.lost.has_closed_goals = self.search.is_some();
-                self.set_goal();
-                if self.search.is_none() {
-                    self.choose_anew(false);
-                }
-            } else {
+        let is_any_left = lasting.goals.iter().any(OpenGoal::is_pursued);
+        match names_of(&achieved) {
+            Some(_) if is_any_left => self.continue_without(&achieved),
+            Some(names) => {
+                self.record_achieved(&achieved);
                 self.pursue_all();
                 self.turn(format!("{names} is reached"), false);
             }
+            None => {}
         }
         self.close_goals_due(&self.now.clone());
     }
 
     /// Closes the goals with deadlines up to this time. The others are pursued without them.
     fn close_goals_due(&mut self, time: &Rational) {
-        let now = &self.now;
         let Some(lasting) = &mut self.lasting else {
             return;
         };
         let is_due = |goal: &mut OpenGoal| goal.deadline.as_ref().is_some_and(|it| it <= time);
-        let mut late: Vec<OpenGoal> = lasting.goals.extract_if(.., is_due).collect();
-        late.retain(|goal| {
-            // It may have been achieved at this very moment.
-            let is_achieved = self.belief.is_certain(&goal.ground) == Ok(true);
+        let due: Vec<OpenGoal> = lasting.goals.extract_if(.., is_due).collect();
+        // Some may have been achieved at this very moment.
+        let is_achieved = |goal: &OpenGoal| self.belief.is_certain(&goal.ground) == Ok(true);
+        let (achieved, late): (Vec<_>, Vec<_>) = due.into_iter().partition(is_achieved);
+        self.record_achieved(&achieved);
+        for goal in &late {
             self.ports.recorder.record(&Entry::Goal {
-                now,
+                now: &self.now,
                 name: &goal.name,
-                change: if is_achieved {
-                    GoalChange::Achieved
-                } else {
-                    GoalChange::Failed {
-                        why: "its deadline has passed",
-                    }
+                change: GoalChange::Failed {
+                    why: "its deadline has passed",
                 },
             });
-            !is_achieved
-        });
-        let Some(names) = names_of(&late) else {
-            return;
+        }
+        let words = match (names_of(&late), names_of(&achieved)) {
+            (Some(late), _) => format!("too late for {late}"),
+            (None, Some(achieved)) => format!("{achieved} is reached"),
+            (None, None) => return,
         };
         self.pursue_all();
-        self.turn(format!("too late for {names}"), false);
+        self.turn(words, false);
     }
 
     fn record_achieved(&mut self, goals: &[OpenGoal]) {
