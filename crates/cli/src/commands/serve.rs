@@ -82,6 +82,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     let (task, first, client) = if let Some((task, first)) = given {
         (task, first, None)
     } else {
+        announce(arguments, &router);
         let of = (&mut spec, world.as_ref());
         let Some(((task, first), at, client)) = await_problem(&router, arguments, of, output)
         else {
@@ -101,6 +102,9 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         .begin(&spec, &task)
         .map_err(Failure::from)
         .and_then(|operator| {
+            if client.is_none() {
+                announce(arguments, &router);
+            }
             let job = Job {
                 spec: &spec,
                 task: &task,
@@ -230,30 +234,32 @@ fn check(arguments: &ServeArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Starts the HTTP interface, and prints its addresses.
+/// Starts the HTTP interface.
 fn open(
     arguments: &ServeArgs,
     interrupt: &Interrupt,
     domain: &NamedText,
 ) -> Result<Arc<ApiRouter>, Error> {
     let control = access(&arguments.run, interrupt)?;
-    let with_token = if control.is_some() {
-        ""
-    } else {
-        "; to be looked at only, as there is no --token"
-    };
-    let router = api::serve(
+    api::serve(
         arguments.http,
         arguments.socket.as_deref(),
         control,
         Some(domain),
-    )?;
+    )
+}
+
+/// Prints where the executive listens. If it has a problem, it accepts requests about it by then.
+fn announce(arguments: &ServeArgs, router: &ApiRouter) {
+    let with_token = match &arguments.run.token {
+        Some(_) => "",
+        None => "; to be looked at only, as there is no --token",
+    };
     let own = router.address();
     output::tell(&format!("listening at http://{own}/{with_token}"));
     if let Some(path) = &arguments.socket {
         output::tell(&format!("listening at {}", path.display()));
     }
-    Ok(router)
 }
 
 fn segments(arguments: &ServeArgs) -> Segments {
@@ -284,6 +290,7 @@ impl ResumeHost for Server<'_> {
         }
         let router = open(self.arguments, interrupt, &spec.domain)?;
         let operator = router.begin(spec, task);
+        announce(self.arguments, &router);
         let _ = self.router.set(router);
         operator
     }
