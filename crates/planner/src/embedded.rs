@@ -112,10 +112,10 @@ pub fn plan(
 }
 
 /// As [`plan`], of a task without constraints on the course of its plans. `constrained`: the same task with
-/// constraints; only plans that keep them count.
+/// constraints, and its situation; only plans that keep them count.
 fn search_for_plans(
     task: &Task,
-    constrained: Option<&Task>,
+    constrained: Option<(&Task, &Situation)>,
     situation: &Situation,
     settings: &Settings,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,

@@ -190,7 +190,8 @@ impl Search<'_> {
             }
         };
         let settings = self.settings_of_search(first_plan_only);
-        let constrained = (coverage == Coverage::Expressible).then_some(self.task);
+        let constrained = coverage == Coverage::Expressible;
+        let constrained = constrained.then_some((self.task, self.situation));
         Ok(self.search(&free, constrained, &settings, most_states))
     }
 
@@ -208,7 +209,7 @@ impl Search<'_> {
     fn search(
         &mut self,
         free: &Task,
-        constrained: Option<&Task>,
+        constrained: Option<(&Task, &Situation)>,
         settings: &Settings,
         most_states: Option<u64>,
     ) -> Answer {
@@ -263,7 +264,8 @@ impl Search<'_> {
         let task = self.task;
         let loose = self.free_task(rewriting::loosened(task));
         let settings = self.settings_of_search(true);
-        let answer = self.search(&loose, Some(task), &settings, most_states);
+        let constrained = Some((task, self.situation));
+        let answer = self.search(&loose, constrained, &settings, most_states);
         match answer {
             // A rejected plan may represent others that satisfy the constraints.
             Answer::Unsolvable {

@@ -41,8 +41,8 @@ const REPORT_TURNS: u64 = 256;
 #[derive(Clone, Copy)]
 pub(in super::super) struct Frame<'a> {
     pub(in super::super) task: &'a Task,
-    /// The task with constraints on the course of plans, if the search ignores some.
-    pub(in super::super) constrained: Option<&'a Task>,
+    /// The task with constraints on the course of plans, and its situation, if the search ignores some.
+    pub(in super::super) constrained: Option<(&'a Task, &'a Situation)>,
     pub(in super::super) situation: &'a Situation,
     pub(in super::super) settings: &'a Settings,
     pub(in super::super) compiled: &'a Compiled,
@@ -54,7 +54,7 @@ pub(in super::super) struct Frame<'a> {
 
 impl<'a> Frame<'a> {
     pub(in super::super) fn new(
-        (task, constrained): (&'a Task, Option<&'a Task>),
+        (task, constrained): (&'a Task, Option<(&'a Task, &'a Situation)>),
         situation: &'a Situation,
         settings: &'a Settings,
         (compiled, mutex_pairs): (&'a Compiled, &'a OnceLock<Option<MutexPairs>>),
@@ -344,10 +344,10 @@ impl<'a, 't> Strand<'a, 't> {
         let Some((mut plan, mut verdict)) = judged else {
             return Judged::Refused;
         };
-        if let Some(constrained) = constrained
-            && judged_without_observers(constrained, situation, settings, &plan).is_none()
+        if let Some((constrained, begin)) = constrained
+            && judged_without_observers(constrained, begin, settings, &plan).is_none()
         {
-            let Some(later) = delayed(constrained, situation, settings, &plan) else {
+            let Some(later) = delayed(constrained, begin, settings, &plan) else {
                 return Judged::Refused;
             };
             let strictness = validate::Settings::default();
