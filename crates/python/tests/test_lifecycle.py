@@ -11,7 +11,7 @@ import threading
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,14 @@ HANG = 30
 
 PLAN = (DELIVERY / "plan.plan").read_text()
 """Two actions start at once. The worlds here finish neither."""
+
+
+@pytest.fixture(autouse=True)
+def interrupts() -> Iterator[None]:
+    """SIGINT interrupts, even if the tests run in the background of a shell, where it is ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def shorten(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -440,6 +448,7 @@ CHILD = """
 import asyncio, sys, threading
 from test_lifecycle import *
 
+signal.signal(signal.SIGINT, signal.default_int_handler)
 problem = elbowroom.read(DELIVERY / "domain.pddl", DELIVERY / "problem.pddl")
 fault, handle = Fault("ignores"), elbowroom.Stop()
 world = WORLDS[sys.argv[1]](fault)
