@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
 import subprocess
 import sys
@@ -469,8 +470,11 @@ print(handle.run.verdict, fault.names("cancel") == STARTED, fault.names("stop") 
 @pytest.mark.parametrize("world", WORLDS)
 def test_signals_to_a_process_end_its_run(world: str, signals: int) -> None:
     command = [sys.executable, "-c", CHILD, world]
-    folder = Path(__file__).parent
-    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as child:
+    folder, package = Path(__file__).parent, Path(elbowroom.__file__).parents[1]
+    environment = {**os.environ, "PYTHONPATH": str(package)}
+    with subprocess.Popen(
+        command, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True
+    ) as child:
         assert child.stdout is not None
         assert child.stdout.readline() == "ready\n"
         for _ in range(signals):
