@@ -179,27 +179,30 @@ impl Task {
     }
 
     /// The same task with deadlines, on its clock: each condition holds at some moment between the beginning
-    /// of a plan and the deadline. Unlike for constraints of the problem, states before the plan do not matter. A task with constraints of its own stays as it is.
+    /// of a plan and the deadline. Unlike for constraints of the problem, states before the plan do not matter.
+    /// Returns `None` if the task has constraints or preferences of its own.
     #[must_use]
     pub fn with_deadlines<'c>(
         &self,
         deadlines: impl IntoIterator<Item = (Rational, &'c problem::Condition)>,
-    ) -> Self {
-        let mut task = self.clone();
+    ) -> Option<Self> {
         if !self.constraints.is_empty() && !self.constraints.begin_now {
-            return task;
+            return None;
         }
         let ground = |condition| {
             self.grounding(|grounder| grounder.ground_condition(condition, &mut Vec::new()))
         };
         let deadlines = deadlines.into_iter();
         let within = deadlines.map(|(deadline, it)| Modal::Within(deadline, ground(it)));
-        task.constraints = Arc::new(Constraints {
+        let constraints = Constraints {
             hard: within.collect(),
             begin_now: true,
             ..Constraints::default()
-        });
-        task
+        };
+        Some(Self {
+            constraints: Arc::new(constraints),
+            ..self.clone()
+        })
     }
 
     /// The same task with each timed initial in an entry of its own in [`timed`](Self::timed), so that

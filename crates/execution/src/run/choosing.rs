@@ -147,12 +147,14 @@ impl Run<'_> {
         let (achieved, late): (Vec<_>, Vec<_>) = due.into_iter().partition(is_achieved);
         self.record_achieved(&achieved);
         for goal in &late {
+            let why = match &goal.aside {
+                Some(aside) => format!("its deadline has passed; it was set aside: {aside}"),
+                None => "its deadline has passed".to_owned(),
+            };
             self.ports.recorder.record(&Entry::Goal {
                 now: &self.now,
                 name: &goal.name,
-                change: GoalChange::Failed {
-                    why: "its deadline has passed",
-                },
+                change: GoalChange::Failed { why: &why },
             });
         }
         let words = match (names_of(&late), names_of(&achieved)) {

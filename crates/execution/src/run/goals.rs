@@ -118,16 +118,18 @@ impl Run<'_> {
     }
 
     /// Returns the task of plans for these goals. A plan need not keep a goal true to its end if the goal has a deadline,
-    /// because the goal is closed as soon as it is achieved. Executors that choose the order themselves know no deadlines.
+    /// because the goal is closed as soon as it is achieved. Executors that choose the order themselves, and plans under
+    /// constraints of the problem, respect no deadlines of goals.
     fn planned_for(&self, task: &Task, goals: &[OpenGoal]) -> Task {
-        if self.ports.executor.need() == Need::PartialOrder {
-            return task.with_goal(together(goals));
-        }
         let pursued = goals.iter().filter(|it| it.is_pursued());
         let deadlines = pursued.filter_map(|it| Some((it.deadline.clone()?, &it.condition)));
         let others = goals.iter().filter(|it| it.deadline.is_none());
-        let task = task.with_goal(together(others));
-        task.with_deadlines(deadlines)
+        let in_time = task.with_goal(together(others)).with_deadlines(deadlines);
+        let chooses_order = self.ports.executor.need() == Need::PartialOrder;
+        match in_time.filter(|_| !chooses_order) {
+            Some(task) => task,
+            None => task.with_goal(together(goals)),
+        }
     }
 
     /// The open goals.

@@ -153,9 +153,6 @@ impl<'a> Run<'a> {
 
     /// Takes in a request.
     pub(super) fn asked_for(&mut self, request: &Request) -> Remark {
-        if let Request::CancelAction { ticket } = request {
-            return self.cancel_on_request(*ticket);
-        }
         let Some(lasting) = &mut self.lasting else {
             return Some("this run takes no requests; nothing was made of it");
         };
@@ -203,7 +200,7 @@ impl<'a> Run<'a> {
                 self.turn(format!("`{name}` is abandoned"), false);
                 None
             }
-            Request::CancelAction { .. } => None,
+            Request::CancelAction { ticket } => self.cancel_on_request(*ticket),
             Request::Pause if lasting.is_paused => Some("it is paused already"),
             Request::Resume if !lasting.is_paused => Some("it is not paused"),
             Request::Pause | Request::Resume => {

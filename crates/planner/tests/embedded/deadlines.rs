@@ -34,6 +34,7 @@ fn problems(dice: &mut Dice) -> (Task, Task, String) {
         other => panic!("{other:?}"),
     };
     let later = plain.with_deadlines([(deadline.0, &deadline.1)]);
+    let later = later.expect("no constraints of its own");
     (
         from_beginning,
         later,
