@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     let given = if arguments.run.problem.is_some() {
         Some(checked(&arguments.run, &spec, world.as_ref(), output)?)
     } else {
-        heeded(&domain_text)?;
+        check_domain(&domain_text)?;
         spec.check().map_err(spec::contradiction)?;
         None
     };
@@ -179,18 +179,16 @@ fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) -> Result<(), Failure> {
     Ok(make_persistent(spec)?)
 }
 
-/// A domain that no problem could be executed of is refused before anybody is asked for one. Whatever
-/// else is wrong with it is told with the problem.
-fn heeded(domain: &NamedText) -> Result<(), Failure> {
+/// Refuses a domain with errors, or whose problems cannot be executed, before a problem is given. Warnings are printed
+/// with the problem.
+fn check_domain(domain: &NamedText) -> Result<(), Failure> {
     let mut words = domain.text.split(['(', ')', ' ', '\t', '\r', '\n']);
     let words = &mut words.by_ref().filter(|word| !word.is_empty());
     let name = words.skip_while(|word| !word.eq_ignore_ascii_case("domain"));
     let name = name.take(2).last().unwrap_or_default();
     let nothing = format!("(define (problem nothing) (:domain {name}) (:init) (:goal (and)))");
     let nothing = Source::new("nothing", nothing);
-    let Ok((problem, _)) = pddl::read_problem(&domain.source(), &nothing) else {
-        return Ok(());
-    };
+    let (problem, _) = pddl::read_problem(&domain.source(), &nothing)?;
     match Task::new(problem).only_judged() {
         Some(feature) => Err(spec::contradiction(SpecError::Unheeded(feature))),
         None => Ok(()),

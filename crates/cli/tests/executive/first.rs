@@ -25,7 +25,9 @@ fn what_is_wrong_is_told_before_it_listens_for_a_problem() {
     let nowhere = place.join("nowhere/journal").display().to_string();
     let journal = place.join("journal").display().to_string();
     let no_program = place.join("nobody").display().to_string();
-    let tests: [(&[&str], &str); 6] = [
+    let empty = place.join("empty.pddl").display().to_string();
+    fs::write(&empty, "").expect("written");
+    let tests: [(&[&str], &str); 7] = [
         (
             &["--world-process", "cat", "--journal", &nowhere],
             "cannot write the journal",
@@ -44,11 +46,13 @@ fn what_is_wrong_is_told_before_it_listens_for_a_problem() {
         ),
         (&["--world-process", &existing], "cannot start the world"),
         (&["--executor", "nobody"], "nobody"),
+        (&[], "this is not a PDDL domain"),
     ];
     for (line, words) in tests {
+        let domain = if line.is_empty() { &empty } else { DOMAIN };
         let mut child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
             .current_dir(root())
-            .args(["serve", DOMAIN, "--http", "0"])
+            .args(["serve", domain, "--http", "0"])
             .args(line)
             .stderr(Stdio::piped())
             .stdout(Stdio::null())
