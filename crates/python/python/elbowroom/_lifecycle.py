@@ -259,7 +259,7 @@ class Lifecycle:
             return self._outcome(future)
         except Exception as error:
             if was_ending:
-                # Raised after the run. The other actions are cancelled all the same.
+                # Raised after the run, when the other actions are cancelled, too.
                 self._failure = self._failure or error
                 return None
             self.begin_end()

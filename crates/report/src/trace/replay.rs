@@ -203,7 +203,7 @@ enum Played {
     /// A failure.
     Failure {
         error: WorldError,
-        /// Number of commands since the last answer, the last of which fails; 0 if a wait fails.
+        /// Number of commands from the last answer to the one that fails; 0 if a wait fails.
         commands: usize,
     },
 }
