@@ -19,6 +19,8 @@ mod goals;
 mod hostile;
 #[path = "executive/killed.rs"]
 mod killed;
+#[path = "executive/learning.rs"]
+mod learning;
 #[path = "executive/meanwhile.rs"]
 mod meanwhile;
 #[path = "executive/recorded.rs"]

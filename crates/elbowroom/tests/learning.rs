@@ -190,6 +190,7 @@ fn what_was_cut_off_counts() {
                 name,
                 records,
                 course: None,
+                world: None,
             }],
             None,
         );
@@ -240,6 +241,7 @@ fn conformal_intervals_hold_the_next_run() {
             name: number.to_string(),
             records: run(&mut rng),
             course: None,
+            world: None,
         });
         let inside = InsideRequest {
             task: Arc::clone(&task),
@@ -316,6 +318,7 @@ fn fetching(throughout: &str) -> ConformalBox {
             planned: Some(5.0),
         }],
         course: None,
+        world: None,
     });
     let inside = InsideRequest {
         task,
@@ -486,6 +489,7 @@ fn expected_changes_stand_beside_those_that_were_seen() {
         .cloned()
         .map(|log| Log {
             course: None,
+            world: None,
             ..log
         })
         .collect();

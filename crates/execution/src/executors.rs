@@ -64,19 +64,8 @@ pub struct Registered {
     pub paper: &'static str,
     /// The knowledge of a plan that it needs.
     pub need: Need,
-    /// Goals that it supports.
-    pub goals: Goals,
     /// Makes one.
     make: fn(Option<Rational>, Means) -> Box<dyn Executor>,
-}
-
-/// Goals that an executor supports.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Goals {
-    /// Goals may be added, replaced and abandoned during the run.
-    Changing,
-    /// Only the goal at the start of the run, for which its tables are computed.
-    Fixed,
 }
 
 /// The services that an executor may use while it executes a plan.
@@ -162,12 +151,6 @@ impl ExecutorSpec {
     /// Whether the executor looks for plans that are likelier to succeed.
     pub fn asks_odds(&self) -> bool {
         self.asks_outlook() || (self.registered.is_optional && self.argument.is_some())
-    }
-
-    /// Returns `true` if goals may change during the run. Samples of likelier plans ([`Self::asks_odds`]) are drawn for
-    /// the goal at its start.
-    pub fn supports_changing_goals(&self) -> bool {
-        self.registered.goals == Goals::Changing && !self.asks_odds()
     }
 
     /// Whether the executor chooses the likeliest order of a plan's actions.
@@ -315,20 +298,6 @@ mod tests {
             "fixed(30%)".parse::<ExecutorSpec>().unwrap().to_string(),
             "fixed:30"
         );
-    }
-
-    #[test]
-    fn tables_and_samples_for_one_goal_exclude_changing_goals() {
-        for (text, expected) in [
-            ("guarded", true),
-            ("live", true),
-            ("live:5", false),
-            ("lookahead", false),
-            ("policy", false),
-        ] {
-            let spec: ExecutorSpec = text.parse().unwrap();
-            assert_eq!(spec.supports_changing_goals(), expected, "{text}");
-        }
     }
 
     #[test]

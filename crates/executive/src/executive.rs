@@ -93,14 +93,13 @@ impl Executive {
     /// its measured time. A simulated world runs on the wall clock.
     ///
     /// # Errors
-    /// When the domain or the problem is invalid, the specification is contradictory or its executor does not support
-    /// changing goals, or the journal cannot be created.
+    /// When the domain or the problem is invalid, the specification is contradictory, or the journal cannot be created.
     pub fn new(mut spec: RunSpec, settings: ExecutiveSettings) -> Result<Self, RunError> {
         if spec.world_process.is_none() && spec.realtime.is_none() {
             spec.realtime = Some(Rational::ONE);
         }
         spec.planning_time = PlanningTime::Measured;
-        make_persistent(&mut spec)?;
+        make_persistent(&mut spec);
         spec.check()?;
         let journal = match &settings.journal {
             Some(_) if spec.world_process.is_none() => {
@@ -233,6 +232,7 @@ impl Executive {
                     task: &self.task,
                     background,
                     limits,
+                    observer: None,
                     warnings,
                 };
                 return run.resume(settings, self, &mut watcher);
@@ -281,23 +281,10 @@ impl RunHost for Executive {
 }
 
 /// Makes the run of a specification persistent: it waits for further goals, and plans in the background.
-///
-/// # Errors
-/// When the executor does not support changing goals.
-pub fn make_persistent(spec: &mut RunSpec) -> Result<(), Error> {
+pub fn make_persistent(spec: &mut RunSpec) {
     spec.is_lasting = true;
-    if !spec.executor.supports_changing_goals() {
-        return Err(Error::new(
-            format!(
-                "`{}` reckons with one goal, and goals change here",
-                spec.executor
-            ),
-            "choose another executor, such as guarded or live",
-        ));
-    }
     spec.plans_aside = spec.can_plan_aside();
     spec.readies_aside = spec.plans_aside;
-    Ok(())
 }
 
 /// Watcher that ends a run on a stop request.

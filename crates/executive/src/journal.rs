@@ -18,6 +18,7 @@ use crate::error::{Error, WarningSink};
 use crate::messages::plain;
 
 pub use segments::Segments;
+pub(crate) use segments::segments_of;
 pub use wall_time::{Reading, WallTime};
 
 /// Length of the checksum and the space before a line, in bytes.
@@ -64,7 +65,7 @@ pub struct Journal {
 }
 
 /// Returns options for files that only their owner can read: a journal contains all facts about the robots.
-fn for_owner() -> OpenOptions {
+pub(crate) fn for_owner() -> OpenOptions {
     let mut options = OpenOptions::new();
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);

@@ -31,6 +31,7 @@ mod executive;
 pub mod http;
 pub mod journal;
 pub mod journaling;
+pub mod learning;
 pub mod memory_limit;
 pub mod messages;
 pub mod operator;

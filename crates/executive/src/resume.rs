@@ -14,6 +14,7 @@ use std::sync::Arc;
 use elbowroom::answers::run::run as execute;
 use elbowroom::answers::{RunRequest, Watcher};
 use elbowroom::execute::RunSpec;
+use elbowroom::execute::SpecError;
 use elbowroom::execution::run::Verdict;
 use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
 use elbowroom::executive::Status;
@@ -33,7 +34,7 @@ use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
 use crate::operator::InteractiveWorld;
 use crate::process_world::ProcessLimits;
 use crate::restartable_world::{Launch, RestartableWorld};
-use crate::run::{JournaledOutcome, RunError, RunHost, ViewedRecorder, both};
+use crate::run::{EntryObserver, JournaledOutcome, RunError, RunHost, ViewedRecorder, both};
 use crate::running_actions::{self, RunningActions};
 use elapsed::Elapsed;
 use journal_replay::{JournalReplay, ReplayRecorder, ReplayWatcher, ResumedPlanner};
@@ -66,6 +67,8 @@ pub struct ResumeSettings<'a> {
     pub background: BackgroundSettings,
     /// Limits of the world process.
     pub limits: ProcessLimits,
+    /// Called for each entry after it is recorded.
+    pub observer: Option<EntryObserver<'a>>,
     /// Receiver of warnings.
     pub warnings: WarningSink,
 }
@@ -170,6 +173,7 @@ impl InterruptedRun {
             task,
             background,
             limits,
+            observer,
             warnings,
         } = settings;
         let name = path.display().to_string();
@@ -205,7 +209,8 @@ impl InterruptedRun {
             let begun = Clock::start();
             let clock = || begun.seconds();
             let continues = || !stop.is_requested();
-            let planner = spec.planner_for(task, None, &clock, &continues)?;
+            let model = spec.beliefs(task.problem()).map_err(SpecError::World)?;
+            let planner = spec.planner_for(task, model.as_ref(), &clock, &continues)?;
             let planner = Box::new(BackgroundPlanner::new(planner, &spec, &background));
             let request = RunRequest::new(&spec, task)
                 .beginning_with(first)
@@ -214,7 +219,7 @@ impl InterruptedRun {
                 .planned_by(ResumedPlanner::new(&stored, planner))
                 .prepared_by(BackgroundPreparer::new(&spec, task, &background.signal)?)
                 .told_to(both(operator.listener(), beliefs.listener()))
-                .recorded_by(ViewedRecorder::new(recorder, task, buffer, None));
+                .recorded_by(ViewedRecorder::new(recorder, task, buffer, observer));
             let elapsed = Elapsed::of(&journal, &stored, snapshot.as_ref());
             let launch = Launch {
                 command,

@@ -242,7 +242,7 @@ impl<'a> RunInputs<'a> {
         let begun = Clock::start();
         let clock = || begun.seconds();
         let continues = || !self.background.stop.is_requested();
-        let model = self.spec.model(self.task.problem());
+        let model = self.spec.beliefs(self.task.problem());
         let model = model.map_err(SpecError::World)?;
         let planner = self
             .spec
@@ -265,8 +265,9 @@ impl<'a> RunInputs<'a> {
         watcher: &mut (dyn Watcher + Send),
     ) -> Result<RunOutcome, SpecError> {
         let (spec, task) = (self.spec, self.task);
-        let model = spec.model(task.problem()).map_err(SpecError::World)?;
+        let model = spec.simulation(task.problem()).map_err(SpecError::World)?;
         let model = model.unwrap_or_default();
+        let beliefs = spec.beliefs(task.problem()).map_err(SpecError::World)?;
         let mut world = spec.world(&model, task, self.first_plan.as_ref())?;
         host.started();
         let Some(factor) = &spec.realtime else {
@@ -276,7 +277,7 @@ impl<'a> RunInputs<'a> {
         let begun = Clock::start();
         let clock = || begun.seconds();
         let continues = || !self.background.stop.is_requested();
-        let planner = spec.planner_for(task, Some(&model), &clock, &continues)?;
+        let planner = spec.planner_for(task, beliefs.as_ref(), &clock, &continues)?;
         let planner: Box<dyn Planner> =
             Box::new(BackgroundPlanner::new(planner, spec, &self.background));
         let world = Realtime {

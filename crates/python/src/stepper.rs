@@ -66,7 +66,7 @@ impl Stepper {
             execution = if let Some(callable) = planner {
                 execution.planned_by(problem.asking(callable, Arc::clone(&stop), &raised))
             } else {
-                let model = spec.model(task.problem());
+                let model = spec.beliefs(task.problem());
                 let model = model.map_err(elbowroom::execute::SpecError::World)?;
                 execution.planned_by(spec.planner_for(&task, model.as_ref(), NO_CLOCK, ALWAYS)?)
             };

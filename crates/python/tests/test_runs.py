@@ -211,3 +211,29 @@ def test_a_planner_that_raises_is_the_cause(problem: elbowroom.Problem) -> None:
     assert problem.run(planner=lambda d, p: None, world=AsPlanned()).verdict == "no-plan"
     bad = problem.run(planner=lambda d, p: "0: (unlock office) [6]", world=AsPlanned())
     assert bad.verdict == "no-plan" and "does not work" in str(bad.why)
+
+
+ROADS = """(define (domain roads) (:requirements :durative-actions :timed-initial-literals)
+  (:predicates (home) (there) (open) (delivered))
+  (:durative-action short :parameters () :duration (= ?duration 2) :condition (at start (home))
+    :effect (and (at start (not (home))) (at end (there))))
+  (:durative-action long :parameters () :duration (= ?duration 5) :condition (at start (home))
+    :effect (and (at start (not (home))) (at end (there))))
+  (:durative-action deliver :parameters () :duration (= ?duration 1)
+    :condition (and (over all (there)) (at start (open))) :effect (at end (delivered))))"""
+CLOSING = """(define (problem closing) (:domain roads) (:init (home) (open) (at 10 (not (open))))
+  (:goal (delivered)))"""
+
+
+def test_an_executor_believes_a_model_of_a_world_in_python() -> None:
+    class Roads(AsPlanned):
+        def start(self, action: elbowroom.Action) -> None:
+            self.factor = Fraction(6 if action.words[0] == "short" else 1)
+            super().start(action)
+
+    model = 'format = "elbowroom-world"\nversion = 1\n[[duration]]\naction = "short"\nconstant = 12\n'
+    problem = elbowroom.Problem(ROADS, CLOSING)
+    world = Roads()
+    assert problem.run(world=world, executor="policy", believed=model).verdict == "goal-reached"
+    assert world.begun == ["long", "deliver"]
+    assert problem.run(world=Roads(), executor="policy").verdict != "goal-reached"

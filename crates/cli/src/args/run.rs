@@ -19,6 +19,7 @@ use elbowroom_executive::http::Address;
 #[derive(Args, Debug)]
 #[command(after_long_help = executors_help())]
 #[command(group(ArgGroup::new("programs").args(["world_process", "resume"])))]
+#[command(group(ArgGroup::new("journals").args(["journal", "resume"]).multiple(true)))]
 #[command(group(ArgGroup::new("clocks").args(["realtime", "world_process", "resume"]).multiple(true)))]
 pub(crate) struct RunArgs {
     /// The domain, in PDDL
@@ -77,6 +78,11 @@ pub(crate) struct RunArgs {
     /// action when that is worst; without it, everything goes as planned
     #[arg(long, value_name = "WORLD.toml|spoiler")]
     pub(crate) world: Option<PathBuf>,
+    /// The world file that the executor believes, for example what `elbowroom learn` has written: durations, failures
+    /// and changes of facts, for the executors, first plans and envelopes that use them; or the folder of --learn.
+    /// By default that of --world; of a program nothing is known
+    #[arg(long, value_name = "WORLD.toml|FOLDER")]
+    pub(crate) believed: Option<PathBuf>,
     /// The box from which the spoiler chooses durations, as in `envelope --contains`; by default
     /// the plan's envelope
     // What a given argument conflicts with, clap does not ask for: the conflict has to be named here, too.
@@ -191,6 +197,10 @@ pub(crate) struct RunArgs {
         conflicts_with_all = ["trace", "world", "realtime", "seed"]
     )]
     pub(crate) journal: Option<PathBuf>,
+    /// Learn from the journal whenever an executive rests, and at the end: this folder keeps copies of its segments,
+    /// and world.toml, the model learnt from all logs in it, for --believed
+    #[arg(long, value_name = "FOLDER", requires = "journals")]
+    pub(crate) learn: Option<PathBuf>,
     /// Show the page of `elbowroom report` while the run goes on, at this port or HOST:PORT of this
     /// machine; without one, at a free port. Only for this machine unless HOST says otherwise
     #[arg(long, value_name = "ADDRESS", value_parser = Address::read, num_args = 0..=1)]
@@ -287,6 +297,7 @@ const IN_THE_TRACE: &[&str] = &[
     "planner_states",
     "improve_states",
     "world",
+    "believed",
     "spoil",
     "world_process",
     "executor",

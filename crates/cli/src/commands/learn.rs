@@ -7,8 +7,8 @@ use elbowroom::RoundingRule;
 use elbowroom::answers::Unwatched;
 use elbowroom::answers::learn::{
     ActionLearnt, ConformalBox, DriftAnswer, DurationsLearnt, FitAnswer, GroupAnswer,
-    InsideRequest, LearnAnswer, LearnRequest, Log, LogError, RateLearnt, Settings, Verdict,
-    expectation_and_reality, learn,
+    InsideRequest, LearnAnswer, LearnRequest, Log, LogError, PredictionAnswer, RateLearnt,
+    Settings, Verdict, expectation_and_reality, learn,
 };
 use elbowroom::num::{End, Rational};
 use elbowroom::report::table::Table;
@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
     let inside = inside(arguments, output)?;
     let mut logs = Vec::new();
     for path in &arguments.logs {
-        let source = input::source(path, "log")?;
+        let source = input::record(path, "log")?;
         let log = Log::read(&source).map_err(|error| match error {
             LogError::Table(mistakes) => Failure::from(mistakes),
             error => Failure::new(
@@ -293,6 +293,9 @@ fn remarks(text: &mut String, action: &ActionLearnt, look: Look) {
             fit(delay)
         ));
     }
+    if let Some(prediction) = action.prediction.filter(|it| it.ended > 0) {
+        remark(predicted(&action.action, &prediction));
+    }
     let drifted = |drift: &DriftAnswer, what: &str| {
         let since = drift.since?;
         Some(format!(
@@ -309,6 +312,30 @@ fn remarks(text: &mut String, action: &ActionLearnt, look: Look) {
     for words in durations.into_iter().chain(failures) {
         remark(words);
     }
+}
+
+/// Predictions beside observations.
+fn predicted(name: &str, prediction: &PredictionAnswer) -> String {
+    let mut text = format!(
+        "{name} as believed: {} failures of {} predicted, {} observed",
+        short(prediction.predicted_failures),
+        counted(
+            usize::try_from(prediction.ended).unwrap_or(usize::MAX),
+            "attempt"
+        ),
+        prediction.failures
+    );
+    if prediction.durations > 0 {
+        let _ = write!(
+            text,
+            "; durations of {} s in the mean predicted, {} s observed, {} of {} within the central 90 % predicted",
+            short(prediction.predicted_mean),
+            short(prediction.observed_mean),
+            prediction.within,
+            prediction.durations
+        );
+    }
+    text + "."
 }
 
 fn conformal(text: &mut String, inside: &ConformalBox, look: Look) {

@@ -10,6 +10,7 @@ pub(super) mod trace_file;
 mod viewers;
 
 use std::cell::OnceCell;
+use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::RoundingRule;
@@ -26,6 +27,7 @@ use elbowroom_executive::clock::Clock;
 use elbowroom_executive::completion_signal::CompletionSignal;
 use elbowroom_executive::http::AccessControl;
 use elbowroom_executive::journal::{JournalFile, Segments};
+use elbowroom_executive::learning::{Learner, Learning};
 use elbowroom_executive::messages::escape_control;
 use elbowroom_executive::operator::OperatorInterface;
 use elbowroom_executive::process_world::{ProcessLimits, check_program};
@@ -75,9 +77,9 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         since = at;
         Ok((&problem).into())
     };
-    let (mut spec, world) = spec::of(arguments, domain, problem)?;
+    let (mut spec, worlds) = spec::of(arguments, domain, problem)?;
     spec.is_attended = arguments.token.is_some();
-    let (task, first) = checked(arguments, &spec, world.as_ref(), output)?;
+    let (task, first) = checked(arguments, &spec, &worlds, output)?;
     let interrupt = Interrupt::listen_with_world();
     let journal = journal(arguments, RESUME)?;
     let page = Page::open(arguments, &spec, &task, &interrupt)?;
@@ -145,7 +147,7 @@ pub(super) fn access(
 pub(super) fn checked(
     arguments: &RunArgs,
     spec: &RunSpec,
-    world: Option<&Source>,
+    worlds: &[Source],
     output: &mut Output,
 ) -> Result<(Arc<Task>, Option<TimeTriggeredPlan>), Failure> {
     let task = task(spec, output)?;
@@ -160,7 +162,7 @@ pub(super) fn checked(
         None => None,
     };
     spec.likelihoods(&task).map_err(contradiction)?;
-    if let Some(source) = world {
+    for source in worlds {
         WorldModel::read(source, task.problem())
             .map_err(|wrong| contradiction(SpecError::World(wrong)))?;
     }
@@ -233,6 +235,15 @@ pub(super) fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure>
     let read = elbowroom::pddl::read_problem(&domain, &problem);
     let problem = Arc::new(input::with_warnings(read, output)?);
     Ok(Task::new(problem).with_epsilon(spec.epsilon.clone()))
+}
+
+/// Starts learning from the journal at `path` if the arguments ask for it.
+fn learning(arguments: &RunArgs, path: &Path) -> Result<Option<Learning>, Failure> {
+    let Some(folder) = &arguments.learn else {
+        return Ok(None);
+    };
+    let learner = Learner::new(folder, path, output::warnings())?;
+    Ok(Some(Learning::start(learner)))
 }
 
 /// Returns the limits of a world process.
@@ -322,6 +333,12 @@ impl Job<'_> {
     pub(super) fn execute(self, arguments: &RunArgs, output: &mut Output) -> Answer {
         let (spec, interrupt) = (self.spec, self.interrupt);
         let mut line = ProgressLine::new();
+        let journal = arguments.journal.as_deref();
+        let learning = journal
+            .map(|path| learning(arguments, path))
+            .transpose()?
+            .flatten();
+        let mut learns = learning.as_ref().map(Learning::observer);
         let inputs = RunInputs {
             spec,
             task: self.task,
@@ -330,7 +347,12 @@ impl Job<'_> {
             background: background(arguments, interrupt),
             limits: limits(arguments),
             since: self.since,
-            observer: Some(Box::new(move |entry| line.update(entry))),
+            observer: Some(Box::new(move |entry| {
+                line.update(entry);
+                if let Some(learns) = &mut learns {
+                    learns(entry);
+                }
+            })),
             warnings: output::warnings(),
         };
         let host = CommandHost {
@@ -343,6 +365,9 @@ impl Job<'_> {
         let mut watcher = Stopwatch::start(interrupt);
         if let Some(file) = self.journal {
             let outcome = inputs.execute_journaled(file, &host, &mut watcher);
+            if let Some(learning) = learning {
+                learning.finish();
+            }
             let outcome = host.close(outcome).map_err(failure)?;
             return conclude((arguments, spec), outcome, output);
         }

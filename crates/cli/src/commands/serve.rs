@@ -66,10 +66,10 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
             text: String::new(),
         }),
     };
-    let (mut spec, world) = spec::of(&arguments.run, domain, problem)?;
-    lasting(&mut spec, arguments)?;
+    let (mut spec, worlds) = spec::of(&arguments.run, domain, problem)?;
+    lasting(&mut spec, arguments);
     let given = if arguments.run.problem.is_some() {
-        Some(checked(&arguments.run, &spec, world.as_ref(), output)?)
+        Some(checked(&arguments.run, &spec, &worlds, output)?)
     } else {
         check_domain(&domain_text)?;
         spec.check().map_err(spec::contradiction)?;
@@ -83,7 +83,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         (task, first, None)
     } else {
         announce(arguments, &router);
-        let of = (&mut spec, world.as_ref());
+        let of = (&mut spec, worlds.as_slice());
         let Some(((task, first), at, client)) = await_problem(&router, arguments, of, output)
         else {
             // It was asked to end before there was a problem.
@@ -132,7 +132,7 @@ type Begun = (Arc<Task>, Option<TimeTriggeredPlan>);
 fn await_problem(
     router: &ApiRouter,
     arguments: &ServeArgs,
-    (spec, world): (&mut RunSpec, Option<&Source>),
+    (spec, worlds): (&mut RunSpec, &[Source]),
     output: &mut Output,
 ) -> Option<(Begun, Option<Clock>, Client)> {
     let interrupt = Interrupt::listen_with_world();
@@ -142,7 +142,7 @@ fn await_problem(
         let begun =
             dated(arguments.calendar(), &spec.domain, given, output).and_then(|(problem, at)| {
                 spec.problem = (&problem).into();
-                Ok((checked(&arguments.run, spec, world, output)?, at))
+                Ok((checked(&arguments.run, spec, worlds, output)?, at))
             });
         match begun {
             Ok((begun, at)) => return Some((begun, at, client)),
@@ -164,7 +164,7 @@ fn refusal(status: u16, failure: &Failure) -> ApiError {
 }
 
 /// What a specification is of an executive, which stays.
-fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) -> Result<(), Failure> {
+fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) {
     spec.is_lasting = true;
     // Whoever asks for another first plan is told why there is none.
     if arguments.run.first_plan_by.is_none() {
@@ -176,7 +176,7 @@ fn lasting(spec: &mut RunSpec, arguments: &ServeArgs) -> Result<(), Failure> {
             spec.planning_time = elbowroom::execution::run::PlanningTime::Measured;
         }
     }
-    Ok(make_persistent(spec)?)
+    make_persistent(spec);
 }
 
 /// Refuses a domain with errors, or whose problems cannot be executed, before a problem is given. Warnings are printed

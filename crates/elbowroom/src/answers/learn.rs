@@ -3,6 +3,7 @@
 mod changes;
 mod courses;
 mod inside;
+mod prediction;
 mod timeouts;
 
 use elbowroom_learning::fit::Fit;
@@ -10,17 +11,20 @@ use elbowroom_learning::learn::{self, Durations, Group, Learnt};
 use elbowroom_learning::records::{self, Outcome, Record};
 use elbowroom_learning::{table, world};
 use elbowroom_report::trace::{Stored, TraceError};
-use elbowroom_sim::{Distribution, Failure};
+use elbowroom_sim::{Distribution, Failure, WorldModel};
 use elbowroom_text::{Diagnostics, Source};
 use serde::{Deserialize, Serialize};
 
 use super::{RequestError, Version, Watcher};
 
 use changes::Expected;
+use prediction::Predictions;
+
 pub use changes::{ChangesLearnt, RateLearnt};
 pub use courses::Course;
 pub use elbowroom_learning::learn::Settings;
 pub use inside::{ConformalBox, ConformalInterval, InsideRequest, Verdict};
+pub use prediction::PredictionAnswer;
 
 /// Asks what logs say.
 #[derive(Clone, Debug)]
@@ -44,6 +48,8 @@ pub struct Log {
     pub records: Vec<Record>,
     /// What became of the facts; `None` where the log does not say, as tables do not.
     pub course: Option<Course>,
+    /// The world file that the executor was told to believe; `None` if there was none, or the log does not say.
+    pub world: Option<WorldModel>,
 }
 
 /// A log that cannot be read.
@@ -76,14 +82,19 @@ impl Log {
                 name,
                 records: table::read(source)?,
                 course: None,
+                world: None,
             });
         }
         match Stored::read(source.text()) {
-            Ok(trace) => Ok(Self {
-                name,
-                records: records::of_trace(&trace),
-                course: Course::of(&trace),
-            }),
+            Ok(trace) => {
+                let course = Course::of(&trace);
+                Ok(Self {
+                    name,
+                    records: records::of_trace(&trace),
+                    world: course.as_ref().and_then(|course| course.believed(&trace)),
+                    course,
+                })
+            }
             Err(error) => Err(LogError::Trace { name, error }),
         }
     }
@@ -144,6 +155,9 @@ pub struct ActionLearnt {
     pub drift: Option<DriftAnswer>,
     /// Whether the frequency of failures does.
     pub failure_drift: DriftAnswer,
+    /// Predictions of the believed world, or of the world file that was expected; `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prediction: Option<PredictionAnswer>,
 }
 
 /// How durations are described.
@@ -260,6 +274,7 @@ pub fn learn(
         Some(world) => Some(Expected::new(&request.logs, world)?),
         None => None,
     };
+    let predictions = predictions(request);
     let changes = changes::of(&request.logs);
     let told = |changes| ChangesLearnt::of(changes, expected.as_ref());
     let mut told: Vec<ChangesLearnt> = changes.iter().map(told).collect();
@@ -274,12 +289,28 @@ pub fn learn(
         version: Version,
         logs: request.logs.iter().map(|log| log.name.clone()).collect(),
         attempts: records.len(),
-        actions: learnt.iter().map(ActionLearnt::of).collect(),
+        actions: learnt
+            .iter()
+            .map(|it| ActionLearnt::of(it, predictions.of(&it.name)))
+            .collect(),
         changes: told,
         world: world::write(&learnt, &changes, request.settings.resolution),
         timeouts: timeouts::of(&learnt).map(|rule| rule.to_string()),
         inside,
     })
+}
+
+/// Returns the predictions of the expected world file, or, without one, of the world that each log believed.
+fn predictions(request: &LearnRequest) -> Predictions {
+    let mut predictions = Predictions::default();
+    for log in &request.logs {
+        let expected = request.expected.as_ref().zip(log.course.as_ref());
+        let expected = expected.and_then(|(world, course)| course.read(world));
+        if let Some(world) = expected.as_ref().or(log.world.as_ref()) {
+            predictions.add(&log.records, world);
+        }
+    }
+    predictions
 }
 
 /// What a log expected beside what happened, action by action: the mean planned and the mean actual
@@ -300,7 +331,7 @@ pub fn expectation_and_reality(records: &[Record], name: &str) -> Option<(f64, f
 }
 
 impl ActionLearnt {
-    fn of(learnt: &Learnt) -> Self {
+    fn of(learnt: &Learnt, prediction: Option<PredictionAnswer>) -> Self {
         let failures = learnt.failures;
         Self {
             action: learnt.name.clone(),
@@ -329,6 +360,7 @@ impl ActionLearnt {
                 Durations::Apart(_) | Durations::Unknown => None,
             },
             failure_drift: DriftAnswer::of(&learnt.failure_drift),
+            prediction,
         }
     }
 }

@@ -174,7 +174,7 @@ pub fn run(
     if let Some(preparer) = request.preparer {
         execution = execution.prepared_by(preparer);
     }
-    let model = spec.model(request.task.problem());
+    let model = spec.beliefs(request.task.problem());
     let model = model.map_err(SpecError::World)?;
     let shared = Watched(Mutex::new(watcher));
     let clock = || {
@@ -233,7 +233,7 @@ pub fn simulate(
     watcher: &mut (dyn Watcher + Send),
 ) -> Result<RunOutcome, SpecError> {
     let spec = request.spec;
-    let model = spec.model(request.task.problem());
+    let model = spec.simulation(request.task.problem());
     let model = model.map_err(SpecError::World)?;
     let Some(model) = model else {
         return Err(SpecError::Process);

@@ -12,7 +12,7 @@ use elbowroom_execution::{
     Ending, Executor, Mission, News, PlanAnswer, Planner, PlannerAnswer, Rehearsal, Rehearsed,
     Rehearsing, Scene, Tells, Wanted,
 };
-use elbowroom_model::ground::FactId;
+use elbowroom_model::ground::{Condition, FactId};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 use elbowroom_sim::{ExogenousChange, Rule};
@@ -20,6 +20,8 @@ use elbowroom_sim::{ExogenousChange, Rule};
 use super::first_plan::renumbered;
 use super::race::{Rules, Tally, is_behind, race};
 use super::rollouts::Rollouts;
+use crate::flow;
+
 use super::{Analyst, Candidates, Embedded, Limits, RememberingPreparer, WholeRegion};
 use stage::Stage;
 
@@ -87,6 +89,8 @@ pub struct Rehearse {
     chosen: Option<(Situation, TimeTriggeredPlan)>,
     /// What was found at the beginning of a run, by the plan.
     beginnings: Vec<(TimeTriggeredPlan, Choice)>,
+    /// The goal of all that is remembered.
+    goal: Option<Condition>,
 }
 
 /// One [`Rehearse`] behind both ports.
@@ -129,6 +133,16 @@ impl Rehearsal for SharedRehearse {
     fn rehearse(&mut self, scene: &Scene<'_>) -> Rehearsed {
         self.get().rehearse(scene)
     }
+}
+
+/// Returns the preparer of adopted plans, and that of plans in samples.
+fn preparers(
+    flow: &flow::Settings,
+) -> (RememberingPreparer<Analyst>, RememberingPreparer<Analyst>) {
+    let analyst = Analyst::new(flow.clone());
+    let hasty = analyst.clone().until(|| ControlFlow::Break(()));
+    let remembering = |analyst| RememberingPreparer::new(analyst, MEMORY);
+    (remembering(analyst), remembering(hasty))
 }
 
 /// Gives plans that were found to be best.
@@ -207,6 +221,7 @@ impl Rehearsal for Rehearse {
 
     fn rehearse(&mut self, scene: &Scene<'_>) -> Rehearsed {
         self.chosen = None;
+        self.set_goal(scene.belief.task().goal());
         let ways = self.first_ways(scene);
         let is_beginning = scene.is_new && scene.belief.time().is_zero();
         let steps = scene.left.to_vec();
@@ -240,16 +255,28 @@ impl Rehearse {
             replanning.improve_states = 0;
             replanning.all_states = SAMPLE_STATES;
         }
-        let analyst = Analyst::new(rollouts.flow.clone());
-        let hasty = analyst.clone().until(|| ControlFlow::Break(()));
+        let (preparer, hasty) = preparers(&rollouts.flow);
         Self {
             planner,
-            preparer: RememberingPreparer::new(analyst, MEMORY),
-            hasty: RememberingPreparer::new(hasty, MEMORY),
+            preparer,
+            hasty,
             planning_time,
             rollouts,
             chosen: None,
             beginnings: Vec::new(),
+            goal: None,
+        }
+    }
+
+    /// Discards results for another goal.
+    fn set_goal(&mut self, goal: &Condition) {
+        if self
+            .goal
+            .replace(goal.clone())
+            .is_some_and(|known| known != *goal)
+        {
+            (self.preparer, self.hasty) = preparers(&self.rollouts.flow);
+            self.beginnings.clear();
         }
     }
 

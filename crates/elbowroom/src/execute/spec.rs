@@ -54,6 +54,10 @@ pub struct RunSpec {
     /// The command line of the process that is the world.
     #[serde(deserialize_with = "required")]
     pub world_process: Option<String>,
+    /// The world file that the executor believes (`docs/formats/world.md`): distributions of durations, failures and
+    /// changes of facts. Omitted if it believes the file of the simulation, or knows nothing of its process.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub believed: Option<String>,
     /// A world that lets each action end when that is worst; left out where it is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spoiler: Option<Spoiler>,
@@ -207,6 +211,7 @@ impl RunSpec {
             problem,
             world: None,
             world_process: None,
+            believed: None,
             spoiler: None,
             planner: EMBEDDED.to_owned(),
             planner_time: None,
@@ -279,18 +284,33 @@ impl RunSpec {
         flow
     }
 
-    /// What is known of the world: what the world file says, or, without one, that everything goes
-    /// as planned. Of a process, nothing is known.
+    /// Returns the world file that the executor believes: [`Self::believed`], or that of the simulation.
+    pub fn believed_world(&self) -> Option<&str> {
+        let simulated = self.world.as_ref().filter(|_| self.world_process.is_none());
+        self.believed.as_ref().or(simulated).map(String::as_str)
+    }
+
+    /// Returns the model of the world that the executor believes: that of [`Self::believed_world`], or, in a simulation
+    /// without one, that everything goes as planned. `None` if the world is a process and nothing is believed of it.
     ///
     /// # Errors
     /// When the world file cannot be read.
-    pub fn model(&self, problem: &Problem) -> Result<Option<WorldModel>, Diagnostics> {
+    pub fn beliefs(&self, problem: &Problem) -> Result<Option<WorldModel>, Diagnostics> {
+        match self.believed_world() {
+            Some(text) => read_world(text, problem).map(Some),
+            None if self.world_process.is_some() => Ok(None),
+            None => Ok(Some(WorldModel::as_planned())),
+        }
+    }
+
+    /// Returns the model of the simulated world; `None` if the world is a process.
+    ///
+    /// # Errors
+    /// When the world file cannot be read.
+    pub fn simulation(&self, problem: &Problem) -> Result<Option<WorldModel>, Diagnostics> {
         match &self.world {
             _ if self.world_process.is_some() => Ok(None),
-            Some(text) => {
-                let source = Source::new("world", text.as_str());
-                WorldModel::read(&source, problem).map(Some)
-            }
+            Some(text) => read_world(text, problem).map(Some),
             None => Ok(Some(WorldModel::as_planned())),
         }
     }
@@ -306,4 +326,8 @@ impl RunSpec {
         let read = likelihoods::read(file.source(), task);
         read.map(Arc::new).map_err(SpecError::Likelihoods)
     }
+}
+
+fn read_world(text: &str, problem: &Problem) -> Result<WorldModel, Diagnostics> {
+    WorldModel::read(&Source::new("world", text), problem)
 }

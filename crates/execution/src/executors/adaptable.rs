@@ -15,7 +15,7 @@ use elbowroom_probability::{
 };
 
 use super::chooser::Chooser;
-use super::{Foresight, Goals, Registered};
+use super::{Foresight, Registered};
 use crate::dispatch::replan;
 use crate::executor::Need;
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
@@ -33,7 +33,6 @@ pub(super) const REGISTERED: Registered = Registered {
               likelier and there is time for it, and replans when no order can work.",
     paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
     need: Need::PartialOrder,
-    goals: Goals::Changing,
     make: |_, means| {
         Box::new(Adaptable {
             initial: Initial::of(&means.likelihoods),

@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::Reading;
 use elbowroom_plan::{Bound, Constraint, Node, NodeId};
 
-use super::{Goals, Registered};
+use super::Registered;
 use crate::dispatch::{Bounds, Dispatch, Sight, replan};
 use crate::event::Ending;
 use crate::executor::Need;
@@ -22,7 +22,6 @@ pub(super) const REGISTERED: Registered = Registered {
               durations.",
     paper: "the Esterel Dispatcher of ROSPlan, the baseline in Ribeiro et al. (2021), section 3",
     need: Need::Network,
-    goals: Goals::Changing,
     make: |_, _| Box::new(Esterel { dispatch: None }),
 };
 

@@ -3,7 +3,7 @@
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{Bound, Constraint, Node, NodeId, Schedule, StnPlan};
 
-use super::{Goals, Registered};
+use super::Registered;
 use crate::dispatch::{Bounds, Dispatch, Sight, given, replan};
 use crate::executor::Need;
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
@@ -19,7 +19,6 @@ pub(super) const REGISTERED: Registered = Registered {
               point, and notices a missed deadline only there.",
     paper: "BLEX(X) in Cashmore et al. (2020), section 5",
     need: Need::Orderings,
-    goals: Goals::Changing,
     make: |argument, _| Box::new(Fixed::new(&argument.unwrap_or_default())),
 };
 

@@ -3,7 +3,7 @@
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{Constraint, DecoupledEnvelope, InstanceId, Valuation};
 
-use super::{Goals, Registered, promise};
+use super::{Registered, promise};
 use crate::dispatch::{Dispatch, replan};
 use crate::executor::{CAN_HAVE_A_CLOCK, Need};
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, Planned, StepId};
@@ -20,7 +20,6 @@ pub(super) const REGISTERED: Registered = Registered {
               smaller envelope, if there is one.",
     paper: "DREEX, Algorithm 2 in Cashmore et al. (2020)",
     need: Need::Envelope,
-    goals: Goals::Changing,
     make: |_, _| Box::new(Guarded { state: None }),
 };
 

@@ -16,7 +16,7 @@ use inside::Inside;
 
 use self::carrying_on::{CarriedOn, Hope};
 use self::repetition::Repetition;
-use super::{Goals, Registered, esterel, promise};
+use super::{Registered, esterel, promise};
 use crate::dispatch::{Bounds, Dispatch, replan};
 use crate::event::Measured;
 use crate::executor::{CAN_HAVE_A_CLOCK, Need};
@@ -42,7 +42,6 @@ pub(super) const REGISTERED: Registered = Registered {
               world file describes.",
     paper: "goes beyond Cashmore et al. (2020)",
     need: Need::OpenNetwork,
-    goals: Goals::Changing,
     make: |argument, means| {
         let advantage = argument.map(|points| points / Rational::from(100));
         Box::new(Live {

@@ -1,13 +1,14 @@
 //! `lookahead`: what is best in the world of the likelihoods, on a clock.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use elbowroom_model::Task;
+use elbowroom_model::ground::Condition;
 use elbowroom_probability::Likelihoods;
 use elbowroom_probability::optimum::Table;
 
+use super::Registered;
 use super::adaptable::Adaptable;
-use super::{Goals, Registered};
 use crate::executor::Need;
 
 pub(super) const REGISTERED: Registered = Registered {
@@ -21,7 +22,6 @@ pub(super) const REGISTERED: Registered = Registered {
               most likely order again before each start if the plan is short.",
     paper: "goes beyond Ribeiro et al. (2021)",
     need: Need::PartialOrder,
-    goals: Goals::Fixed,
     make: |_, means| {
         Box::new(Adaptable::with_foresight(
             means.likelihoods,
@@ -30,17 +30,30 @@ pub(super) const REGISTERED: Registered = Registered {
     },
 };
 
-/// The policy table of `lookahead` for a problem and its likelihoods, shared by clones. Nobody has
-/// to fill it, and it changes no decision: it saves making the same table in every run.
+/// The policy table of `lookahead` for a problem and its likelihoods, shared by clones. It changes no decision: it
+/// saves computing the same table in every run. When the goal changes, the table is replaced.
 #[derive(Clone, Debug, Default)]
-pub struct Foresight(Arc<OnceLock<Option<Arc<Table>>>>);
+pub struct Foresight(Arc<Mutex<Option<GoalTable>>>);
+
+/// The table for a goal; `None` if the world cannot be tabulated.
+#[derive(Debug)]
+struct GoalTable {
+    goal: Condition,
+    table: Option<Arc<Table>>,
+}
 
 impl Foresight {
-    /// The table, made when it is first asked for; `None` if the world cannot be tabulated.
+    /// Returns the table for the goal of the task; `None` if the world cannot be tabulated.
     pub(super) fn table(&self, task: &Task, likelihoods: &Likelihoods) -> Option<Arc<Table>> {
-        let made = self
-            .0
-            .get_or_init(|| Table::new(task, likelihoods).map(Arc::new));
-        made.clone()
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = known.as_ref().filter(|it| it.goal == *task.goal()) {
+            return known.table.clone();
+        }
+        let table = Table::new(task, likelihoods).map(Arc::new);
+        *known = Some(GoalTable {
+            goal: task.goal().clone(),
+            table: table.clone(),
+        });
+        table
     }
 }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use elbowroom_model::ground::FactId;
 use elbowroom_num::Rational;
 
-use super::{Goals, Registered, live};
+use super::{Registered, live};
 use crate::dispatch::replan;
 use crate::executor::Need;
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
@@ -35,7 +35,6 @@ pub(super) const REGISTERED: Registered = Registered {
     paper: "the policy of a semi-Markov decision process (Howard, 1971); without it, the rollout algorithm \
             (Bertsekas, Tsitsiklis & Wu, 1997); goes beyond both papers",
     need: Need::OpenNetwork,
-    goals: Goals::Fixed,
     make: |_, mut means| {
         if means.outlook.is_none()
             && let Some(rehearsal) = means.rehearsal.take()

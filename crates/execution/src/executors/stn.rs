@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::Reading;
 use elbowroom_plan::{Constraint, NodeId};
 
-use super::{Goals, Registered};
+use super::Registered;
 use crate::dispatch::{Dispatch, given, replan};
 use crate::executor::Need;
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
@@ -19,7 +19,6 @@ pub(super) const REGISTERED: Registered = Registered {
               replans when something happens outside its window.",
     paper: "Dechter, Meiri & Pearl (1991); Muscettola, Morris & Tsamardinos (1998)",
     need: Need::Network,
-    goals: Goals::Changing,
     make: |_, _| Box::new(Stn { state: None }),
 };
 

@@ -143,6 +143,15 @@ fn keep_segment(path: &Path, kept: usize) -> io::Result<()> {
     fs::hard_link(path, numbered(1)).or_else(|_| fs::copy(path, numbered(1)).map(drop))
 }
 
+/// Returns the existing segments of a journal, oldest first.
+pub(crate) fn segments_of(path: &Path) -> Vec<PathBuf> {
+    let earlier = (1..).map(|number: usize| beside(path, &number.to_string()));
+    let mut segments: Vec<PathBuf> = earlier.take_while(|it| it.exists()).collect();
+    segments.reverse();
+    segments.push(path.to_owned());
+    segments
+}
+
 /// Returns `FILE.name`.
 fn beside(path: &Path, name: &str) -> PathBuf {
     let mut file = OsString::from(path);

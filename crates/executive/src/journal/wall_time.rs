@@ -1,6 +1,7 @@
 //! Wall-clock times of journal records. A resumed run computes the elapsed time from them.
 
 use std::borrow::Cow;
+use std::fmt;
 use std::time::UNIX_EPOCH;
 
 use elbowroom::num::Rational;
@@ -33,6 +34,13 @@ impl WallTime {
             Some(members) if members.len() > 1 => format!("{members}{MEMBER}{}}}\n", self.0).into(),
             _ => line.into(),
         }
+    }
+}
+
+impl fmt::Display for WallTime {
+    /// Writes the milliseconds since 1970.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
     }
 }
 

@@ -59,7 +59,8 @@ class Executable:
             options: further members of a run's specification, as the header of a trace has them
                 (``docs/formats/trace.md``): ``time_limit`` and ``planning_time`` in the world's
                 seconds, ``timeout`` (as in :meth:`envelope`), ``max_replans``, ``vary``,
-                ``guarantee``, ``precision``, ``running``, ``likelihoods``, ``self_overlap``, …; and ``jobs``, the number of threads of the
+                ``guarantee``, ``precision``, ``running``, ``likelihoods``, ``believed`` (the world file that the executor
+                believes, for example of a world in Python), ``self_overlap``, …; and ``jobs``, the number of threads of the
                 embedded planner: 1 unless it is given, 0 for one for each processor. It changes no plan, and is no
                 part of the trace.
 

@@ -127,10 +127,12 @@ pub(in crate::commands) fn run(
     let spec = interrupted.spec().clone();
     let task = Arc::new(super::task(&spec, output)?);
     let interrupt = Interrupt::listen_with_world();
+    let learning = super::learning(arguments, path)?;
     let settings = ResumeSettings {
         task: &task,
         background: background(arguments, &interrupt),
         limits: limits(arguments),
+        observer: learning.as_ref().map(|it| Box::new(it.observer()) as _),
         warnings: output::warnings(),
     };
     let host = CommandHost {
@@ -141,6 +143,9 @@ pub(in crate::commands) fn run(
         resume: Some(host),
     };
     let outcome = interrupted.resume(settings, &host, &mut Stopwatch::start(&interrupt));
+    if let Some(learning) = learning {
+        learning.finish();
+    }
     let outcome = host.close(outcome).map_err(failure)?;
     super::conclude((arguments, &spec), outcome, output)
 }

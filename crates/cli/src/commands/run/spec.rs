@@ -1,6 +1,6 @@
 //! From the command line to what a run is.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use elbowroom::execute::{
     FirstPlan, FirstPlanError, MOST_STATES, NamedText, RunSpec, SpecError, Spoiler, SpoilerError,
@@ -9,19 +9,22 @@ use elbowroom::execution::run::{PlanningTime, RunningRule};
 use elbowroom::num::Rational;
 use elbowroom::plan::parametrize::ParametrizeError;
 use elbowroom::text::Source;
+use elbowroom_executive::learning::MODEL;
 
 use super::super::threads;
 use crate::args::{EMBEDDED, FirstPlanChoice, RunArgs, RunningChoice};
 use crate::exit::Failure;
 use crate::input;
+use crate::output;
 
 /// What the arguments ask for. Files are read here; what is wrong with the arguments themselves is
-/// told before that, and before the problem is asked for. The world file comes with its name, for what is to be said about it.
+/// told before that, and before the problem is asked for. The world files come with their names, for what is to be said about
+/// them.
 pub(in crate::commands) fn of(
     arguments: &RunArgs,
     domain: &Path,
     problem: impl FnOnce(&NamedText) -> Result<NamedText, Failure>,
-) -> Result<(RunSpec, Option<Source>), Failure> {
+) -> Result<(RunSpec, Vec<Source>), Failure> {
     let empty = || NamedText {
         name: String::new(),
         text: String::new(),
@@ -68,7 +71,7 @@ pub(in crate::commands) fn of(
     if let Some(path) = &arguments.likelihoods {
         spec.likelihoods = Some((&input::source(path, "likelihoods")?).into());
     }
-    let mut world = None;
+    let mut worlds = Vec::new();
     if arguments.is_spoiled() {
         if spec.realtime.is_some() && spec.has_plan {
             let what = "--world spoiler has no wall clock";
@@ -79,7 +82,14 @@ pub(in crate::commands) fn of(
     } else if let Some(path) = &arguments.world {
         let source = input::source(path, "world")?;
         spec.world = Some(source.text().to_owned());
-        world = Some(source);
+        worlds.push(source);
+    }
+    if let Some(path) = &arguments.believed {
+        if let Some(path) = model_at(path, arguments.learn.as_deref()) {
+            let source = input::source(&path, "world")?;
+            spec.believed = Some(source.text().to_owned());
+            worlds.push(source);
+        }
     }
     spec.problem = problem(&spec.domain)?;
     spec.first_plan = match arguments.first_plan_by {
@@ -89,7 +99,24 @@ pub(in crate::commands) fn of(
     };
     spec.plans_aside = spec.can_plan_aside();
     spec.readies_aside = spec.plans_aside;
-    Ok((spec, world))
+    Ok((spec, worlds))
+}
+
+/// Returns the world file of `--believed`; of a folder of `--learn`, the model in it, or `None` if it has none yet.
+fn model_at(path: &Path, learn: Option<&Path>) -> Option<PathBuf> {
+    let is_new = learn == Some(path) && !path.exists();
+    if !path.is_dir() && !is_new {
+        return Some(path.to_owned());
+    }
+    let model = path.join(MODEL);
+    if model.exists() {
+        return Some(model);
+    }
+    output::warn(&format!(
+        "{} has no model yet: nothing is believed of the world",
+        path.display()
+    ));
+    None
 }
 
 /// How many threads a planner of this name has. By default one: beside a run, the other processors have
@@ -131,13 +158,17 @@ pub(in crate::commands) fn contradiction(error: SpecError) -> Failure {
              nothing"
         }
         SpecError::Unheeded(_) => "`elbowroom check` judges plans of such a domain",
-        SpecError::NeedsWorld(_) => "give it a world file with --world, or leave out the number",
+        SpecError::NeedsWorld(_) => {
+            "give it a world file with --world or --believed, or name another executor"
+        }
         SpecError::NeedsEmbedded(_) => "leave out --planner, or the number",
         SpecError::SelfOverlap(_) => "leave out --self-overlap, or --planner",
         SpecError::FirstPlan(why) => match why {
             FirstPlanError::Given => "leave out the plan, or --first-plan",
             FirstPlanError::AnotherPlanner => "leave out --planner, or --first-plan",
-            _ => "give it a world file with --world, or --likelihoods, or leave out --first-plan",
+            _ => {
+                "give it a world file with --world or --believed, or --likelihoods, or leave out --first-plan"
+            }
         },
         SpecError::NoTimeLimit(name) => {
             return Failure::new(

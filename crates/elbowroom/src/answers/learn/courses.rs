@@ -76,6 +76,17 @@ impl Course {
         })
     }
 
+    /// Returns the world file that the executor of the run was told to believe, if there was one.
+    pub(super) fn believed(&self, trace: &Stored) -> Option<WorldModel> {
+        let spec: RunSpec = trace.header().ok()?;
+        self.read(&Source::new("world", spec.believed?))
+    }
+
+    /// Reads a world file for the problem of the run.
+    pub(super) fn read(&self, world: &Source) -> Option<WorldModel> {
+        WorldModel::read(world, self.task.problem()).ok()
+    }
+
     /// For each failure of an action whose start had changed facts: the action's name, and whether all of
     /// this was undone when it failed.
     pub(super) fn undone(&self) -> impl Iterator<Item = (&str, bool)> {

@@ -229,7 +229,7 @@ impl RunSpec {
             return Ok(None);
         }
         let likelihoods = self.likelihoods(task)?;
-        if let Some(world) = model.filter(|_| self.world.is_some()) {
+        if let Some(world) = model.filter(|_| self.believed_world().is_some()) {
             return Ok(Some(Known::World(self.rollouts(world, likelihoods))));
         }
         Ok(self.likelihoods.is_some().then(|| Known::Likelihoods {
@@ -254,14 +254,14 @@ impl RunSpec {
         }
     }
 
-    /// Who tries out what can be done, for executors that weigh moves where there is no table; of
-    /// goals that are still to come, and of other planners, nothing can be tried out.
+    /// Returns the rollouts of executors that weigh moves, which replace a table of moves. `None` if no model of the world
+    /// is believed.
     fn rehearse(
         &self,
         task: &Task,
         model: Option<&WorldModel>,
     ) -> Result<Option<SharedRehearse>, SpecError> {
-        if self.world.is_none() || self.is_lasting || !self.executor.asks_outlook() {
+        if self.believed_world().is_none() || !self.executor.asks_outlook() {
             return Ok(None);
         }
         let Some(world) = model else {
@@ -275,7 +275,7 @@ impl RunSpec {
     /// By what a first plan is chosen if nobody says: by its probability where the embedded planner
     /// makes it and something is known that it can be chosen by.
     pub fn usual_first_plan(&self) -> FirstPlan {
-        let is_known = self.world.is_some() || self.likelihoods.is_some();
+        let is_known = self.believed_world().is_some() || self.likelihoods.is_some();
         let is_embedded = self.planner.eq_ignore_ascii_case(EMBEDDED);
         if is_known && is_embedded && !self.has_plan && !self.is_lasting {
             FirstPlan::Likeliest
@@ -320,7 +320,7 @@ impl RunSpec {
         self.check_planner()?;
         let whom = self.whom()?;
         if !self.first_plan.is_shortest() {
-            let is_known = self.world.is_some() || self.likelihoods.is_some();
+            let is_known = self.believed_world().is_some() || self.likelihoods.is_some();
             let wrong = match whom {
                 _ if self.has_plan => Some(FirstPlanError::Given),
                 _ if self.is_lasting => Some(FirstPlanError::Lasting),
@@ -332,14 +332,14 @@ impl RunSpec {
                 return Err(SpecError::FirstPlan(wrong));
             }
         }
-        if self.objective == Some(Objective::Probability) && self.world.is_none() {
+        if self.objective == Some(Objective::Probability) && self.believed_world().is_none() {
             return Err(SpecError::Chance(ChanceError::NoWorld));
         }
         // Who weighs moves goes by the plan where that cannot be done.
         if !self.executor.asks_odds() || self.executor.asks_outlook() {
             return Ok(());
         }
-        if self.world.is_none() && self.spoiler.is_none() {
+        if self.believed_world().is_none() && self.spoiler.is_none() {
             return Err(SpecError::NeedsWorld(self.executor.clone()));
         }
         match whom {
@@ -380,13 +380,13 @@ impl RunSpec {
     /// # Errors
     /// When the world file cannot be read.
     pub fn analyst(&self, problem: &Problem) -> Result<Analyst, SpecError> {
-        let model = self.model(problem).map_err(SpecError::World)?;
+        let model = self.beliefs(problem).map_err(SpecError::World)?;
         Ok(Analyst::new(self.envelopes_in(model.as_ref())))
     }
 
     fn envelopes_in(&self, model: Option<&WorldModel>) -> flow::Settings {
         let mut envelopes = self.envelopes();
-        if self.world.is_some() {
+        if self.believed_world().is_some() {
             envelopes.world = model.cloned().map(Arc::new);
         }
         envelopes
@@ -406,11 +406,13 @@ impl RunSpec {
         if let Some(mistake) = unknown_action(&self.timeout, task.problem()) {
             return Err(SpecError::Timeout(mistake));
         }
-        let model = self.model(task.problem()).map_err(SpecError::World)?;
+        let model = self.beliefs(task.problem()).map_err(SpecError::World)?;
         let envelopes = self.envelopes_in(model.as_ref());
         let model = model.filter(|_| self.executor.asks_odds());
         let is_embedded = matches!(self.whom()?, Whom::Embedded);
-        let tabulated = model.as_ref().filter(|_| self.executor.asks_outlook());
+        // A table of moves is made for one goal.
+        let has_table = self.executor.asks_outlook() && !self.is_lasting;
+        let tabulated = model.as_ref().filter(|_| has_table);
         let tabulated = tabulated.map(|model| self.outlook(task, model, is_embedded));
         let (outlook, no_table) = match tabulated.transpose() {
             Ok(outlook) => (outlook, None),

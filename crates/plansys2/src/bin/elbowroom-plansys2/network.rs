@@ -347,24 +347,41 @@ fn note_readers<T: Serialize>(writer: &DataWriterCdr<T>, found: &mut BTreeSet<GU
     }
 }
 
-/// An answer to somebody who may not have been found yet is kept for so long, and then sent all the same.
+/// Delay of an answer to a reader that has not been discovered. Then it is sent without waiting any longer.
 const FOUND_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
+
+/// Period for which an answer is kept and sent again once its reader is discovered, because the first one did not reach
+/// it. Fast DDS repeats a lost announcement after three seconds, and a repetition can be lost as well.
+const KEPT_FOR: std::time::Duration = std::time::Duration::from_secs(30);
+
+/// Answer to a client whose reader may not have been discovered.
+struct Waiting<T> {
+    asker: Asker,
+    response: T,
+    since: Instant,
+    is_sent: bool,
+}
 
 /// By what a service is answered.
 pub(super) struct Answers<T: Serialize> {
     writer: DataWriterCdr<Framed<T>>,
     /// Who can hear an answer: a request may come before its sender is found, and what is said then is lost.
     found: BTreeSet<GUID>,
-    waiting: Vec<(Asker, T, Instant)>,
+    waiting: Vec<Waiting<T>>,
 }
 
-impl<T: Serialize> Answers<T> {
+impl<T: Serialize + Clone> Answers<T> {
     /// Answers a request, now or when whoever has asked can hear it.
     ///
     /// # Errors
     /// It could not be sent.
     pub(super) fn answer(&mut self, asker: Asker, response: T) -> Result<(), String> {
-        self.waiting.push((asker, response, now()));
+        self.waiting.push(Waiting {
+            asker,
+            response,
+            since: now(),
+            is_sent: false,
+        });
         self.flush()
     }
 
@@ -375,29 +392,50 @@ impl<T: Serialize> Answers<T> {
     pub(super) fn flush(&mut self) -> Result<(), String> {
         note_readers(&self.writer, &mut self.found);
         let clock = now();
-        let is_due = |(asker, _, since): &mut (Asker, T, Instant)| {
-            let who = asker.identity.writer_guid;
-            let is_found = if who.entity_id.entity_kind.is_reader() {
-                self.found.contains(&who)
-            } else {
-                // Who names no reader has one all the same, where the question came from; but it may be that of another.
-                asker.header.is_none() || self.found.iter().any(|it| it.prefix == who.prefix)
-            };
-            is_found || clock.saturating_duration_since(*since) >= FOUND_WITHIN
-        };
-        for (asker, response, _) in self.waiting.extract_if(.., is_due) {
-            let options = WriteOptionsBuilder::new()
-                .source_timestamp(Timestamp::now())
-                .related_sample_identity(asker.identity);
-            let answer = match asker.header {
-                Some(header) => Framed::Headed(header, response),
-                None => Framed::Plain(response),
-            };
-            let written = self.writer.write_with_options(answer, options.build());
-            written.map_err(|e| format!("an answer was not sent: {e}"))?;
-        }
-        Ok(())
+        let mut outcome = Ok(());
+        let (writer, found) = (&self.writer, &self.found);
+        self.waiting.retain_mut(|it| {
+            let age = clock.saturating_duration_since(it.since);
+            let is_found = is_found(&it.asker, found);
+            if is_found || (!it.is_sent && age >= FOUND_WITHIN) {
+                it.is_sent = true;
+                let sent = send(writer, &it.asker, it.response.clone());
+                if sent.is_err() {
+                    outcome = sent;
+                }
+            }
+            !is_found && age < KEPT_FOR
+        });
+        outcome
     }
+}
+
+/// Returns `true` if the reader of a client is discovered.
+fn is_found(asker: &Asker, found: &BTreeSet<GUID>) -> bool {
+    let who = asker.identity.writer_guid;
+    if who.entity_id.entity_kind.is_reader() {
+        return found.contains(&who);
+    }
+    // A request without a reader comes from a participant that has one, but another reader of it may be discovered first.
+    asker.header.is_none() || found.iter().any(|it| it.prefix == who.prefix)
+}
+
+fn send<T: Serialize>(
+    writer: &DataWriterCdr<Framed<T>>,
+    asker: &Asker,
+    response: T,
+) -> Result<(), String> {
+    let options = WriteOptionsBuilder::new()
+        .source_timestamp(Timestamp::now())
+        .related_sample_identity(asker.identity);
+    let answer = match asker.header {
+        Some(header) => Framed::Headed(header, response),
+        None => Framed::Plain(response),
+    };
+    let written = writer.write_with_options(answer, options.build());
+    written
+        .map(drop)
+        .map_err(|e| format!("an answer was not sent: {e}"))
 }
 
 /// Whatever can be listened to.

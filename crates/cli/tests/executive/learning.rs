@@ -1,0 +1,124 @@
+//! Models of the world that executives learn from their journals and believe.
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use serde_json::{Value, json};
+
+use super::client::{Executive, folder};
+use super::{command, python_is_there};
+
+const ROADS: &str = "crates/cli/tests/files/two-roads";
+
+fn roads(file: &str) -> String {
+    format!("{ROADS}/{file}")
+}
+
+/// Executes the problem of a file in the world of the two roads, with `options`.
+fn run(problem: &str, options: &[&str]) -> Output {
+    let (domain, problem) = (roads("domain.pddl"), roads(problem));
+    let world = format!("python3 {}", roads("world.py"));
+    let begin = ["run", &domain, &problem, "--world-process", &world];
+    command::elbowroom(&[&begin[..], options].concat())
+}
+
+fn text(output: &[u8]) -> String {
+    String::from_utf8_lossy(output).into_owned()
+}
+
+/// Takes both roads five times, with a plan of its own, and learns from the journals.
+fn learn(folder: &Path, experience: &str) {
+    let plan = folder.join("both.plan");
+    let steps = "0: (long-road) [5]\n6: (back) [1]\n8: (short-road) [2]\n11: (sign) [1]\n";
+    fs::write(&plan, steps).expect("written");
+    let plan = plan.display().to_string();
+    for day in 0..5 {
+        let journal = folder.join(format!("{day}.journal"));
+        let journal = journal.display().to_string();
+        let learn = [
+            "--plan",
+            &plan,
+            "--journal",
+            &journal,
+            "--learn",
+            experience,
+        ];
+        let done = run("day.pddl", &learn);
+        assert_eq!(done.status.code(), Some(0), "{done:?}");
+    }
+}
+
+#[test]
+fn executors_believe_what_was_learnt_from_journals() {
+    if !python_is_there() {
+        return;
+    }
+    let folder = folder("believed");
+    let experience = folder.join("experience").display().to_string();
+    let believing = ["--executor", "policy", "--believed", &experience, "--json"];
+    // Before the first day there is no model, and the folder of --learn need not exist.
+    let learning = ["--learn", &experience, "--journal"];
+    let unused = folder.join("unused.journal").display().to_string();
+    let before = run(
+        "closing.pddl",
+        &[&believing[..], &learning, &[&unused]].concat(),
+    );
+    assert!(
+        text(&before.stderr).contains("has no model yet"),
+        "{before:?}"
+    );
+    assert_eq!(before.status.code(), Some(1), "{before:?}");
+    learn(&folder, &experience);
+    let after = run("closing.pddl", &believing);
+    assert_eq!(after.status.code(), Some(0), "{after:?}");
+    let answer: Value = serde_json::from_slice(&after.stdout).expect("JSON");
+    assert!(answer.to_string().contains("(long-road)"), "{answer}");
+    let model = folder.join("experience/world.toml").display().to_string();
+    let logs = fs::read_dir(folder.join("experience")).expect("a folder");
+    let logs = logs.map(|it| it.expect("an entry").path());
+    let logs = logs.filter(|it| it.extension().is_some_and(|it| it == "journal"));
+    assert_eq!(logs.count(), 6);
+    // Predictions stand beside observations.
+    let journal = folder.join("4.journal").display().to_string();
+    let said = command::elbowroom(&["learn", &journal, "--world", &model]);
+    let said = text(&said.stdout);
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        said.contains("durations of 12 s in the mean predicted, 12 s observed"),
+        "{said}"
+    );
+}
+
+#[test]
+fn executors_that_try_plans_out_pursue_changing_goals() {
+    let folder = folder("believed-goals");
+    let world = folder.join("world.toml");
+    let slow = "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"short-road\"\nconstant = 12\n";
+    fs::write(&world, slow).expect("written");
+    let world = world.display().to_string();
+    // `lookahead` believes no durations.
+    for (executor, problem) in [
+        ("policy", "closing.pddl"),
+        ("live:5", "closing.pddl"),
+        ("lookahead", "day.pddl"),
+    ] {
+        let (domain, problem) = (roads("domain.pddl"), roads(problem));
+        let line = [&domain, &problem, "--realtime", "20", "--believed", &world];
+        let options = ["--executor", executor, "--world", &world];
+        let mut own = Executive::start(&folder, &[&line[..], &options].concat());
+        own.await_state(|state| state["activity"] == "resting");
+        for (name, goal) in [("signed", "(signed)"), ("home", "(and (home) (signed))")] {
+            let (status, taken) = own.post("/v1/goals", &json!({"goal": goal, "name": name}));
+            assert_eq!(status, 200, "{taken}");
+            let reached = format!("reached: {name}");
+            own.await_state(|state| state["why"] == reached.as_str());
+        }
+        let (_, all) = own.get("/v1/goals");
+        let goals = all["goals"].as_array().expect("goals");
+        let is_achieved = |goal: &Value| goal["state"] == "achieved";
+        assert!(goals.iter().all(is_achieved), "{executor}: {all}");
+        own.post("/v1/stop", &Value::Null);
+        assert_eq!(own.end().status.code(), Some(0), "{executor}");
+    }
+}

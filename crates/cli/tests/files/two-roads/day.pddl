@@ -1,0 +1,3 @@
+(define (problem day) (:domain two-roads)
+  (:init (home) (open))
+  (:goal (signed)))

@@ -1,0 +1,231 @@
+//! Learning from the journal of an executive between its missions: `docs/learning.md`.
+//!
+//! A folder contains copies of journals, one for each segment, and `world.toml`, the model of the world learnt from all
+//! of them.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, JoinHandle};
+
+use elbowroom::answers::Unwatched;
+use elbowroom::answers::learn::{ActionLearnt, LearnRequest, Log, Settings, learn};
+use elbowroom::execution::Entry;
+use elbowroom::text::Source;
+
+use crate::error::{Error, WarningSink};
+use crate::journal::{Journal, for_owner, is_journal, segments_of};
+use crate::messages::plain;
+
+/// Name of the model in the folder.
+pub const MODEL: &str = "world.toml";
+
+/// File name extension of the logs in the folder.
+const LOG: &str = "journal";
+
+/// Folder of logs with the model learnt from them.
+pub struct Learner {
+    folder: PathBuf,
+    journal: PathBuf,
+    warnings: WarningSink,
+    /// Drifts that were reported.
+    reported: BTreeSet<String>,
+}
+
+impl Learner {
+    /// Creates the folder if it does not exist. `journal` is the journal of the run, which is read at each update.
+    ///
+    /// # Errors
+    /// When the folder cannot be created or written.
+    pub fn new(folder: &Path, journal: &Path, warnings: WarningSink) -> Result<Self, Error> {
+        let cannot = |error: &io::Error| {
+            Error::new(
+                format!(
+                    "cannot write to the folder {}: {}",
+                    folder.display(),
+                    plain(error)
+                ),
+                "choose another folder for --learn",
+            )
+        };
+        fs::create_dir_all(folder).map_err(|error| cannot(&error))?;
+        let probe = folder.join(".probe");
+        fs::write(&probe, "").map_err(|error| cannot(&error))?;
+        let _ = fs::remove_file(probe);
+        Ok(Self {
+            folder: folder.to_owned(),
+            journal: journal.to_owned(),
+            warnings,
+            reported: BTreeSet::new(),
+        })
+    }
+
+    /// Copies the segments of the journal, and replaces the model by what all logs of the folder tell. Logs that cannot
+    /// be read, and drifts that were not reported before, are warnings.
+    ///
+    /// # Errors
+    /// When the folder cannot be read or written.
+    pub fn update(&mut self) -> io::Result<()> {
+        for segment in segments_of(&self.journal) {
+            self.copy(&segment)?;
+        }
+        let logs = self.logs()?;
+        let request = LearnRequest {
+            logs,
+            settings: Settings::default(),
+            inside: None,
+            expected: None,
+        };
+        let answer = match learn(&request, &mut Unwatched) {
+            Ok(answer) => answer,
+            Err(error) => {
+                self.warn(&error.to_string());
+                return Ok(());
+            }
+        };
+        if answer.attempts == 0 {
+            return Ok(());
+        }
+        replace(&self.folder.join(MODEL), &answer.world)?;
+        for action in &answer.actions {
+            self.report_drift(action);
+        }
+        Ok(())
+    }
+
+    /// Copies a segment of the journal to the folder. Its name is the time of its first record.
+    fn copy(&self, segment: &Path) -> io::Result<()> {
+        let Ok(text) = fs::read_to_string(segment) else {
+            return Ok(());
+        };
+        // The last record may be written at this moment.
+        let Ok(journal) = Journal::read(&text) else {
+            self.warn(&format!("{} is damaged", segment.display()));
+            return Ok(());
+        };
+        let Some(Some(first)) = journal.recorded.first() else {
+            return Ok(());
+        };
+        let copy = self.folder.join(format!("{first}.{LOG}"));
+        let length = fs::metadata(&copy).map_or(0, |it| it.len());
+        if text.len() as u64 > length {
+            replace(&copy, &text)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the logs of the folder, oldest first.
+    fn logs(&self) -> io::Result<Vec<Log>> {
+        let mut paths: Vec<PathBuf> = Vec::new();
+        for entry in fs::read_dir(&self.folder)? {
+            let path = entry?.path();
+            if path.extension().is_some_and(|it| it == LOG) {
+                paths.push(path);
+            }
+        }
+        paths.sort();
+        let mut logs = Vec::with_capacity(paths.len());
+        for path in paths {
+            match read_log(&path) {
+                Ok(log) => logs.push(log),
+                Err(why) => self.warn(&format!("{} is left out: {why}", path.display())),
+            }
+        }
+        Ok(logs)
+    }
+
+    fn report_drift(&mut self, action: &ActionLearnt) {
+        let durations = action.drift.as_ref().map(|drift| (drift, "durations"));
+        let failures = (&action.failure_drift, "failures");
+        for (drift, what) in durations.into_iter().chain([failures]) {
+            let Some(since) = drift.since else { continue };
+            let text = format!(
+                "the {what} of `{}` have changed, noticed at number {since} of them: the model in {} mixes before and \
+                 after",
+                action.action,
+                self.folder.display()
+            );
+            if self.reported.insert(text.clone()) {
+                self.warn(&text);
+            }
+        }
+    }
+
+    fn warn(&self, text: &str) {
+        self.warnings.warn(&format!("learning: {text}"));
+    }
+}
+
+fn read_log(path: &Path) -> Result<Log, String> {
+    let text = fs::read_to_string(path).map_err(|error| plain(&error))?;
+    let text = if is_journal(&text) {
+        Journal::read(&text)?.text
+    } else {
+        text
+    };
+    let source = Source::new(path.display().to_string(), text);
+    Log::read(&source).map_err(|error| error.to_string())
+}
+
+/// Replaces a file, which is complete at any moment.
+fn replace(path: &Path, text: &str) -> io::Result<()> {
+    let new = path.with_extension("new");
+    let mut options = for_owner();
+    let mut file = options.write(true).create(true).truncate(true).open(&new)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()?;
+    fs::rename(new, path)
+}
+
+/// Learning in a thread of its own: whenever the executive rests, and at the end of the run.
+pub struct Learning {
+    missions: Sender<()>,
+    thread: JoinHandle<Learner>,
+}
+
+impl Learning {
+    /// Starts the thread.
+    pub fn start(learner: Learner) -> Self {
+        let (missions, ended) = channel();
+        Self {
+            missions,
+            thread: thread::spawn(move || updates(learner, &ended)),
+        }
+    }
+
+    /// Returns a callback for entries of the record, which notices the end of a mission.
+    pub fn observer(&self) -> impl FnMut(&Entry<'_>) + Send + use<> {
+        let missions = self.missions.clone();
+        move |entry| {
+            if matches!(entry, Entry::Resting { .. }) {
+                let _ = missions.send(());
+            }
+        }
+    }
+
+    /// Learns from the whole run, once its journal is closed.
+    pub fn finish(self) {
+        drop(self.missions);
+        if let Ok(mut learner) = self.thread.join() {
+            update(&mut learner);
+        }
+    }
+}
+
+/// Updates after each mission, until all senders are dropped.
+fn updates(mut learner: Learner, ended: &Receiver<()>) -> Learner {
+    while ended.recv().is_ok() {
+        // Missions that ended during the last update need one more.
+        while ended.try_recv().is_ok() {}
+        update(&mut learner);
+    }
+    learner
+}
+
+fn update(learner: &mut Learner) {
+    if let Err(error) = learner.update() {
+        learner.warn(&format!("{}: {}", learner.folder.display(), plain(&error)));
+    }
+}
