@@ -7,20 +7,25 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 use elbowroom::answers::Unwatched;
 use elbowroom::answers::learn::{ActionLearnt, LearnRequest, Log, Settings, learn};
 use elbowroom::execution::Entry;
 use elbowroom::text::Source;
 
+use crate::clock::Clock;
 use crate::error::{Error, WarningSink};
 use crate::journal::{Journal, for_owner, is_journal, segments_of};
 use crate::messages::plain;
 
 /// Name of the model in the folder.
 pub const MODEL: &str = "world.toml";
+
+/// Shortest pause between two updates.
+const LEAST_PAUSE: Duration = Duration::from_secs(10);
 
 /// File name extension of the logs in the folder.
 const LOG: &str = "journal";
@@ -214,12 +219,24 @@ impl Learning {
     }
 }
 
-/// Updates after each mission, until all senders are dropped.
+/// Updates after missions, until all senders are dropped. Between updates, it is idle for ten times as long as the last
+/// one took.
 fn updates(mut learner: Learner, ended: &Receiver<()>) -> Learner {
-    while ended.recv().is_ok() {
-        // Missions that ended during the last update need one more.
-        while ended.try_recv().is_ok() {}
+    let mut is_due = false;
+    while is_due || ended.recv().is_ok() {
+        let begun = Clock::start();
         update(&mut learner);
+        let pause = (begun.elapsed() * 10).max(LEAST_PAUSE);
+        let begun = Clock::start();
+        let mut has_ended = false;
+        while let Some(left) = pause.checked_sub(begun.elapsed()) {
+            match ended.recv_timeout(left) {
+                Ok(()) => has_ended = true,
+                Err(RecvTimeoutError::Timeout) => break,
+                Err(RecvTimeoutError::Disconnected) => return learner,
+            }
+        }
+        is_due = has_ended;
     }
     learner
 }

@@ -126,6 +126,7 @@ fn text(request: &LearnRequest, answer: &LearnAnswer, look: Look) -> String {
         notes: Vec::new(),
     };
     text.push_str(table.within(look.width).trim_start_matches('\n'));
+    predictions(&mut text, answer, look);
     changes(&mut text, answer, look);
     for action in &answer.actions {
         remarks(&mut text, action, look);
@@ -187,7 +188,53 @@ fn rows(request: &LearnRequest, action: &ActionLearnt) -> Vec<Vec<String>> {
     }
 }
 
-/// How often facts changed by themselves, which no plan expects.
+/// Adds a table of predictions beside observations.
+fn predictions(text: &mut String, answer: &LearnAnswer, look: Look) {
+    let row = |action: &ActionLearnt| {
+        let prediction = action.prediction.filter(|it| it.ended > 0)?;
+        let PredictionAnswer {
+            durations,
+            predicted_mean,
+            observed_mean,
+            within,
+            ended,
+            predicted_failures,
+            failures,
+        } = prediction;
+        let mean = |mean| {
+            if durations > 0 {
+                short(mean)
+            } else {
+                String::new()
+            }
+        };
+        Some(vec![
+            action.action.clone(),
+            mean(predicted_mean),
+            mean(observed_mean),
+            format!("{within} of {durations}"),
+            short(predicted_failures),
+            format!("{failures} of {ended}"),
+        ])
+    };
+    let rows: Vec<Vec<String>> = answer.actions.iter().filter_map(row).collect();
+    if rows.is_empty() {
+        return;
+    }
+    let headings = ["action", "mean", "observed", "within", "failed", "observed"];
+    let table = Table {
+        caption: String::new(),
+        headings: headings.map(str::to_owned).to_vec(),
+        keys: 1,
+        rows,
+        notes: Vec::new(),
+    };
+    text.push('\n');
+    text.push_str("Predictions of the world file and observations (within: durations in the central 90 %):\n\n");
+    text.push_str(table.within(look.width).trim_start_matches('\n'));
+}
+
+/// Adds a table of the changes that no action and no timed initial makes.
 fn changes(text: &mut String, answer: &LearnAnswer, look: Look) {
     if answer.changes.is_empty() {
         return;
@@ -293,9 +340,6 @@ fn remarks(text: &mut String, action: &ActionLearnt, look: Look) {
             fit(delay)
         ));
     }
-    if let Some(prediction) = action.prediction.filter(|it| it.ended > 0) {
-        remark(predicted(&action.action, &prediction));
-    }
     let drifted = |drift: &DriftAnswer, what: &str| {
         let since = drift.since?;
         Some(format!(
@@ -312,30 +356,6 @@ fn remarks(text: &mut String, action: &ActionLearnt, look: Look) {
     for words in durations.into_iter().chain(failures) {
         remark(words);
     }
-}
-
-/// Predictions beside observations.
-fn predicted(name: &str, prediction: &PredictionAnswer) -> String {
-    let mut text = format!(
-        "{name} as believed: {} failures of {} predicted, {} observed",
-        short(prediction.predicted_failures),
-        counted(
-            usize::try_from(prediction.ended).unwrap_or(usize::MAX),
-            "attempt"
-        ),
-        prediction.failures
-    );
-    if prediction.durations > 0 {
-        let _ = write!(
-            text,
-            "; durations of {} s in the mean predicted, {} s observed, {} of {} within the central 90 % predicted",
-            short(prediction.predicted_mean),
-            short(prediction.observed_mean),
-            prediction.within,
-            prediction.durations
-        );
-    }
-    text + "."
 }
 
 fn conformal(text: &mut String, inside: &ConformalBox, look: Look) {
