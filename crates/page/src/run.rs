@@ -9,7 +9,9 @@ use std::sync::Arc;
 
 use elbowroom::answers::RunAnswer;
 use elbowroom::answers::envelope::timeline;
+use elbowroom::answers::learn::{PredictionAnswer, predictions_for};
 use elbowroom::execute::RunSpec;
+use elbowroom::learning::records;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl;
@@ -18,7 +20,7 @@ use elbowroom::report::short::nearest;
 use elbowroom::report::trace::{Line, Stored};
 
 use crate::belief::Belief;
-use crate::document::{Chart, Document, Mark, Section, Series, Texts, Tone, Verdict};
+use crate::document::{Chart, Document, Mark, Section, Series, Table, Text, Texts, Tone, Verdict};
 use crate::lanes::{Lanes, Occupant, lanes};
 use crate::plan::{end_of_axis, prose};
 use crate::run::bars::Bars;
@@ -114,6 +116,10 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
             lines: numbers,
         }));
     }
+    sections.extend(
+        task.as_ref()
+            .and_then(|task| predictions(stored, spec, task)),
+    );
     sections.push(Section::Table(log.table(&mut texts)));
     let (domain, problem) = match &task {
         Some(task) => (task.problem().domain.clone(), task.problem().name.clone()),
@@ -146,6 +152,52 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         is_paused,
         more: Vec::new(),
     }
+}
+
+/// Returns a table of the durations and failures that the believed world predicts, and those observed; `None` if the run
+/// has no believed world, or no action has ended.
+fn predictions(stored: &Stored, spec: &RunSpec, task: &Task) -> Option<Section> {
+    spec.believed.as_ref()?;
+    let world = spec.beliefs(task.problem()).ok()??;
+    let records = records::of_trace(stored);
+    let predictions = predictions_for(&records, &world);
+    let ended = predictions.iter().filter(|(_, it)| it.ended > 0);
+    let row = |(name, it): &(String, PredictionAnswer)| {
+        let mean = |mean: f64| match it.durations {
+            0 => String::new(),
+            _ => format!("{mean:.2}"),
+        };
+        let cells = [
+            name.clone(),
+            mean(it.predicted_mean),
+            mean(it.observed_mean),
+            format!("{} of {}", it.within, it.durations),
+            format!("{:.2}", it.predicted_failures),
+            format!("{} of {}", it.failures, it.ended),
+        ];
+        cells.map(Text::from).to_vec()
+    };
+    let rows: Vec<_> = ended.map(row).collect();
+    let columns = [
+        ("action", false),
+        ("predicted mean, s", true),
+        ("observed mean, s", true),
+        ("within the central 90 %", true),
+        ("predicted failures", true),
+        ("observed failures", true),
+    ];
+    (!rows.is_empty()).then(|| {
+        Section::Table(Table {
+            heading: "Predictions of the believed world".to_owned(),
+            note: "Actions of each name that ended by themselves, beside the model of --believed."
+                .to_owned(),
+            columns: columns
+                .map(|(name, is_number)| (name.to_owned(), is_number))
+                .to_vec(),
+            rows,
+            ..Table::default()
+        })
+    })
 }
 
 /// What of the run is not on the page, as its record does not begin at the beginning.

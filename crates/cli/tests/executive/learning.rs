@@ -70,7 +70,11 @@ fn executors_believe_what_was_learnt_from_journals() {
     );
     assert_eq!(before.status.code(), Some(1), "{before:?}");
     learn(&folder, &experience);
-    let after = run("closing.pddl", &believing);
+    let trace = folder.join("after.jsonl").display().to_string();
+    let after = run(
+        "closing.pddl",
+        &[&believing[..], &["--trace", &trace]].concat(),
+    );
     assert_eq!(after.status.code(), Some(0), "{after:?}");
     let answer: Value = serde_json::from_slice(&after.stdout).expect("JSON");
     assert!(answer.to_string().contains("(long-road)"), "{answer}");
@@ -79,6 +83,10 @@ fn executors_believe_what_was_learnt_from_journals() {
     let logs = logs.map(|it| it.expect("an entry").path());
     let logs = logs.filter(|it| it.extension().is_some_and(|it| it == "journal"));
     assert_eq!(logs.count(), 6);
+    let replay = command::elbowroom(&["run", "--replay", &trace]);
+    assert_eq!(replay.status.code(), Some(0), "{replay:?}");
+    let page = command::elbowroom(&["report", &trace]);
+    assert!(text(&page.stdout).contains("Predictions of the believed world"));
     // Predictions stand beside observations.
     let journal = folder.join("4.journal").display().to_string();
     let said = command::elbowroom(&["learn", &journal, "--world", &model]);

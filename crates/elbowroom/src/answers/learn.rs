@@ -24,7 +24,7 @@ pub use changes::{ChangesLearnt, RateLearnt};
 pub use courses::Course;
 pub use elbowroom_learning::learn::Settings;
 pub use inside::{ConformalBox, ConformalInterval, InsideRequest, Verdict};
-pub use prediction::PredictionAnswer;
+pub use prediction::{PredictionAnswer, predictions_for};
 
 /// Asks what logs say.
 #[derive(Clone, Debug)]

@@ -33,6 +33,15 @@ pub struct PredictionAnswer {
     pub failures: u64,
 }
 
+/// Returns predictions of `world` for the attempts of a log, by the names of the actions.
+pub fn predictions_for(records: &[Record], world: &WorldModel) -> Vec<(String, PredictionAnswer)> {
+    let mut predictions = Predictions::default();
+    predictions.add(records, world);
+    let names = predictions.by_name.keys();
+    let answers = names.filter_map(|name| Some((name.clone(), predictions.of(name)?)));
+    answers.collect()
+}
+
 /// Sums over the attempts of all logs with a believed world.
 #[derive(Default)]
 pub(super) struct Predictions {
@@ -77,7 +86,7 @@ impl Predictions {
             .or_insert_with(|| mean(world, &action, &exact));
         sums.durations += 1;
         sums.within += u64::from(!is_low && !is_high);
-        // Sums until `finish`.
+        // Sums until they are read by `of`.
         sums.predicted_mean += mean;
         sums.observed_mean += observed;
     }
