@@ -67,8 +67,8 @@ impl Learner {
         })
     }
 
-    /// Copies the segments of the journal, and replaces the model by what all logs of the folder tell. Logs that cannot
-    /// be read, and drifts that were not reported before, are warnings.
+    /// Copies the segments of the journal, learns from all logs of the folder, and replaces the model. Logs that cannot be
+    /// read are warnings, and so are drifts that were not reported before.
     ///
     /// # Errors
     /// When the folder cannot be read or written.

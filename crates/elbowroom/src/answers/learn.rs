@@ -48,7 +48,7 @@ pub struct Log {
     pub records: Vec<Record>,
     /// What became of the facts; `None` where the log does not say, as tables do not.
     pub course: Option<Course>,
-    /// The world file that the executor was told to believe; `None` if there was none, or the log does not say.
+    /// The believed world of the run; `None` if it had none, or if the log does not contain it.
     pub world: Option<WorldModel>,
 }
 

@@ -76,7 +76,7 @@ impl Course {
         })
     }
 
-    /// Returns the world file that the executor of the run was told to believe, if there was one.
+    /// Returns the believed world of the run, if it had one.
     pub(super) fn believed(&self, trace: &Stored) -> Option<WorldModel> {
         let spec: RunSpec = trace.header().ok()?;
         self.read(&Source::new("world", spec.believed?))

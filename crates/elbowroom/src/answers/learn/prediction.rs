@@ -8,13 +8,13 @@ use elbowroom_sim::draw::keyed;
 use elbowroom_sim::{Purpose, Side, WorldModel};
 use serde::{Deserialize, Serialize};
 
-/// Number of draws from which the mean of a distribution is computed.
+/// Number of draws per mean of a distribution.
 const DRAWS: u64 = 200;
 
 /// Durations outside the central 90 % of their distribution are below the first share, or above the second.
 const TAILS: (f64, f64) = (0.05, 0.95);
 
-/// Predictions of the believed world for the attempts of one action, beside what was observed.
+/// Predictions of the believed world for the attempts of one action, and observations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PredictionAnswer {
     /// Number of observed durations with a prediction: attempts that succeeded.
