@@ -4,6 +4,7 @@
 //! changed between Humble and Iron, and nodes of one side abort when they read that of the other. Who does not
 //! speak of nodes can do no harm to either; topics, services and actions need no nodes.
 
+mod answers;
 mod raw;
 
 use std::collections::BTreeSet;
@@ -11,7 +12,6 @@ use std::io;
 use std::marker::PhantomData;
 use std::sync::mpsc::Sender;
 use std::thread;
-use std::time::Instant;
 
 use rustdds::mio1::event::Source;
 use rustdds::mio1::{Events, Interest, Poll, Registry, Token};
@@ -28,7 +28,7 @@ use serde::de::DeserializeOwned;
 
 use super::Input;
 use super::options::Settings;
-use super::session::now;
+pub(super) use answers::Answers;
 use raw::{Raw, RawAdapter};
 
 /// Which request an answer belongs to.
@@ -193,11 +193,8 @@ impl Network {
             &qos,
         )?;
         let writer = self.publisher.create_datawriter_no_key_cdr(&replies, None);
-        Ok(Answers {
-            writer: writer.map_err(|e| format!("cannot serve {name}: {e}"))?,
-            found: BTreeSet::new(),
-            waiting: Vec::new(),
-        })
+        let writer = writer.map_err(|e| format!("cannot serve {name}: {e}"))?;
+        Ok(Answers::new(writer))
     }
 
     /// Asks a service; `kind` is its type, and its answers are inputs, those to others too.
@@ -345,97 +342,6 @@ fn note_readers<T: Serialize>(writer: &DataWriterCdr<T>, found: &mut BTreeSet<GU
             }
         }
     }
-}
-
-/// Delay of an answer to a reader that has not been discovered. Then it is sent without waiting any longer.
-const FOUND_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
-
-/// Period for which an answer is kept and sent again once its reader is discovered, because the first one did not reach
-/// it. Fast DDS repeats a lost announcement after three seconds, and a repetition can be lost as well.
-const KEPT_FOR: std::time::Duration = std::time::Duration::from_secs(30);
-
-/// Answer to a client whose reader may not have been discovered.
-struct Waiting<T> {
-    asker: Asker,
-    response: T,
-    since: Instant,
-    is_sent: bool,
-}
-
-/// By what a service is answered.
-pub(super) struct Answers<T: Serialize> {
-    writer: DataWriterCdr<Framed<T>>,
-    /// Who can hear an answer: a request may come before its sender is found, and what is said then is lost.
-    found: BTreeSet<GUID>,
-    waiting: Vec<Waiting<T>>,
-}
-
-impl<T: Serialize + Clone> Answers<T> {
-    /// Answers a request, now or when whoever has asked can hear it.
-    ///
-    /// # Errors
-    /// It could not be sent.
-    pub(super) fn answer(&mut self, asker: Asker, response: T) -> Result<(), String> {
-        self.waiting.push(Waiting {
-            asker,
-            response,
-            since: now(),
-            is_sent: false,
-        });
-        self.flush()
-    }
-
-    /// Sends the answers that are due. To be called a few times a second.
-    ///
-    /// # Errors
-    /// One could not be sent.
-    pub(super) fn flush(&mut self) -> Result<(), String> {
-        note_readers(&self.writer, &mut self.found);
-        let clock = now();
-        let mut outcome = Ok(());
-        let (writer, found) = (&self.writer, &self.found);
-        self.waiting.retain_mut(|it| {
-            let age = clock.saturating_duration_since(it.since);
-            let is_found = is_found(&it.asker, found);
-            if is_found || (!it.is_sent && age >= FOUND_WITHIN) {
-                it.is_sent = true;
-                let sent = send(writer, &it.asker, it.response.clone());
-                if sent.is_err() {
-                    outcome = sent;
-                }
-            }
-            !is_found && age < KEPT_FOR
-        });
-        outcome
-    }
-}
-
-/// Returns `true` if the reader of a client is discovered.
-fn is_found(asker: &Asker, found: &BTreeSet<GUID>) -> bool {
-    let who = asker.identity.writer_guid;
-    if who.entity_id.entity_kind.is_reader() {
-        return found.contains(&who);
-    }
-    // A request without a reader comes from a participant that has one, but another reader of it may be discovered first.
-    asker.header.is_none() || found.iter().any(|it| it.prefix == who.prefix)
-}
-
-fn send<T: Serialize>(
-    writer: &DataWriterCdr<Framed<T>>,
-    asker: &Asker,
-    response: T,
-) -> Result<(), String> {
-    let options = WriteOptionsBuilder::new()
-        .source_timestamp(Timestamp::now())
-        .related_sample_identity(asker.identity);
-    let answer = match asker.header {
-        Some(header) => Framed::Headed(header, response),
-        None => Framed::Plain(response),
-    };
-    let written = writer.write_with_options(answer, options.build());
-    written
-        .map(drop)
-        .map_err(|e| format!("an answer was not sent: {e}"))
 }
 
 /// Whatever can be listened to.
