@@ -1,15 +1,16 @@
 //! The process on a clock that is cut into cells: see [`timed`].
 
+mod modules;
+
 use std::fmt::Write as _;
 
 use elbowroom_model::Task;
-use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
 
-use super::formula::{Formula, choice, exact};
+use super::formula::Formula;
 use super::{PrismError, bare, checked};
 use crate::export::names::distinct;
-use crate::timed::{Act, Chances, Ends, Event, Facts, Needs, Settings, Side, TimedWorld, chances};
+use crate::timed::{Act, Chances, Event, Facts, Needs, Settings, Side, TimedWorld, chances};
 
 /// From where the best value is bounded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -339,198 +340,6 @@ impl Process<'_> {
         }
     }
 
-    /// An action: since when it has been under way, and what is known of its end.
-    fn act_module(&self, act: usize, happenings: &[Happening], text: &mut String) {
-        let (name, world_act) = (&self.acts[act], &self.world.acts[act]);
-        let (since, ends) = (format!("a_{name}"), format!("o_{name}"));
-        let cells = self.chances.cells;
-        let most = match self.bound {
-            Bound::Lower => 2,
-            Bound::Upper => 4,
-        };
-        let _ = writeln!(
-            text,
-            "module act_{name} // {}\n  // 0: not under way; n: since n-1 cells.\n  {since} : [0..{}] init 0;",
-            bare(&world_act.name),
-            cells + 1
-        );
-        text.push_str(match self.bound {
-            Bound::Lower => "  // What it does in this cell: 1 ends well, 2 badly.\n",
-            Bound::Upper => {
-                "  // 1 ends well, 2 badly, in this cell or the next; 3 and 4 in this one.\n"
-            }
-        });
-        let _ = writeln!(text, "  {ends} : [0..{most}] init 0;");
-        for happening in happenings {
-            self.act_command(act, happening, text);
-        }
-        match self.bound {
-            Bound::Lower => {
-                let _ = writeln!(
-                    text,
-                    "  [tick] {ends}=0 -> ({since}'=({since}>0 ? {since}+1 : 0));"
-                );
-                let _ = writeln!(text, "  [wait] {since}=0 -> true;");
-                self.draws(act, "wait", "", text);
-            }
-            Bound::Upper => {
-                // How long it has been under way no longer matters when its end is known.
-                let _ = writeln!(
-                    text,
-                    "  [pass] {ends}<3 -> ({since}'=({ends}>0 ? 1 : ({since}>0 ? {since}+1 : 0)))\
-                     &({ends}'=({ends}>0 ? {ends}+2 : 0));"
-                );
-                let _ = writeln!(text, "  [reveal] {since}=0 | {ends}>0 -> true;");
-                self.draws(act, "reveal", &format!(" & {ends}=0"), text);
-            }
-        }
-        text.push_str("endmodule\n\n");
-    }
-
-    /// Whether it ends in the cell, by how long it has been under way.
-    fn draws(&self, act: usize, label: &str, guard: &str, text: &mut String) {
-        let since = format!("a_{}", self.acts[act]);
-        let ends = format!("o_{}", self.acts[act]);
-        let hazards: Vec<String> = self.chances.ends[act]
-            .iter()
-            .map(|hazard| choice(&ends_of(&ends, hazard, "true")))
-            .collect();
-        for (from, to) in runs(&hazards) {
-            let _ = writeln!(
-                text,
-                "  [{label}] {}{guard} -> {};",
-                range(&since, from + 1, to + 1),
-                hazards[from]
-            );
-        }
-    }
-
-    /// What a happening changes about an action.
-    fn act_command(&self, act: usize, happening: &Happening, text: &mut String) {
-        let (since, ends) = (
-            format!("a_{}", self.acts[act]),
-            format!("o_{}", self.acts[act]),
-        );
-        let Happening {
-            label,
-            adds,
-            deletes,
-            ..
-        } = happening;
-        let goes_on = self.goes_on(&self.world.acts[act], *adds, *deletes);
-        match happening.owner {
-            Owner::Started(own) if own == act => {
-                let begins = format!("({since}'=1)");
-                let ways = match self.bound {
-                    Bound::Lower => begins,
-                    // It may end in the very cell.
-                    Bound::Upper => {
-                        let ways = ends_of(&ends, &self.chances.ends[act][0], "");
-                        let ways = ways.map(|(p, end)| match end.as_str() {
-                            "" => (p, begins.clone()),
-                            end => (p, format!("{begins}&{end}")),
-                        });
-                        choice(&ways)
-                    }
-                };
-                let _ = writeln!(text, "  [{label}] {since}=0 -> {ways};");
-            }
-            Owner::Ended(own, is_well) if own == act => {
-                let guard = match (is_well, self.bound) {
-                    (None, _) => format!("{since}>0"),
-                    (Some(true), Bound::Lower) => format!("{ends}=1"),
-                    (Some(false), Bound::Lower) => format!("{ends}=2"),
-                    (Some(true), Bound::Upper) => format!("{ends}=1 | {ends}=3"),
-                    (Some(false), Bound::Upper) => format!("{ends}=2 | {ends}=4"),
-                };
-                let _ = writeln!(text, "  [{label}] {guard} -> ({since}'=0)&({ends}'=0);");
-            }
-            _ => {
-                if let Some(goes_on) = goes_on {
-                    let keep = |name: &str| format!("({name}'=(({goes_on}) ? {name} : 0))");
-                    let _ = writeln!(
-                        text,
-                        "  [{label}] true -> {}&{};",
-                        keep(&since),
-                        keep(&ends)
-                    );
-                }
-            }
-        }
-    }
-
-    /// Whether an action can start, and what it needs over all holds right after that.
-    fn can_start(&self, act: &Act) -> Formula {
-        let needs = self.holds(&act.start.needs);
-        let over_all = act.rest.iter().map(|(over_all, _)| {
-            let goes_on = self.goes_on(act, act.start.adds, act.start.deletes);
-            goes_on.unwrap_or_else(|| self.holds(over_all))
-        });
-        Formula::all(std::iter::once(needs).chain(over_all))
-    }
-
-    /// Whether what an action needs over all holds after these effects; `None` if they do not
-    /// matter to it.
-    fn goes_on(&self, act: &Act, adds: Facts, deletes: Facts) -> Option<Formula> {
-        let (over_all, _) = act.rest.as_ref()?;
-        (over_all.mentions() & (adds | deletes) != 0).then(|| self.after(over_all, adds, deletes))
-    }
-
-    /// An event: 0 still to come, 1 in this cell, 2 over.
-    fn event_module(&self, event: usize, happenings: &[Happening], text: &mut String) {
-        let name = format!("e_{event}");
-        let world_event = &self.world.events[event];
-        let words = |facts: Facts, truth: &str| -> Vec<String> {
-            let names = self.facts.iter().enumerate();
-            names
-                .filter(|(place, _)| facts & (1 << place) != 0)
-                .map(|(_, name)| format!("{name} {truth}"))
-                .collect()
-        };
-        let mut changes = words(world_event.adds, "true");
-        changes.extend(words(world_event.deletes & !world_event.adds, "false"));
-        let _ = writeln!(
-            text,
-            "module event_{event} // makes {}\n  // 0 to come, 1 in this cell, 2 over.\n  {name} : [0..2] init 0;",
-            changes.join(", ")
-        );
-        for happening in happenings {
-            if happening.owner == Owner::Event(event) {
-                let _ = writeln!(text, "  [{}] {name}=1 -> ({name}'=2);", happening.label);
-            }
-        }
-        let (label, done) = match self.bound {
-            Bound::Lower => ("wait", "tick"),
-            Bound::Upper => ("reveal", "pass"),
-        };
-        let _ = writeln!(text, "  [{done}] {name}!=1 -> true;");
-        let _ = writeln!(text, "  [{label}] {name}>0 -> true;");
-        let drawn = |p: f64| {
-            let p = exact(p);
-            let rest = &Rational::ONE - &p;
-            choice(&[(p, format!("({name}'=1)")), (rest, "true".to_owned())])
-        };
-        let hazards = self.chances.events[event].iter();
-        let hazards: Vec<String> = hazards.map(|p| drawn(*p)).collect();
-        for (from, to) in runs(&hazards) {
-            let _ = writeln!(
-                text,
-                "  [{label}] {name}=0 & {} -> {};",
-                range("cell", from, to),
-                hazards[from]
-            );
-        }
-        if self.bound == Bound::Lower && self.has_a_beginning() {
-            let _ = writeln!(
-                text,
-                "  [begin] true -> {};",
-                drawn(self.chances.before[event])
-            );
-            let _ = writeln!(text, "  [begun] {name}!=1 -> true;");
-        }
-        text.push_str("endmodule\n\n");
-    }
-
     /// Whether something may happen before anybody can do something.
     fn has_a_beginning(&self) -> bool {
         self.chances.before.iter().any(|p| *p > 0.0)
@@ -594,45 +403,5 @@ impl Process<'_> {
             Needs::Not(part) => self.may_hold(part),
             Needs::Fact(_) => Formula::TRUE,
         }
-    }
-}
-
-/// The ways in which an action under way may end, with `otherwise` for that it does not.
-fn ends_of(name: &str, hazard: &Ends, otherwise: &str) -> [(Rational, String); 3] {
-    let (well, badly) = (exact(hazard.well), exact(hazard.badly()));
-    let rest = &(&Rational::ONE - &well) - &badly;
-    // What rounding has left over goes to the likelier one.
-    let is_over = rest.to_f64() < 1e-12;
-    let one = Rational::ONE;
-    let (well, badly, rest) = match (is_over, well >= badly) {
-        (false, _) => (well, badly, rest),
-        (true, true) => (&one - &badly, badly, Rational::ZERO),
-        (true, false) => (well.clone(), &one - &well, Rational::ZERO),
-    };
-    [
-        (well, format!("({name}'=1)")),
-        (badly, format!("({name}'=2)")),
-        (rest, otherwise.to_owned()),
-    ]
-}
-
-/// The first and the last place of each run of equal texts.
-fn runs(texts: &[String]) -> Vec<(usize, usize)> {
-    let mut runs: Vec<(usize, usize)> = Vec::new();
-    for (place, text) in texts.iter().enumerate() {
-        match runs.last_mut() {
-            Some((first, last)) if texts[*first] == *text => *last = place,
-            _ => runs.push((place, place)),
-        }
-    }
-    runs
-}
-
-/// A number is one of these.
-fn range(name: &str, from: usize, to: usize) -> String {
-    if from == to {
-        format!("{name}={from}")
-    } else {
-        format!("{name}>={from} & {name}<={to}")
     }
 }
