@@ -19,8 +19,7 @@ mod runaway;
 mod states;
 mod strategy;
 mod successors;
-
-use std::collections::VecDeque;
+mod waiting;
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
@@ -41,10 +40,11 @@ use known::Hashes;
 use landmarks::SearchLandmarks;
 use node::{DeadEnd, Node, Notes};
 use novelty::Novelty;
-use queue::{Queue, Waiting};
+use queue::Queue;
 use states::States;
 use strategy::NoveltyOf;
 pub(crate) use strategy::{Aim, Strategy};
+use waiting::WaitingList;
 
 /// A search in progress.
 #[derive(Debug)]
@@ -66,7 +66,7 @@ pub(crate) struct Search<'a> {
     all: Queue,
     preferred: Queue,
     /// All successors, first come first served, in a search that has to come by everywhere.
-    oldest: VecDeque<Waiting>,
+    oldest: WaitingList,
     turns: [i64; 2],
     /// The best estimate, and the number of landmarks left where they count.
     best: (u32, u32),
@@ -166,7 +166,7 @@ impl<'a> Search<'a> {
             compared: State::default(),
             all: Queue::default(),
             preferred: Queue::default(),
-            oldest: VecDeque::new(),
+            oldest: WaitingList::default(),
             turns: [0, 0],
             best: (u32::MAX, u32::MAX),
             first_estimate: 0,

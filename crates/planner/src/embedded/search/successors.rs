@@ -5,11 +5,8 @@ use super::super::compile::NONE;
 use super::super::relaxed::{Estimate, OVERDRAWN};
 use super::super::state::State;
 use super::super::time::NEVER;
-use super::queue::Waiting;
+use super::waiting::Waiting;
 use super::{Aim, Node, NoveltyOf, Search};
-
-/// An estimate of the memory that a waiting successor takes, in bytes.
-const WAITING_MEMORY: usize = 12;
 
 impl Search<'_> {
     /// Lets the successors wait for their turn.
@@ -38,29 +35,24 @@ impl Search<'_> {
         }
         let rank = self.rank(number, estimate.steps);
         for &step in &estimate.preferred {
-            self.preferred.push(rank, Waiting::step(number, step));
+            self.memory += self.preferred.push(rank, Waiting::step(number, step));
         }
         self.generated += estimate.applicable.len() as u64;
-        let mut waiting = estimate.preferred.len();
         if self.is_timeless && !estimate.applicable.is_empty() {
             // Most of them never have their turn, and they are the same whenever they are listed.
-            self.all.push(rank, Waiting::all_of(number));
-            waiting += 1;
-            if self.strategy.is_complete() {
-                self.oldest.push_back(Waiting::all_of(number));
-                waiting += 1;
-            }
+            self.add_waiting(rank, Waiting::all_of(number));
         } else {
-            let steps = estimate.applicable.iter();
-            let all = steps.map(|&step| Waiting::step(number, step));
-            all.clone().for_each(|step| self.all.push(rank, step));
-            waiting += estimate.applicable.len();
-            if self.strategy.is_complete() {
-                self.oldest.extend(all);
-                waiting += estimate.applicable.len();
+            for &step in &estimate.applicable {
+                self.add_waiting(rank, Waiting::step(number, step));
             }
         }
-        self.memory += WAITING_MEMORY * waiting;
+    }
+
+    fn add_waiting(&mut self, rank: i64, waiting: Waiting) {
+        self.memory += self.all.push(rank, waiting);
+        if self.strategy.is_complete() {
+            self.memory += self.oldest.push_back(waiting);
+        }
     }
 
     /// The successor of the lowest rank.
@@ -125,12 +117,11 @@ impl Search<'_> {
             self.memory += memory;
             let rank = new << 48 | i64::from(worth.0) << 24;
             self.generated += 1;
-            self.memory += WAITING_MEMORY;
+            let waiting = Waiting::step(number, step);
             if estimate.preferred.binary_search(&step).is_ok() {
-                self.memory += WAITING_MEMORY;
-                self.preferred.push(rank, Waiting::step(number, step));
+                self.memory += self.preferred.push(rank, waiting);
             }
-            self.all.push(rank, Waiting::step(number, step));
+            self.memory += self.all.push(rank, waiting);
         }
         let notes = &mut self.nodes[number as usize].notes;
         notes.get_or_insert_default().progress = Some(progress);
