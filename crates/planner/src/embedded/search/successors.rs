@@ -5,8 +5,9 @@ use super::super::compile::NONE;
 use super::super::relaxed::{Estimate, OVERDRAWN};
 use super::super::state::State;
 use super::super::time::NEVER;
+use super::novelty::Progress;
 use super::waiting::Waiting;
-use super::{Aim, Node, NoveltyOf, Search};
+use super::{Aim, NoveltyOf, ROOT, Search};
 
 impl Search<'_> {
     /// Lets the successors wait for their turn.
@@ -100,12 +101,10 @@ impl Search<'_> {
         let Some(mut novelty) = self.novelty.take() else {
             return;
         };
-        let node = &self.nodes[number as usize];
-        let before = self.nodes.get(node.parent as usize);
-        let before = before.and_then(Node::progress);
         let state = self.states.get(number);
+        let node = &self.nodes[number as usize];
+        let before = self.progress(node.origin.parent);
         let progress = novelty.progress(&state, node.left, before, &estimate.subgoals);
-        self.memory += progress.size();
         self.weighed += estimate.applicable.len() as u64;
         for &step in &estimate.applicable {
             let Some((_, next)) = self.make(&state, step) else {
@@ -123,8 +122,10 @@ impl Search<'_> {
             }
             self.memory += self.all.push(rank, waiting);
         }
-        let notes = &mut self.nodes[number as usize].notes;
-        notes.get_or_insert_default().progress = Some(progress);
+        let size = progress.size();
+        let (progress, memory) = self.shared.progress.number(progress, size);
+        self.nodes[number as usize].progress = progress;
+        self.memory += memory;
         self.novelty = Some(novelty);
     }
 
@@ -134,9 +135,24 @@ impl Search<'_> {
         if self.strategy.novelty != Some(NoveltyOf::Successors) {
             return true;
         }
-        let parent = self.nodes.get(parent as usize);
-        let progress = parent.and_then(Node::progress);
+        let progress = self.progress(parent);
         progress.is_none_or(|before| before.has_new_goal(left))
+    }
+
+    /// Progress on the path to a node.
+    fn progress(&self, number: u32) -> Option<&Progress> {
+        let node = self.nodes.get(number as usize)?;
+        self.shared.progress.get(node.progress)
+    }
+
+    /// The number of steps that led to a node.
+    fn depth(&self, number: u32) -> i64 {
+        let parent = |node: &u32| {
+            let parent = self.nodes[*node as usize].origin.parent;
+            (parent != ROOT).then_some(parent)
+        };
+        let steps = std::iter::successors(Some(number), parent).skip(1);
+        i64::try_from(steps.count()).unwrap_or(i64::MAX)
     }
 
     /// What a state has used up of what is not filled up, all of it counting as much as the way to
@@ -173,7 +189,7 @@ impl Search<'_> {
         let drift = self.nodes[number as usize].drift().penalty();
         let mut estimate = i64::from(estimate) + self.penalty(number) + drift;
         if self.strategy.counts_steps {
-            estimate += i64::from(self.nodes[number as usize].depth);
+            estimate += self.depth(number);
         }
         let (Aim::WeightedAStar(factor), Some(step_costs)) = (self.strategy.aim, &self.step_costs)
         else {
