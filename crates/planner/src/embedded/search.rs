@@ -425,7 +425,7 @@ impl<'a> Search<'a> {
         Turn::Nothing
     }
 
-    /// Adds a node, and returns its number. `left`: the landmarks accepted, and what is left.
+    /// Adds a node, and returns its number. `left`: the accepted landmarks, and the number of those left.
     fn add(&mut self, origin: Waiting, left: (Vec<u64>, u32), state: State, notes: Notes) -> u32 {
         let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
         let (accepted, left) = left;

@@ -77,7 +77,7 @@ pub(super) struct SharedNotes {
     pub(super) progress: Shared<Progress>,
 }
 
-/// Numbered values, each of which is stored once.
+/// Numbered values without duplicates.
 #[derive(Debug)]
 pub(super) struct Shared<T> {
     values: Map<T, ()>,

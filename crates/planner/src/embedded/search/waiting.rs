@@ -168,7 +168,7 @@ impl WaitingList {
     }
 }
 
-/// The difference of steps and of states from two numbers, in which the lowest bit tells the kind of number.
+/// Decodes the differences of steps and of states from two numbers. Their lowest bits are the kinds of number.
 fn difference(step: u64, parent: u64) -> (i64, i64) {
     let signed = |number: u64| (number >> 1).cast_signed() ^ -(number & 1).cast_signed();
     (signed(step >> 1), signed(parent >> 1))
