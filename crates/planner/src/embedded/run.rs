@@ -320,6 +320,7 @@ impl<'a> Planner<'a> {
             let left = left.filter(|_| number == from);
             let unreported = if jobs.is_empty() { unreported } else { 0 };
             let own_task = (number > 0).then_some(&own_task);
+            let budget = budget.saturating_mul(entrant.strategy.share);
             jobs.push(Box::new(move |tell: Tell<'_>| {
                 let own_task = own_task.map(Task::with_own_table);
                 let task = own_task.as_ref().unwrap_or(frame.task);

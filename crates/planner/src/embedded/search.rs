@@ -19,8 +19,7 @@ mod runaway;
 mod states;
 mod strategy;
 mod successors;
-
-use std::collections::VecDeque;
+mod waiting;
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
@@ -39,12 +38,13 @@ pub(crate) use goals::is_goal;
 use goals::misses_goal;
 use known::Hashes;
 use landmarks::SearchLandmarks;
-use node::{DeadEnd, Node, Notes};
+use node::{DeadEnd, NONE, Node, Notes, SharedNotes};
 use novelty::Novelty;
-use queue::{Queue, Waiting};
+use queue::Queue;
 use states::States;
 use strategy::NoveltyOf;
 pub(crate) use strategy::{Aim, Strategy};
+use waiting::{Waiting, WaitingList};
 
 /// A search in progress.
 #[derive(Debug)]
@@ -57,6 +57,7 @@ pub(crate) struct Search<'a> {
     dead_ends: DeadEnds<'a>,
     has_begun: bool,
     nodes: Vec<Node>,
+    shared: SharedNotes,
     /// The states of the nodes.
     states: States,
     /// The nodes by the discrete hash of their states.
@@ -66,7 +67,7 @@ pub(crate) struct Search<'a> {
     all: Queue,
     preferred: Queue,
     /// All successors, first come first served, in a search that has to come by everywhere.
-    oldest: VecDeque<Waiting>,
+    oldest: WaitingList,
     turns: [i64; 2],
     /// The best estimate, and the number of landmarks left where they count.
     best: (u32, u32),
@@ -161,12 +162,13 @@ impl<'a> Search<'a> {
             relaxed,
             has_begun: false,
             nodes: Vec::new(),
+            shared: SharedNotes::default(),
             states: States::default(),
             known: Hashes::default(),
             compared: State::default(),
             all: Queue::default(),
             preferred: Queue::default(),
-            oldest: VecDeque::new(),
+            oldest: WaitingList::default(),
             turns: [0, 0],
             best: (u32::MAX, u32::MAX),
             first_estimate: 0,
@@ -411,13 +413,8 @@ impl<'a> Search<'a> {
         }
         let drift = self.drift(parent, &state, estimate.steps);
         let may_be_better = is_goal && self.may_be_better(&state);
-        let notes = Notes {
-            projection,
-            progress: None,
-            accepted: accepted.into(),
-            drift,
-        };
-        let number = self.add(parent, step, left, state, notes);
+        let notes = Notes { projection, drift };
+        let number = self.add(Waiting::step(parent, step), (accepted, left), state, notes);
         self.known.push(hash);
         // A state in which the goal holds may still have successors worth looking at: the judge can
         // refuse the plan, and another one can be better.
@@ -428,21 +425,27 @@ impl<'a> Search<'a> {
         Turn::Nothing
     }
 
-    /// Adds a node, and returns its number.
-    fn add(&mut self, parent: u32, step: Step, left: u32, state: State, notes: Notes) -> u32 {
+    /// Adds a node, and returns its number. `left`: the accepted landmarks, and the number of those left.
+    fn add(&mut self, origin: Waiting, left: (Vec<u64>, u32), state: State, notes: Notes) -> u32 {
         let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
-        let before = self.nodes.get(parent as usize);
-        let depth = before.map_or(0, |parent| parent.depth + 1);
+        let (accepted, left) = left;
+        let (accepted, memory) = if accepted.is_empty() {
+            (NONE, 0)
+        } else {
+            let size = size_of_val(&accepted[..]);
+            self.shared.accepted.number(accepted.into(), size)
+        };
         let notes = notes.has_any(self.compiled).then(|| Box::new(notes));
-        self.memory += size_of::<Node>() + Hashes::MEMORY_OF_STATE;
+        self.memory += size_of::<Node>() + Hashes::MEMORY_OF_STATE + memory;
         self.memory += notes.as_ref().map_or(0, |notes| notes.size());
-        self.memory += self.states.push(before.map(|_| parent), state);
+        let parent = Some(origin.parent).filter(|&parent| parent != ROOT);
+        self.memory += self.states.push(parent, state);
         self.nodes.push(Node {
-            parent,
-            depth,
+            origin,
             left,
+            accepted,
+            progress: NONE,
             dead_end: DeadEnd::Unchecked,
-            step,
             notes,
         });
         number

@@ -33,8 +33,11 @@ impl Planner<'_> {
         }
         let searches_novelty = tuning.uses(Technique::Novelty) && !self.frame.compiled.is_symbolic;
         if self.has_reservoirs && searches_novelty {
-            // A state can be new because a reservoir is empty, so this search looks ahead as the first one does.
-            strategies.insert(1, Strategy::of(Member::Novelty, tuning).replenishing());
+            let novelty = Strategy::of(Member::Novelty, tuning);
+            // A state can be new because a reservoir is empty, so the first of these refills in estimates as the search
+            // before it does. Refilling can hide progress: the estimate grows with each step that uses something up.
+            let plain = novelty.with_share(tuning.novelty_share);
+            strategies.splice(1..1, [novelty.replenishing(), plain]);
         }
         let counts_landmarks =
             tuning.uses(Technique::Landmarks) && !self.frame.compiled.is_symbolic;

@@ -52,9 +52,12 @@ impl Search<'_> {
     /// The choices that lead to a state.
     pub(super) fn steps_to(&mut self, mut number: u32) -> Vec<Step> {
         let mut steps = Vec::new();
-        while self.nodes[number as usize].parent != ROOT {
-            let node = &self.nodes[number as usize];
-            let (parent, step) = (node.parent, node.step);
+        loop {
+            let origin = self.nodes[number as usize].origin;
+            let Some(step) = origin.next().filter(|_| origin.parent != ROOT) else {
+                break;
+            };
+            let parent = origin.parent;
             let before = self.states.get(parent);
             let single = step.parts(self.compiled, &before);
             steps.extend(single.into_iter().rev());

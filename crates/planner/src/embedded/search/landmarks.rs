@@ -75,11 +75,9 @@ impl Search<'_> {
     /// counts without landmarks, how much of the goal is left.
     pub(super) fn left(&self, parent: u32, state: &State) -> (Vec<u64>, u32) {
         if let SearchLandmarks::Known(landmarks) = &self.landmarks {
-            let notes = self
-                .nodes
-                .get(parent as usize)
-                .and_then(|node| node.notes.as_ref());
-            let before = notes.map(|notes| &notes.accepted[..]);
+            let parent = self.nodes.get(parent as usize);
+            let before = parent.and_then(|parent| self.shared.accepted.get(parent.accepted));
+            let before = before.map(|before| &before[..]);
             return landmarks.progress(self.compiled, before, state);
         }
         match self.strategy.novelty {

@@ -1,21 +1,26 @@
 //! The nodes of a search, and notes of some searches about them.
 
-use super::super::apply::Step;
+use std::hash::Hash;
+
 use super::super::compile::Compiled;
+use super::super::hash::Map;
 use super::super::state::Projection;
 use super::novelty::Progress;
 use super::runaway::Drift;
+use super::waiting::Waiting;
 
 /// A node. Its state is stored elsewhere, as most searches need little memory for a node.
 #[derive(Debug)]
 pub(super) struct Node {
-    pub(super) parent: u32,
-    /// The number of steps that led to it.
-    pub(super) depth: u32,
+    /// The node before it, and the step that led here.
+    pub(super) origin: Waiting,
     /// The number of goals or landmarks left, where that matters.
     pub(super) left: u32,
+    /// Number of its [accepted landmarks](SharedNotes::accepted), or [`NONE`].
+    pub(super) accepted: u32,
+    /// Number of its [progress](SharedNotes::progress), or [`NONE`].
+    pub(super) progress: u32,
     pub(super) dead_end: DeadEnd,
-    pub(super) step: Step,
     /// `None` if there is nothing to note.
     pub(super) notes: Option<Box<Notes>>,
 }
@@ -25,33 +30,23 @@ pub(super) struct Node {
 pub(super) struct Notes {
     /// The part of the unsettled past that matters, in a search that compares it exactly.
     pub(super) projection: Option<Box<Projection>>,
-    /// Progress on the path to it, in a search for new states.
-    pub(super) progress: Option<Progress>,
-    /// The landmarks accepted on the way to it, where they count.
-    pub(super) accepted: Box<[u64]>,
     /// For problems with numbers.
     pub(super) drift: Drift,
 }
 
 impl Notes {
     pub(super) fn has_any(&self, compiled: &Compiled) -> bool {
-        self.projection.is_some() || !self.accepted.is_empty() || !compiled.fluents.is_empty()
+        self.projection.is_some() || !compiled.fluents.is_empty()
     }
 
     /// An estimate of the memory that they take, in bytes.
     pub(super) fn size(&self) -> usize {
         let projection = self.projection.as_ref();
-        size_of::<Self>()
-            + projection.map_or(0, |projection| projection.size())
-            + 8 * self.accepted.len()
+        size_of::<Self>() + projection.map_or(0, |projection| projection.size())
     }
 }
 
 impl Node {
-    pub(super) fn progress(&self) -> Option<&Progress> {
-        self.notes.as_ref()?.progress.as_ref()
-    }
-
     pub(super) fn drift(&self) -> Drift {
         self.notes
             .as_ref()
@@ -68,4 +63,47 @@ pub(super) enum DeadEnd {
     Unproved,
     /// No plan goes through the state.
     Proved,
+}
+
+/// No shared note.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Notes that many nodes have in common.
+#[derive(Debug, Default)]
+pub(super) struct SharedNotes {
+    /// The landmarks accepted on the way to a node, where they count.
+    pub(super) accepted: Shared<Box<[u64]>>,
+    /// Progress on the path to a node, in a search for new successors.
+    pub(super) progress: Shared<Progress>,
+}
+
+/// Numbered values without duplicates.
+#[derive(Debug)]
+pub(super) struct Shared<T> {
+    values: Map<T, ()>,
+}
+
+impl<T> Default for Shared<T> {
+    fn default() -> Self {
+        Self {
+            values: Map::default(),
+        }
+    }
+}
+
+/// An estimate of the memory that a table needs for an entry, in bytes, without the value.
+const MEMORY_OF_ENTRY: usize = 32;
+
+impl<T: Hash + Eq> Shared<T> {
+    /// Returns the number of a value, and the memory that it takes if it is new. `size`: that of the value.
+    pub(super) fn number(&mut self, value: T, size: usize) -> (u32, usize) {
+        let (number, known) = self.values.insert_full(value, ());
+        let memory = known.map_or(MEMORY_OF_ENTRY + size, |()| 0);
+        (u32::try_from(number).unwrap_or(NONE), memory)
+    }
+
+    pub(super) fn get(&self, number: u32) -> Option<&T> {
+        let (value, ()) = self.values.get_index(number as usize)?;
+        Some(value)
+    }
 }

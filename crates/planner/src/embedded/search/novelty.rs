@@ -27,7 +27,7 @@ pub(super) struct Novelty {
 }
 
 /// Progress along the path to a state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Progress {
     goals_left: u32,
     /// The relaxed plan of the last state in which a goal was reached.

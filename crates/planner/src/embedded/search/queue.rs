@@ -1,60 +1,14 @@
-//! What waits for its turn.
+//! Queues of waiting successors, by rank.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 use super::super::apply::Step;
-
-/// A successor that waits, or all successors of a state. Many wait, so each is small.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Waiting {
-    pub(super) parent: u32,
-    /// The number of the step, and in the lowest bits its kind.
-    step: u32,
-}
-
-/// The number of bits for the kind of a step.
-const KIND_BITS: u32 = 3;
-
-impl Waiting {
-    pub(super) fn step(parent: u32, step: Step) -> Self {
-        let (number, kind) = match step {
-            Step::Start(action) => (action, 0),
-            Step::Compressed(action) => (action, 1),
-            Step::Macro(number) => (number, 2),
-            Step::End(place) => (place, 3),
-            Step::Timed => (0, 4),
-        };
-        debug_assert!(
-            number < 1 << (u32::BITS - KIND_BITS),
-            "memory is used up long before"
-        );
-        let step = number << KIND_BITS | kind;
-        Self { parent, step }
-    }
-
-    /// All successors, which are listed when their turn comes.
-    pub(super) fn all_of(parent: u32) -> Self {
-        Self { parent, step: 5 }
-    }
-
-    /// The step; `None` for all of them.
-    pub(super) fn next(self) -> Option<Step> {
-        let number = self.step >> KIND_BITS;
-        match self.step & ((1 << KIND_BITS) - 1) {
-            0 => Some(Step::Start(number)),
-            1 => Some(Step::Compressed(number)),
-            2 => Some(Step::Macro(number)),
-            3 => Some(Step::End(number)),
-            4 => Some(Step::Timed),
-            _ => None,
-        }
-    }
-}
+use super::waiting::{Waiting, WaitingList};
 
 /// Successors by rank, the lowest first; of one rank, first come first served.
 #[derive(Debug, Default)]
 pub(super) struct Queue {
-    buckets: BTreeMap<i64, VecDeque<Waiting>>,
+    buckets: BTreeMap<i64, WaitingList>,
     is_turn_of_newest: bool,
 }
 
@@ -63,8 +17,9 @@ impl Queue {
         self.buckets.is_empty()
     }
 
-    pub(super) fn push(&mut self, rank: i64, waiting: Waiting) {
-        self.buckets.entry(rank).or_default().push_back(waiting);
+    /// Adds a successor, and returns the number of bytes that it takes.
+    pub(super) fn push(&mut self, rank: i64, waiting: Waiting) -> usize {
+        self.buckets.entry(rank).or_default().push_back(waiting)
     }
 
     /// The first one, and its rank.
@@ -154,22 +109,5 @@ mod tests {
         assert_eq!(steps, expected.map(|waiting| (0, waiting)));
         queue.put_back(0, 8, &[]);
         assert_eq!(parents(|| queue.pop()), [0, 1, 2, 3, 9]);
-    }
-
-    #[test]
-    fn a_step_is_read_as_it_was_written() {
-        for number in [0, 1, 7, 8, (1 << 29) - 1] {
-            let steps = [
-                Step::Start(number),
-                Step::Compressed(number),
-                Step::Macro(number),
-                Step::End(number),
-                Step::Timed,
-            ];
-            for step in steps {
-                assert_eq!(Waiting::step(3, step).next(), Some(step));
-            }
-        }
-        assert_eq!(Waiting::all_of(3).next(), None);
     }
 }

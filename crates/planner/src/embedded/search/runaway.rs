@@ -35,7 +35,7 @@ impl Search<'_> {
         }
         let facts = state.fact_hash();
         let parent = self.nodes.get(parent as usize);
-        let grandparent = parent.and_then(|parent| self.nodes.get(parent.parent as usize));
+        let grandparent = parent.and_then(|parent| self.nodes.get(parent.origin.parent as usize));
         let mut before = [parent, grandparent].into_iter().flatten().map(Node::drift);
         let similar = before.find(|drift| drift.facts == facts);
         let length = match similar {

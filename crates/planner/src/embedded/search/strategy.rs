@@ -37,6 +37,8 @@ pub(crate) struct Strategy {
     pub(crate) joins: bool,
     /// `true` if the number of steps that led to a state is added to its estimate.
     pub(crate) counts_steps: bool,
+    /// The number of states that it visits in a round before the first plan, in relation to other searches.
+    pub(crate) share: u64,
     /// The aim.
     pub(crate) aim: Aim,
 }
@@ -80,6 +82,7 @@ impl Strategy {
         replenishes: false,
         joins: false,
         counts_steps: false,
+        share: 1,
         aim: Aim::Goal,
     };
 
@@ -185,6 +188,11 @@ impl Strategy {
             replenishes: true,
             ..self
         }
+    }
+
+    /// The same, with another share of a round.
+    pub(crate) fn with_share(self, share: u64) -> Self {
+        Self { share, ..self }
     }
 
     /// The same, adding the number of steps to the estimate.

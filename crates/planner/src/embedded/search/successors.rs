@@ -5,11 +5,9 @@ use super::super::compile::NONE;
 use super::super::relaxed::{Estimate, OVERDRAWN};
 use super::super::state::State;
 use super::super::time::NEVER;
-use super::queue::Waiting;
-use super::{Aim, Node, NoveltyOf, Search};
-
-/// An estimate of the memory that a waiting successor takes, in bytes.
-const WAITING_MEMORY: usize = 12;
+use super::novelty::Progress;
+use super::waiting::Waiting;
+use super::{Aim, NoveltyOf, ROOT, Search};
 
 impl Search<'_> {
     /// Lets the successors wait for their turn.
@@ -38,29 +36,24 @@ impl Search<'_> {
         }
         let rank = self.rank(number, estimate.steps);
         for &step in &estimate.preferred {
-            self.preferred.push(rank, Waiting::step(number, step));
+            self.memory += self.preferred.push(rank, Waiting::step(number, step));
         }
         self.generated += estimate.applicable.len() as u64;
-        let mut waiting = estimate.preferred.len();
         if self.is_timeless && !estimate.applicable.is_empty() {
             // Most of them never have their turn, and they are the same whenever they are listed.
-            self.all.push(rank, Waiting::all_of(number));
-            waiting += 1;
-            if self.strategy.is_complete() {
-                self.oldest.push_back(Waiting::all_of(number));
-                waiting += 1;
-            }
+            self.add_waiting(rank, Waiting::all_of(number));
         } else {
-            let steps = estimate.applicable.iter();
-            let all = steps.map(|&step| Waiting::step(number, step));
-            all.clone().for_each(|step| self.all.push(rank, step));
-            waiting += estimate.applicable.len();
-            if self.strategy.is_complete() {
-                self.oldest.extend(all);
-                waiting += estimate.applicable.len();
+            for &step in &estimate.applicable {
+                self.add_waiting(rank, Waiting::step(number, step));
             }
         }
-        self.memory += WAITING_MEMORY * waiting;
+    }
+
+    fn add_waiting(&mut self, rank: i64, waiting: Waiting) {
+        self.memory += self.all.push(rank, waiting);
+        if self.strategy.is_complete() {
+            self.memory += self.oldest.push_back(waiting);
+        }
     }
 
     /// The successor of the lowest rank.
@@ -108,12 +101,10 @@ impl Search<'_> {
         let Some(mut novelty) = self.novelty.take() else {
             return;
         };
-        let node = &self.nodes[number as usize];
-        let before = self.nodes.get(node.parent as usize);
-        let before = before.and_then(Node::progress);
         let state = self.states.get(number);
+        let node = &self.nodes[number as usize];
+        let before = self.progress(node.origin.parent);
         let progress = novelty.progress(&state, node.left, before, &estimate.subgoals);
-        self.memory += progress.size();
         self.weighed += estimate.applicable.len() as u64;
         for &step in &estimate.applicable {
             let Some((_, next)) = self.make(&state, step) else {
@@ -125,15 +116,16 @@ impl Search<'_> {
             self.memory += memory;
             let rank = new << 48 | i64::from(worth.0) << 24;
             self.generated += 1;
-            self.memory += WAITING_MEMORY;
+            let waiting = Waiting::step(number, step);
             if estimate.preferred.binary_search(&step).is_ok() {
-                self.memory += WAITING_MEMORY;
-                self.preferred.push(rank, Waiting::step(number, step));
+                self.memory += self.preferred.push(rank, waiting);
             }
-            self.all.push(rank, Waiting::step(number, step));
+            self.memory += self.all.push(rank, waiting);
         }
-        let notes = &mut self.nodes[number as usize].notes;
-        notes.get_or_insert_default().progress = Some(progress);
+        let size = progress.size();
+        let (progress, memory) = self.shared.progress.number(progress, size);
+        self.nodes[number as usize].progress = progress;
+        self.memory += memory;
         self.novelty = Some(novelty);
     }
 
@@ -143,9 +135,24 @@ impl Search<'_> {
         if self.strategy.novelty != Some(NoveltyOf::Successors) {
             return true;
         }
-        let parent = self.nodes.get(parent as usize);
-        let progress = parent.and_then(Node::progress);
+        let progress = self.progress(parent);
         progress.is_none_or(|before| before.has_new_goal(left))
+    }
+
+    /// Progress on the path to a node.
+    fn progress(&self, number: u32) -> Option<&Progress> {
+        let node = self.nodes.get(number as usize)?;
+        self.shared.progress.get(node.progress)
+    }
+
+    /// The number of steps that led to a node.
+    fn depth(&self, number: u32) -> i64 {
+        let parent = |node: &u32| {
+            let parent = self.nodes[*node as usize].origin.parent;
+            (parent != ROOT).then_some(parent)
+        };
+        let steps = std::iter::successors(Some(number), parent).skip(1);
+        i64::try_from(steps.count()).unwrap_or(i64::MAX)
     }
 
     /// What a state has used up of what is not filled up, all of it counting as much as the way to
@@ -182,7 +189,7 @@ impl Search<'_> {
         let drift = self.nodes[number as usize].drift().penalty();
         let mut estimate = i64::from(estimate) + self.penalty(number) + drift;
         if self.strategy.counts_steps {
-            estimate += i64::from(self.nodes[number as usize].depth);
+            estimate += self.depth(number);
         }
         let (Aim::WeightedAStar(factor), Some(step_costs)) = (self.strategy.aim, &self.step_costs)
         else {
