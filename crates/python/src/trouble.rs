@@ -8,8 +8,11 @@ use elbowroom::answers::plan::PlannerFailure;
 use elbowroom::execute::SpecError;
 use elbowroom::num::Rational;
 use elbowroom::text::Diagnostics;
+use elbowroom_executive::run::RunError;
 use elbowroom_laboratory::answer::CompareError;
 use pyo3::prelude::*;
+
+use crate::executive::advised;
 
 /// Why there is no answer.
 pub(crate) enum Trouble {
@@ -21,6 +24,8 @@ pub(crate) enum Trouble {
     Unsupported(String),
     /// The judge cannot tell.
     Undecided(String),
+    /// An executive cannot be started or resumed.
+    Executive(String),
     /// A planner could not be run.
     Planner(String),
     /// Something in Python has failed, which says so itself.
@@ -42,6 +47,7 @@ impl Trouble {
             Self::Request(message) => exception(py, "RequestError", (message,)),
             Self::Unsupported(message) => exception(py, "UnsupportedError", (message,)),
             Self::Undecided(message) => exception(py, "UndecidedError", (message,)),
+            Self::Executive(message) => exception(py, "ExecutiveError", (message,)),
             Self::Planner(message) => exception(py, "PlannerError", (message,)),
             Self::Python(error) => error,
         }
@@ -76,6 +82,16 @@ impl From<SpecError> for Trouble {
             SpecError::World(wrong) | SpecError::Likelihoods(wrong) => Self::Read(wrong),
             SpecError::Planner(wrong) => Self::Planner(wrong.to_string()),
             other => Self::request(other),
+        }
+    }
+}
+
+impl From<RunError> for Trouble {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Problem(wrong) => Self::Read(wrong),
+            RunError::Spec(wrong) => wrong.into(),
+            RunError::Failed(error) => Self::Executive(advised(&error)),
         }
     }
 }

@@ -54,6 +54,14 @@ pub struct RunSpec {
     /// The command line of the process that is the world.
     #[serde(deserialize_with = "required")]
     pub world_process: Option<String>,
+    /// `true` if the world is an object in the process of the run, and `world_process` its description. Omitted if
+    /// `false`.
+    #[serde(
+        default,
+        rename = "embedded_world",
+        skip_serializing_if = "std::ops::Not::not"
+    )]
+    pub is_world_embedded: bool,
     /// A world that lets each action end when that is worst; left out where it is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spoiler: Option<Spoiler>,
@@ -207,6 +215,7 @@ impl RunSpec {
             problem,
             world: None,
             world_process: None,
+            is_world_embedded: false,
             spoiler: None,
             planner: EMBEDDED.to_owned(),
             planner_time: None,

@@ -128,6 +128,7 @@ pub(in crate::commands) fn run(
     let task = Arc::new(super::task(&spec, output)?);
     let interrupt = Interrupt::listen_with_world();
     let settings = ResumeSettings {
+        embedded: None,
         task: &task,
         background: background(arguments, &interrupt),
         limits: limits(arguments),
