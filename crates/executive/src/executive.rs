@@ -163,8 +163,11 @@ impl Executive {
         let mut header = |line: &str| buffer.add(line);
         let written = TraceWriter::new(Arc::clone(&task), &mut header).header(&spec);
         written.map_err(|error| Error::new(format!("cannot write the trace: {error}"), ""))?;
+        let status = Status::new(&task, spec.timeout.clone());
+        // Until its journal is replayed.
+        status.set_replayed(matches!(start, Start::Resumed(_)));
         Ok(Self {
-            status: Status::new(&task, spec.timeout.clone()),
+            status,
             checks: task.with_own_table(),
             spec,
             task,

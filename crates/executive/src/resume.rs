@@ -105,11 +105,8 @@ impl InterruptedRun {
             stored.map_err(|error| unreadable(&name, &error.to_string(), OTHER_VERSION))
         };
         let mut stored = read(&journal)?;
-        // A world that has died may be started again.
-        if let Some(Line::Over(report)) = stored.lines.last()
-            && report.verdict == WORLD_FAILED
-        {
-            journal = journal.without_last();
+        if let Some(end) = end_by_world(&stored.lines) {
+            journal = journal.truncated(stored.first_number() - 1 + end);
             stored = read(&journal)?;
         }
         if let Some(Line::Over(report)) = stored.lines.last()
@@ -313,6 +310,18 @@ const WORLD_FAILED: &str = "world-failed";
 /// Verdicts of a run without a plan, which can be resumed. Earlier versions used the first for failed planners as
 /// well.
 const WITHOUT_PLAN: [&str; 2] = ["no-plan", "planner-failed"];
+
+/// Returns the number of lines before the end of a run whose world has failed. Such a world may be replaced, or started
+/// again.
+fn end_by_world(lines: &[Line]) -> Option<usize> {
+    let is_end = |line: &Line| match line {
+        // The cancellations that follow are repeated.
+        Line::WorldFailed(_) => true,
+        Line::Over(report) => report.verdict == WORLD_FAILED,
+        _ => false,
+    };
+    lines.iter().position(is_end)
+}
 
 /// Returns `true` for an answer of the world.
 fn is_answer(line: &Line) -> bool {

@@ -1,46 +1,39 @@
-"""Executive in this process: it pursues a goal, is killed, and resumes. Run it in the root of the repository."""
+"""Executive in this process: it pursues goals, is killed, and resumes. `python restart.py JOURNAL` in the repository"""
 
 import os
-import signal
 import subprocess
 import sys
-import tempfile
 
 import elbowroom
+
+CASE = ("cases/delivery/domain.pddl", "cases/delivery/problem.pddl")
 
 
 class Robot(elbowroom.SteppedWorld):
     speed = 20.0  # simulated seconds in one second
-
-    def __init__(self):
-        super().__init__()
-        self.left = {}  # seconds until each action ends
+    ends = {}  # the time at which each running action ends
 
     def begin(self, action):
-        self.left[action] = float(action.duration)
+        self.ends[action] = self.now + action.duration
 
     def step(self, dt):
-        for action in [*self.left]:
-            self.left[action] -= dt
-            if self.left[action] < dt / 2:
-                del self.left[action]
-                self.succeeded(action)
+        for action in [it for it, end in self.ends.items() if end <= self.now]:
+            del self.ends[action]
+            self.succeeded(action)
 
     def cancel(self, action):
-        del self.left[action]
+        del self.ends[action]
 
-    def resume(self, now, actions):  # this robot has finished its actions without the executive
+    def resume(self, now, actions):  # this robot has finished its actions on its own
         return now, [elbowroom.ended(action, now) for action in actions]
 
 
-if len(sys.argv) > 1:  # the process that is killed
-    case = "cases/delivery/domain.pddl", "cases/delivery/problem.pddl"
-    executive = elbowroom.Executive(*case, world=Robot(), journal=sys.argv[1])
+if len(sys.argv) > 2:  # the process that is killed
+    executive = elbowroom.Executive(*CASE, world=Robot(), journal=sys.argv[1])
     executive.wait("problem", timeout=60)
     executive.submit("(at rover depot)", name="home")
-    os.kill(os.getpid(), signal.SIGKILL)
+    os.kill(os.getpid(), 9)
 
-journal = os.path.join(tempfile.mkdtemp(), "robot.journal")
-subprocess.run([sys.executable, __file__, journal])
-with elbowroom.Executive.resume(journal, Robot()) as executive:
+subprocess.run([sys.executable, __file__, sys.argv[1], "first"])
+with elbowroom.Executive.resume(sys.argv[1], Robot()) as executive:
     print(executive.wait("home", timeout=60))

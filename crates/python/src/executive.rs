@@ -206,9 +206,14 @@ impl Executive {
         guarded(py, || Ok(json(&self.inner.published().plan())))
     }
 
-    /// Whether the run has processed all requests and replays no journal.
-    fn is_settled(&self) -> bool {
-        self.inner.is_idle() && !self.inner.published().is_replayed()
+    /// Whether the run has processed all requests.
+    fn is_idle(&self) -> bool {
+        self.inner.is_idle()
+    }
+
+    /// Whether the run replays its journal, so that its state is one of the past.
+    fn is_replayed(&self) -> bool {
+        self.inner.published().is_replayed()
     }
 
     /// The lines of the trace after line `sent`, the number of earlier lines that are no longer kept, the number of the

@@ -338,13 +338,14 @@ class Executive:
         deadline = None if limit is None else time.monotonic() + limit
         line = 0
         while True:
-            is_over, is_settled = self._over.is_set(), self._native.is_settled()
+            is_over, is_idle = self._over.is_set(), self._native.is_idle()
+            is_past = self._native.is_replayed()
             found = self._find(goal)
-            if found is not None and is_settled and not found.is_undecided:
+            if found is not None and not (is_past or found.is_undecided):
                 return found
             if is_over:
                 self._raise_ended()
-            if found is None and is_settled:
+            if found is None and is_idle and not is_past:
                 raise self._unknown(goal)
             left = POLL_INTERVAL if deadline is None else deadline - time.monotonic()
             if left <= 0:

@@ -181,6 +181,10 @@ class Lifecycle:
         self._now = passed["now"]
         self.clock.begin(Fraction(self._now))
         self._is_clock_new = False
+        reported = {fields.get("ticket") for fields in passed["observations"]}
+        for ticket in known.keys() - reported:
+            # It has failed.
+            del self._open[ticket]
         self._note(passed["observations"])
         return json.dumps(passed)
 
