@@ -206,6 +206,7 @@ def test_goal_is_cancelled_and_fact_is_believed() -> None:
         assert seen["observations"][0]["value"] == Fraction(1, 3)
 
 
+@pytest.mark.filterwarnings("ignore::elbowroom.InterruptedWarning")
 def test_operator_reports_outcomes() -> None:
     fault = Fault("well")
     with Executive(*CASE, world=WORLDS["World"](fault)) as executive:
@@ -237,22 +238,21 @@ def test_events_come_until_the_end() -> None:
 def test_requests_come_from_all_threads() -> None:
     """Also from methods of the world, which the run waits for."""
     answers: list[Any] = []
+    ready, is_asked = threading.Event(), threading.Event()
 
     class Asking(Depot):
         def begin(self, action):
             super().begin(action)
-            if not answers:
+            if len(self.begun) == 1:
+                ready.wait(HANG)
                 answers.append(executive.submit(HOME, name="first"))
                 with pytest.raises(RuntimeError, match="request_stop"):
                     executive.stop()
                 with pytest.raises(RuntimeError, match="request_stop"):
                     executive.wait("first")
+                is_asked.set()
 
-    ready = threading.Event()
-    world = Asking()
-    original = world.begin
-    world.begin = lambda action: (ready.wait(HANG), original(action))  # type: ignore[method-assign]
-    with Executive(*CASE, world=world) as executive:
+    with Executive(*CASE, world=Asking()) as executive:
         ready.set()
         threads = [
             threading.Thread(target=lambda n=n: answers.append(executive.submit(HOME, name=f"t{n}")))
@@ -262,6 +262,7 @@ def test_requests_come_from_all_threads() -> None:
             thread.start()
         for thread in threads:
             thread.join()
+        is_asked.wait(HANG)
         for name in ["first", *(f"t{n}" for n in range(8))]:
             assert executive.wait(name, HANG)
     assert len(answers) == 9
@@ -462,8 +463,8 @@ def test_action_that_the_new_world_does_not_know_has_failed(tmp_path: Path, worl
         executive.fact("(idle rover)")
         executive.unpause()
         assert executive.wait(executive.submit(HOME, name="again"), HANG)
-    outcomes = [row.outcome for row in executive.stop().rows() if "office depot" in row.action]
-    assert outcomes[0] == "failed"
+    why = "the world knows nothing" if world is Lasting else "the world cannot say"
+    assert sum(why in line for line in executive.stop().trace_text.splitlines()) > 0
     # A world that knows of the earlier process cancels what it has forgotten. A new one has nothing to cancel.
     cancelled = getattr(robot, "cancelled", None)
     assert cancelled is None or cancelled[0].startswith("(drive rover office")
@@ -536,6 +537,7 @@ def test_world_of_a_journal_is_given_again(tmp_path: Path) -> None:
     assert done.returncode == 2 and "python Lasting" in done.stderr
 
 
+@pytest.mark.filterwarnings("ignore::elbowroom.ExecutiveWarning")
 def test_world_that_is_a_process_is_resumed(tmp_path: Path) -> None:
     journal = tmp_path / "robot.journal"
     program = """
