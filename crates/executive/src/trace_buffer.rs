@@ -215,7 +215,7 @@ impl TraceBuffer {
     }
 
     /// Returns the lines after line `sent`, without their line feeds. Waits for at most `timeout` if there are none and
-    /// the run goes on.
+    /// the run continues.
     pub fn lines_after(&self, sent: usize, timeout: Duration) -> NewLines {
         let waits = |state: &mut State| state.lines() <= sent && !state.is_over;
         let waited = self

@@ -105,7 +105,7 @@ fn goal_is_reached_in_simulated_world() {
     assert_eq!(late, Ok(RequestStatus::RunEnded));
 }
 
-/// World in this process in which everything goes as planned, until it fails after a number of starts.
+/// World in this process that executes actions as planned, and fails after a number of starts.
 struct Robot {
     now: Rational,
     coming: Vec<Observation>,
@@ -195,7 +195,7 @@ fn succeeded(ticket: Ticket) -> Event {
     }
 }
 
-/// The first world fails when it is told to start the third action. The second world has finished that action.
+/// The first world fails at the start of the third action. The second world has finished that action.
 #[test]
 fn run_in_failed_world_is_resumed_in_another_one() {
     let folder = folder("embedded");

@@ -29,8 +29,8 @@ type Outcome = (String, Option<String>, Option<String>, Option<Py<PyAny>>);
 
 #[pymethods]
 impl Executive {
-    /// Creates an executive for the problem and the options of a run. `segments` are the length of a journal from which
-    /// it is rotated, and the number of earlier segments that are kept. `warn` receives warnings.
+    /// Creates an executive for the problem and the options of a run. `segments` are the length from which a journal is
+    /// rotated, and the number of earlier segments that are kept. `warn` receives warnings.
     #[new]
     fn new(
         py: Python<'_>,
@@ -206,12 +206,12 @@ impl Executive {
         guarded(py, || Ok(json(&self.inner.published().plan())))
     }
 
-    /// Whether the run has processed all requests.
+    /// Returns `true` if the run has processed all requests.
     fn is_idle(&self) -> bool {
         self.inner.is_idle()
     }
 
-    /// Whether the run replays its journal, so that its state is one of the past.
+    /// Returns `true` if the run replays its journal, so that its state is one of the past.
     fn is_replayed(&self) -> bool {
         self.inner.published().is_replayed()
     }

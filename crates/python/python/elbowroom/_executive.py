@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextvars
 import json
 import os
-import threading
 import time
 import warnings
-import weakref
 from collections.abc import Iterator
 from fractions import Fraction
-from types import TracebackType
-from typing import Any, NoReturn
+from typing import Any
 
 from . import _executive_answers as answers
 from . import _native
-from ._answers import Run
-from ._calls import has_coroutines
-from ._errors import ExecutiveError, ExecutiveWarning, InterruptedWarning, RequestError
+from ._background_run import BackgroundRun
+from ._errors import ExecutiveError, ExecutiveWarning, RequestError
 from ._executive_answers import Goal, PlannedAction, Status
-from ._lifecycle import POLL_INTERVAL, CtrlC, Lifecycle
+from ._lifecycle import POLL_INTERVAL
 from ._numbers import Number, document, text
 from ._problem import read
-from ._runs import concluded, description, run_options, world_lifecycle
+from ._runs import description, run_options
 from ._stepped import SteppedWorld
 from ._texts import Text, named_text, seconds
 from ._world import Action, AsyncWorld, World
@@ -32,14 +26,11 @@ from ._world import Action, AsyncWorld, World
 ACCEPT_TIME = 2.0
 """Seconds for the run to process a request. Later it processes the request all the same."""
 
-ABANDON_TIME = 1.0
-"""Seconds for the run to end after the third Ctrl-C."""
-
 JOURNAL_SIZE = 10_000_000
 """Length from which a journal is rotated by default, in bytes."""
 
 
-class Executive:
+class Executive(BackgroundRun):
     """Run that accepts goals, facts and pauses until it is stopped. With a journal, it resumes after a crash.
 
     It runs in the background from its creation on. All methods can be called from any thread. Leaving a ``with`` block
@@ -113,7 +104,7 @@ class Executive:
             chosen["embedded_world"] = True
         segments = _segments(journal_size, journal_segments)
         given = json.dumps(chosen)
-        self.warnings = []
+        self._begin()
         self._start(
             _native.Executive(native, given, journal, segments, planner_memory, self._warn), world
         )
@@ -142,7 +133,7 @@ class Executive:
                 finished run; or if the world is missing.
         """
         executive = cls.__new__(cls)
-        executive.warnings = []
+        executive._begin()
         segments = _segments(journal_size, journal_segments)
         native = _native.Executive.resume(journal, segments, planner_memory, executive._warn)
         name = native.embedded_world()
@@ -155,49 +146,10 @@ class Executive:
         executive._start(native, world)
         return executive
 
-    def _start(self, native: _native.Executive, world: Any) -> None:
-        self._native = native
-        self._lifecycle: Lifecycle | None = None
-        if world is not None:
-            self._lifecycle = world_lifecycle(world, native.request_stop, loop=_loop(world))
-        self._over = threading.Event()
-        self._run: Run | None = None
-        self._failure: BaseException | None = None
-        self._late: list[str] = []
+    def _begin(self) -> None:
+        self.warnings = []
         # Times before the submissions of goals, by name: earlier goals may have had the same names.
         self._given: dict[str, Fraction] = {}
-        context = contextvars.copy_context()
-        # No daemon: native code must not run while the interpreter is finalized.
-        self._thread = threading.Thread(
-            target=context.run, args=(self._work,), name="elbowroom-executive"
-        )
-        self._thread.start()
-        _stop_after_main(self)
-
-    def _work(self) -> None:
-        try:
-            self._execute()
-        except BaseException as error:
-            self._failure = error
-        finally:
-            self._over.set()
-
-    def _execute(self) -> None:
-        lifecycle = self._lifecycle
-        try:
-            answer, record, lost, raised = self._native.run(lifecycle)
-        except BaseException:
-            if lifecycle is not None and lifecycle.is_begun:
-                lifecycle.finish()
-            raise
-        failure = None if lifecycle is None else lifecycle.finish()
-        self._run = Run(document(answer), record)
-        self._late = concluded(self._run, raised, failure, lifecycle)
-        if lost is not None:
-            raise ExecutiveError(
-                f"the journal cannot be written: {lost}; make room on the disk, and resume the run from it",
-                self._run,
-            )
 
     def _warn(self, message: str) -> None:
         self.warnings.append(message)
@@ -379,111 +331,10 @@ class Executive:
             if is_over:
                 return
 
-    # The end.
-
-    @property
-    def is_over(self) -> bool:
-        """``True`` once the executive has ended."""
-        return self._over.is_set()
-
-    def request_stop(self) -> None:
-        """Requests an orderly end, and returns at once. For signal handlers, and for methods of the world."""
-        if self._lifecycle is None:
-            self._native.request_stop()
-        else:
-            self._lifecycle.request_end()
-
-    def stop(self) -> Run:
-        """Stops the executive in order, within 6 s, and returns what was done.
-
-        A first and a second Ctrl-C meanwhile are raised afterwards; a third ends the run at once.
-
-        Raises:
-            WorldError: if the world has failed.
-            ExecutiveError: if the journal cannot be written.
-        """
-        self._refuse_in_world("stop")
-        self.request_stop()
-        lifecycle = self._lifecycle
-        if lifecycle is not None:
-            before = lifecycle.interrupts
-            with CtrlC(lifecycle):
-                self._await_end(lifecycle)
-            if lifecycle.interrupts > before:
-                raise KeyboardInterrupt
-        run = self.join()
-        assert run is not None
-        return run
-
-    def join(self, timeout: float | None = None) -> Run | None:
-        """Waits until the executive has ended. Returns what was done, or ``None`` after ``timeout`` seconds.
-
-        Raises:
-            WorldError: if the world has failed.
-            ExecutiveError: if the journal cannot be written.
-        """
-        self._refuse_in_world("join")
-        if not self._over.wait(seconds(timeout)):
-            return None
-        if self._failure is not None:
-            raise self._failure
-        late, self._late = self._late, []
-        for message in late:
-            warnings.warn(message, InterruptedWarning, 3)
-        return self._run
-
-    def _await_end(self, lifecycle: Lifecycle) -> None:
-        abandoned: float | None = None
-        while not self._over.wait(POLL_INTERVAL):
-            if lifecycle.is_abandoned:
-                abandoned = abandoned or time.monotonic()
-                if time.monotonic() - abandoned > ABANDON_TIME:
-                    return
-
-    def __enter__(self) -> Executive:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if isinstance(error, KeyboardInterrupt) and self._lifecycle is not None:
-            self._lifecycle.interrupt()
-        try:
-            self.stop()
-        except BaseException:
-            # The first exception counts.
-            if error is None:
-                raise
-
-    async def __aenter__(self) -> Executive:
-        return self
-
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        # The event loop continues, for the coroutines of the world.
-        await asyncio.to_thread(self.__exit__, kind, error, trace)
-
     def __repr__(self) -> str:
         return f"<Executive: {self.status().activity}>"
 
     # Helpers.
-
-    def _is_in_world(self) -> bool:
-        return self._lifecycle is not None and self._lifecycle.is_in_world
-
-    def _refuse_in_world(self, method: str) -> None:
-        if self._is_in_world():
-            raise RuntimeError(
-                f"{method}() waits for the world, so that it cannot be called in its thread or event loop; "
-                f"call request_stop(), or `await asyncio.to_thread(executive.{method}, …)`"
-            )
 
     def _find(self, name: str) -> Goal | None:
         since = self._given.get(name)
@@ -497,13 +348,6 @@ class Executive:
         known = ", ".join(goal.name for goal in self.goals() if goal.is_open) or "none"
         return RequestError(f"there is no goal of the name {name!r}; open goals: {known}")
 
-    def _raise_ended(self) -> NoReturn:
-        self._over.wait(ACCEPT_TIME)
-        if self._failure is not None:
-            raise self._failure
-        raise ExecutiveError("the executive has ended", self._run)
-
-
 def _text(number: Number | None) -> str | None:
     return None if number is None else text(number)
 
@@ -513,36 +357,3 @@ def _segments(size: int, kept: int) -> tuple[int, int]:
         if number < 0:
             raise RequestError(f"`{name}` is {number}; give a number from 0 on")
     return size, kept
-
-
-def _loop(world: object) -> asyncio.AbstractEventLoop | None:
-    """The running event loop, for a world whose methods are coroutines."""
-    if not (isinstance(world, AsyncWorld) or has_coroutines(world)):
-        return None
-    try:
-        return asyncio.get_running_loop()
-    except RuntimeError:
-        raise TypeError("this world has coroutines; make the executive in a coroutine") from None
-
-
-_running: weakref.WeakSet[Executive] = weakref.WeakSet()
-_watcher: threading.Thread | None = None
-_lock = threading.Lock()
-
-
-def _stop_after_main(executive: Executive) -> None:
-    """Stops an executive when the main thread has ended, so that the process can exit."""
-    global _watcher
-    with _lock:
-        _running.add(executive)
-        if _watcher is None or not _watcher.is_alive():
-            _watcher = threading.Thread(target=_stop_all, name="elbowroom-exit")
-            _watcher.start()
-
-
-def _stop_all() -> None:
-    threading.main_thread().join()
-    with _lock:
-        executives = list(_running)
-    for executive in executives:
-        executive.request_stop()

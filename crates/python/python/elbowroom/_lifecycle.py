@@ -76,7 +76,7 @@ class Lifecycle:
         # The run has cancelled its actions, or does so next; waits are for late outcomes only.
         self._is_closing = False
         self._is_abandoned = False
-        # The clock of a resumed world begins anew at its next answer.
+        # The clock of a resumed world restarts at its next answer.
         self._is_clock_new = False
         # The first failure after the request to end.
         self._failure: Exception | None = None

@@ -133,7 +133,7 @@ class World:
 
         Returns what time it is, and :func:`started` or :func:`ended` for each action whose outcome is known. The others
         have failed, and are cancelled. ``None``: nothing of the actions runs any more; all of them have failed, and the
-        clock of this world begins anew.
+        clock of this world restarts.
         """
         return None
 
