@@ -192,3 +192,13 @@ def test_example_resumes(tmp_path: Path) -> None:
         command, cwd=ROOT, env=environment, timeout=2 * HANG, capture_output=True, text=True
     )
     assert done.returncode == 0 and "state='achieved'" in done.stdout, done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+def test_journal_that_cannot_be_written_ends_the_executive() -> None:
+    world = Depot()
+    with ended(Executive(*CASE, world=world, journal="/dev/full")) as executive:
+        for call in (executive.stop, lambda: executive.wait("problem"), lambda: executive.submit(HOME)):
+            with pytest.raises(elbowroom.ExecutiveError, match="cannot write the journal"):
+                call()
+    assert world.begun == []

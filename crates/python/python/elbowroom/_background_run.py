@@ -118,7 +118,8 @@ class BackgroundRun:
             ExecutiveError: if the journal cannot be written.
         """
         self._refuse_in_world("join")
-        if not self._over.wait(seconds(timeout)):
+        limit = seconds(timeout)
+        if not self._over.wait(None if limit is None else min(limit, threading.TIMEOUT_MAX)):
             return None
         if self._failure is not None:
             raise self._failure
