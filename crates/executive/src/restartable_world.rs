@@ -3,23 +3,19 @@
 //!
 //! After that, the world is asked about the actions that were running. Those that it does not know have failed.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom::execution::{
     Command, Ending, Event, Observation, Passage, Ticket, World, WorldError,
 };
-use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
-use elbowroom::num::work::Stop;
 
 use crate::belief_updates::BeliefUpdates;
 use crate::clock::Clock;
-use crate::error::{Error, WarningSink};
-use crate::process_world::ProcessLimits;
+use crate::error::Error;
 use crate::running_actions::RunningActions;
-use crate::world_connection::{WorldConnection, WorldSource};
+use crate::world_connection::{Launch, WorldConnection, WorldSource};
 
 /// Delay before the first restart. Each further one in a row takes twice as long.
 const FIRST_DELAY: Duration = Duration::from_millis(500);
@@ -32,15 +28,6 @@ const RELIABLE_AFTER: Duration = Duration::from_secs(600);
 
 /// Interval between two checks for a request to stop the run.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
-
-/// Arguments for a connection to the world.
-pub(crate) struct Launch<'a> {
-    pub(crate) source: WorldSource<'a>,
-    pub(crate) task: &'a Arc<Task>,
-    pub(crate) limits: ProcessLimits,
-    pub(crate) stop: Stop,
-    pub(crate) warnings: WarningSink,
-}
 
 /// Computes the world's time since the last record, or returns the reason why it is unknown.
 pub(crate) type Elapsed<'a> = Box<dyn Fn() -> Result<Rational, &'static str> + Send + 'a>;

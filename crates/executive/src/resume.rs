@@ -34,10 +34,10 @@ use crate::journal::{DAMAGE_ADVICE, Journal, JournalFile, WallTime, is_journal};
 use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
 use crate::operator::InteractiveWorld;
 use crate::process_world::ProcessLimits;
-use crate::restartable_world::{Launch, RestartableWorld};
+use crate::restartable_world::RestartableWorld;
 use crate::run::{JournaledOutcome, RunError, RunHost, ViewedRecorder, both};
 use crate::running_actions::{self, RunningActions};
-use crate::world_connection::WorldSource;
+use crate::world_connection::{Launch, WorldSource};
 use elapsed::Elapsed;
 use journal_replay::{JournalReplay, ReplayRecorder, ReplayWatcher, ResumedPlanner};
 

@@ -26,9 +26,9 @@ use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
 use crate::operator::{InteractiveWorld, OperatorInterface};
 use crate::process_world::ProcessLimits;
 use crate::realtime::{Realtime, ScaledClock, TimedPlanner};
-use crate::restartable_world::{Launch, RestartableWorld};
+use crate::restartable_world::RestartableWorld;
 use crate::trace_buffer::TraceBuffer;
-use crate::world_connection::WorldSource;
+use crate::world_connection::{Launch, WorldSource};
 
 /// Application that embeds a run. The defaults have neither operators nor viewers.
 pub trait RunHost {

@@ -1,16 +1,28 @@
 //! Connection of a run to its world: a child process, or an object in this process.
 
+use std::sync::Arc;
+
 use elbowroom::execute::RunSpec;
 use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
+use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
+use elbowroom::num::work::Stop;
 
 use crate::belief_updates::BeliefUpdates;
 use crate::embedded_world::EmbeddedWorld;
-use crate::error::Error;
-use crate::process_world::ProcessWorld;
-use crate::restartable_world::Launch;
+use crate::error::{Error, WarningSink};
+use crate::process_world::{ProcessLimits, ProcessWorld};
 use crate::running_actions::RunningActions;
+
+/// Arguments for a connection to the world.
+pub(crate) struct Launch<'a> {
+    pub(crate) source: WorldSource<'a>,
+    pub(crate) task: &'a Arc<Task>,
+    pub(crate) limits: ProcessLimits,
+    pub(crate) stop: Stop,
+    pub(crate) warnings: WarningSink,
+}
 
 /// Source of a world.
 pub(crate) enum WorldSource<'a> {
