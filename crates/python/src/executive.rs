@@ -14,7 +14,7 @@ use elbowroom_executive::{ExecutiveSettings, WarningSink};
 use pyo3::prelude::*;
 
 use crate::task::Task;
-use crate::trouble::{Trouble, guarded, json, number};
+use crate::trouble::{Trouble, advised, guarded, json, number};
 use crate::world::PyWorld;
 
 /// Persistent run. One thread calls `run`; all other methods can be called from any thread.
@@ -275,14 +275,6 @@ fn settings(
 
 fn refused(error: elbowroom_executive::Error) -> Trouble {
     Trouble::Request(advised(&error))
-}
-
-/// Returns the message of an error with its advice.
-pub(crate) fn advised(error: &elbowroom_executive::Error) -> String {
-    match error.advice() {
-        "" => error.message().to_owned(),
-        advice => format!("{}; {advice}", error.message()),
-    }
 }
 
 fn duration(seconds: f64) -> Result<Duration, Trouble> {

@@ -12,8 +12,6 @@ use elbowroom_executive::run::RunError;
 use elbowroom_laboratory::answer::CompareError;
 use pyo3::prelude::*;
 
-use crate::executive::advised;
-
 /// Why there is no answer.
 pub(crate) enum Trouble {
     /// A text cannot be read.
@@ -146,6 +144,14 @@ where
         .and_then(|module| module.getattr(name))
         .and_then(|class| class.call1(arguments));
     made.map_or_else(|error| error, PyErr::from_value)
+}
+
+/// Returns the message of an error with its advice.
+pub(crate) fn advised(error: &elbowroom_executive::Error) -> String {
+    match error.advice() {
+        "" => error.message().to_owned(),
+        advice => format!("{}; {advice}", error.message()),
+    }
 }
 
 /// A document.
