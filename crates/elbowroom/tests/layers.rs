@@ -80,7 +80,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         "cli",
         &["calendar", "elbowroom", "laboratory", "page", "executive"],
     ),
-    ("python", &["elbowroom", "laboratory", "cli"]),
+    ("python", &["elbowroom", "laboratory", "executive", "cli"]),
     // A program beside the command, which it knows by the protocol of worlds alone.
     ("plansys2", &[]),
 ];

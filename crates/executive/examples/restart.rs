@@ -9,13 +9,12 @@ use std::process::Command;
 use std::time::Duration;
 
 use elbowroom::execute::{NamedText, RunSpec};
-use elbowroom::execution::Request;
-use elbowroom::num::Rational;
-use elbowroom_executive::request_queue::ExternalRequest;
+use elbowroom::execution::run::FIRST_GOAL;
+use elbowroom::executive::documents::{GoalNow, NewGoal};
 use elbowroom_executive::{Executive, ExecutiveSettings};
 
-/// Goal that is submitted before the crash.
-const GOAL: &str = "(at rover depot)";
+/// Name of the goal that is submitted before the crash.
+const HOME: &str = "home";
 
 /// Reads a file of the case `delivery`.
 fn case(name: &str) -> Result<NamedText, std::io::Error> {
@@ -24,14 +23,21 @@ fn case(name: &str) -> Result<NamedText, std::io::Error> {
     Ok(NamedText { name, text })
 }
 
-/// Waits until the executive believes a fact.
-fn wait_for(executive: &Executive, fact: &str) {
-    while !executive.status().facts.iter().any(|it| it == fact) {
+/// Waits until a goal is achieved.
+fn wait_for(executive: &Executive, name: &str) {
+    let is_achieved = |goal: &GoalNow| goal.name == name && goal.state == "achieved";
+    while !executive
+        .published()
+        .all_goals()
+        .goals
+        .iter()
+        .any(is_achieved)
+    {
         std::thread::sleep(Duration::from_millis(20));
     }
 }
 
-/// Executes the problem, submits [`GOAL`], and crashes.
+/// Executes the problem, submits [`HOME`], and crashes.
 fn first_run(journal: &Path) -> Result<(), Box<dyn Error>> {
     let mut spec = RunSpec::new(case("domain.pddl")?, case("problem.pddl")?);
     spec.world_process = Some("python3 examples/world.py".to_owned());
@@ -43,16 +49,15 @@ fn first_run(journal: &Path) -> Result<(), Box<dyn Error>> {
     let executive = Executive::new(spec, settings)?;
     std::thread::scope(|scope| {
         scope.spawn(|| executive.run());
-        wait_for(&executive, "(lies parcel office)");
-        let (name, goal) = ("home".to_owned(), GOAL.to_owned());
-        let value = Rational::ONE;
-        let request = ExternalRequest::Request(Request::Pursue {
-            name,
-            goal,
-            value,
+        wait_for(&executive, FIRST_GOAL);
+        let home = NewGoal {
+            name: Some(HOME.to_owned()),
+            goal: "(at rover depot)".to_owned(),
+            value: None,
             deadline: None,
-        });
-        executive.submit(request, Duration::from_secs(10))?;
+            within: None,
+        };
+        executive.submit_goal(home, Duration::from_secs(10))?;
         std::process::abort()
     })
 }
@@ -70,7 +75,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let executive = Executive::resume(&journal, ExecutiveSettings::default())?;
     std::thread::scope(|scope| {
         let run = scope.spawn(|| executive.run());
-        wait_for(&executive, GOAL);
+        wait_for(&executive, HOME);
         executive.stop();
         let outcome = run.join().expect("the run returns an outcome")?;
         let verdict = outcome.outcome.answer.report.verdict;

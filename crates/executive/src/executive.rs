@@ -10,7 +10,7 @@ use elbowroom::answers::{Halt, Watcher};
 use elbowroom::execute::RunSpec;
 use elbowroom::execution::run::PlanningTime;
 use elbowroom::executive::Status;
-use elbowroom::executive::documents::State;
+use elbowroom::executive::documents::{NewGoal, State};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::num::work::Stop;
@@ -20,12 +20,14 @@ use elbowroom::report::trace::TraceWriter;
 use crate::background_planner::BackgroundSettings;
 use crate::clock::Clock;
 use crate::completion_signal::CompletionSignal;
+use crate::embedded_world::EmbeddedWorld;
 use crate::error::{Error, WarningSink};
+use crate::goal_request::GoalNames;
 use crate::journal::{JournalFile, Segments};
 use crate::messages::plain;
 use crate::operator::OperatorInterface;
 use crate::process_world::ProcessLimits;
-use crate::request_check::check;
+use crate::request_check::{check, check_target};
 use crate::request_queue::{ExternalRequest, RequestQueue, RequestStatus};
 use crate::resume::{InterruptedRun, JournaledRun, ResumeSettings};
 use crate::run::{JournaledOutcome, RunError, RunHost, RunInputs};
@@ -34,7 +36,7 @@ use crate::trace_buffer::TraceBuffer;
 /// Settings of an executive that its specification does not contain.
 #[derive(Clone, Debug)]
 pub struct ExecutiveSettings {
-    /// File of the journal. Only runs in a world that is a process can have one.
+    /// File of the journal. Only runs in a world that is a process, or in this process, can have one.
     pub journal: Option<PathBuf>,
     /// Rotation of the journal.
     pub segments: Option<Segments>,
@@ -65,7 +67,8 @@ impl Default for ExecutiveSettings {
 
 /// Persistent run that accepts goals, facts and pauses until it is stopped.
 ///
-/// One thread calls [`Executive::run`]. All other methods can be called from any thread during the run.
+/// One thread calls [`Executive::run`] or [`Executive::run_in`]. All other methods can be called from any thread during
+/// the run.
 pub struct Executive {
     spec: RunSpec,
     task: Arc<Task>,
@@ -73,6 +76,7 @@ pub struct Executive {
     checks: Task,
     settings: ExecutiveSettings,
     queue: RequestQueue,
+    names: GoalNames,
     status: Status,
     buffer: TraceBuffer,
     stop: Stop,
@@ -90,11 +94,15 @@ enum Start {
 
 impl Executive {
     /// Creates an executive for the domain, the problem, the world and the planner of a specification. Planning takes
-    /// its measured time. A simulated world runs on the wall clock.
+    /// its measured time. A simulated world runs on the wall clock. If `spec.is_world_embedded`, the world is given to
+    /// [`Executive::run_in`].
     ///
     /// # Errors
     /// When the domain or the problem is invalid, the specification is contradictory, or the journal cannot be created.
     pub fn new(mut spec: RunSpec, settings: ExecutiveSettings) -> Result<Self, RunError> {
+        if spec.is_world_embedded && spec.world_process.is_none() {
+            spec.world_process = Some("embedded".to_owned());
+        }
         if spec.world_process.is_none() && spec.realtime.is_none() {
             spec.realtime = Some(Rational::ONE);
         }
@@ -105,7 +113,7 @@ impl Executive {
             Some(_) if spec.world_process.is_none() => {
                 return Err(RunError::Failed(Error::new(
                     "a simulated world ends with the program, so that its run has no journal",
-                    "name a world process, or leave out the journal",
+                    "name a world process, give a world in this process, or leave out the journal",
                 )));
             }
             Some(path) => {
@@ -114,13 +122,14 @@ impl Executive {
             }
             None => None,
         };
-        Self::with_start(spec, settings, Start::New(journal))
+        let names = GoalNames::default();
+        Self::with_start(spec, settings, Start::New(journal), names)
     }
 
     /// Creates an executive that resumes the run of a journal. `settings.journal` is ignored.
     ///
     /// # Errors
-    /// When the journal cannot be read, is damaged, or is that of a finished run.
+    /// When the journal cannot be read, is damaged, is written by another program, or is that of a finished run.
     pub fn resume(journal: &Path, settings: ExecutiveSettings) -> Result<Self, RunError> {
         let cannot = |error: &std::io::Error| {
             let message = format!("cannot read {}: {}", journal.display(), plain(error));
@@ -129,7 +138,9 @@ impl Executive {
         let text = fs::read_to_string(journal).map_err(|error| cannot(&error))?;
         match InterruptedRun::read(journal, &text, text.len() as u64)? {
             JournaledRun::Interrupted(run) => {
-                Self::with_start(run.spec().clone(), settings, Start::Resumed(run))
+                let names = GoalNames::after(run.goal_names());
+                let (spec, run) = (run.spec().clone(), Box::new(run.reserved()?));
+                Self::with_start(spec, settings, Start::Resumed(run), names)
             }
             JournaledRun::Achieved(_) => {
                 let message = format!("the run of {} has reached its goal", journal.display());
@@ -142,6 +153,7 @@ impl Executive {
         spec: RunSpec,
         settings: ExecutiveSettings,
         start: Start,
+        names: GoalNames,
     ) -> Result<Self, RunError> {
         let read = pddl::read_problem(&spec.domain.source(), &spec.problem.source());
         let (problem, _) = read.map_err(RunError::Problem)?;
@@ -150,13 +162,17 @@ impl Executive {
         let mut header = |line: &str| buffer.add(line);
         let written = TraceWriter::new(Arc::clone(&task), &mut header).header(&spec);
         written.map_err(|error| Error::new(format!("cannot write the trace: {error}"), ""))?;
+        let status = Status::new(&task, spec.timeout.clone());
+        // Until its journal is replayed.
+        status.set_replayed(matches!(start, Start::Resumed(_)));
         Ok(Self {
-            status: Status::new(&task, spec.timeout.clone()),
+            status,
             checks: task.with_own_table(),
             spec,
             task,
             settings,
             queue: RequestQueue::default(),
+            names,
             buffer,
             stop: Stop::default(),
             start: Mutex::new(Some(start)),
@@ -166,13 +182,15 @@ impl Executive {
     /// Submits a request, and waits until the run accepts it, for at most `timeout`.
     ///
     /// # Errors
-    /// When a goal, its name or its value is invalid, a fact or fluent is unknown, or the queue is full.
+    /// When a goal, its name or its value is invalid, a fact, fluent, open goal or running action is unknown, or the
+    /// queue is full.
     pub fn submit(
         &self,
         request: ExternalRequest,
         timeout: Duration,
     ) -> Result<RequestStatus, Error> {
         check(&request, &self.checks)?;
+        check_target(&request, &self.status, &self.queue)?;
         let number = self.queue.submit(vec![request]).ok_or_else(|| {
             Error::new(
                 "too many requests wait for the executive",
@@ -182,9 +200,46 @@ impl Executive {
         Ok(self.queue.wait_until_accepted(number, timeout))
     }
 
+    /// Submits a goal as [`Executive::submit`] does. Returns its name, which is made up if none is given.
+    ///
+    /// # Errors
+    /// As [`Executive::submit`], and when the goal has two deadlines, or one that has passed.
+    pub fn submit_goal(
+        &self,
+        goal: NewGoal,
+        timeout: Duration,
+    ) -> Result<(String, RequestStatus), Error> {
+        let (name, request) = self.names.request(goal, &self.status)?;
+        let status = self.submit(request, timeout)?;
+        Ok((name, status))
+    }
+
+    /// Returns `true` if the run has accepted all submitted requests.
+    pub fn is_idle(&self) -> bool {
+        self.queue.is_idle()
+    }
+
+    /// Returns the specification of the run.
+    pub fn spec(&self) -> &RunSpec {
+        &self.spec
+    }
+
+    /// Returns the problem of the run.
+    pub fn task(&self) -> &Arc<Task> {
+        &self.task
+    }
+
+    /// Returns the published status of the run: goals, plan, guarantee and the next decision.
+    pub fn published(&self) -> &Status {
+        &self.status
+    }
+
     /// Returns the state of the run: activity, goals, running actions, believed facts and numbers.
     pub fn status(&self) -> State {
-        self.status.state()
+        State {
+            unanswered: self.queue.silence(),
+            ..self.status.state()
+        }
     }
 
     /// Returns the trace of the run. Its streams send each new line.
@@ -200,20 +255,40 @@ impl Executive {
     /// Executes the run in this thread until it is stopped or fails. Computations of this thread obey the stop request.
     ///
     /// # Errors
-    /// When the run cannot be started, or was started before.
+    /// When the run cannot be started, was started before, or its world is an object in this process.
     pub fn run(&self) -> Result<JournaledOutcome, RunError> {
+        self.run_with(None)
+    }
+
+    /// Executes the run as [`Executive::run`] does, in a world that is an object in this process.
+    ///
+    /// # Errors
+    /// When the run cannot be started, was started before, or its world is none in this process.
+    pub fn run_in(&self, world: &mut dyn EmbeddedWorld) -> Result<JournaledOutcome, RunError> {
+        self.run_with(Some(world))
+    }
+
+    fn run_with(
+        &self,
+        world: Option<&mut dyn EmbeddedWorld>,
+    ) -> Result<JournaledOutcome, RunError> {
         let start = self.start.lock();
         let start = start.unwrap_or_else(PoisonError::into_inner).take();
         let start = start
             .ok_or_else(|| Error::new("the run was started before", "create another executive"))?;
         self.stop.obey();
-        let outcome = self.execute(start);
+        let outcome = self.execute(start, world);
         self.queue.close();
         self.buffer.close();
         outcome
     }
 
-    fn execute(&self, start: Start) -> Result<JournaledOutcome, RunError> {
+    fn execute(
+        &self,
+        start: Start,
+        embedded: Option<&mut dyn EmbeddedWorld>,
+    ) -> Result<JournaledOutcome, RunError> {
+        let embedded = embedded.map(shortened);
         let mut watcher = StopWatcher {
             clock: Clock::start(),
             stop: self.stop.clone(),
@@ -230,6 +305,7 @@ impl Executive {
             Start::Resumed(run) => {
                 let settings = ResumeSettings {
                     task: &self.task,
+                    embedded,
                     background,
                     limits,
                     observer: None,
@@ -243,6 +319,7 @@ impl Executive {
             spec: &self.spec,
             task: &self.task,
             first_plan: None,
+            embedded,
             operator: &operator,
             background,
             limits,
@@ -285,6 +362,11 @@ pub fn make_persistent(spec: &mut RunSpec) {
     spec.is_lasting = true;
     spec.plans_aside = spec.can_plan_aside();
     spec.readies_aside = spec.plans_aside;
+}
+
+/// Returns the world with a shorter lifetime.
+fn shortened<'a>(world: &'a mut (dyn EmbeddedWorld + '_)) -> &'a mut (dyn EmbeddedWorld + 'a) {
+    world
 }
 
 /// Watcher that ends a run on a stop request.

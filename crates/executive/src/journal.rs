@@ -60,8 +60,18 @@ pub struct Journal {
     /// Length of the complete records in bytes.
     length: u64,
     last: String,
-    /// Length, checksum and length of the text without the last record.
-    before: (u64, String, usize),
+    /// Ends of the complete records.
+    ends: Vec<RecordEnd>,
+}
+
+/// End of a record.
+#[derive(Clone)]
+struct RecordEnd {
+    /// Length of the file, in bytes.
+    length: u64,
+    /// Length of the trace, in bytes.
+    text: usize,
+    checksum: String,
 }
 
 /// Returns options for files that only their owner can read: a journal contains all facts about the robots.
@@ -250,7 +260,7 @@ impl Journal {
             is_torn: false,
             length: 0,
             last: INITIAL_CHECKSUM.to_owned(),
-            before: (0, INITIAL_CHECKSUM.to_owned(), 0),
+            ends: Vec::new(),
         };
         let mut before = None::<&str>;
         for (index, record) in text.split_inclusive('\n').enumerate() {
@@ -260,13 +270,17 @@ impl Journal {
             });
             match parts {
                 Some((sum, line)) if !journal.is_torn && sum == checksum(&journal.last, line) => {
-                    journal.before = (journal.length, journal.last.clone(), journal.text.len());
                     let (line, recorded) = wall_time::split(line);
                     journal.text.push_str(&line);
                     journal.text.push('\n');
                     journal.recorded.push(recorded);
                     journal.length += record.len() as u64;
                     sum.clone_into(&mut journal.last);
+                    journal.ends.push(RecordEnd {
+                        length: journal.length,
+                        text: journal.text.len(),
+                        checksum: sum.to_owned(),
+                    });
                 }
                 Some((sum, line)) if before.is_some_and(|before| sum == checksum(before, line)) => {
                     return Err(format!(
@@ -283,15 +297,20 @@ impl Journal {
 }
 
 impl Journal {
-    /// Returns the journal without its last record. [`JournalFile::reopen`] overwrites that record.
+    /// Returns the first `count` records of the journal. [`JournalFile::reopen`] overwrites the others.
     #[must_use]
-    pub fn without_last(mut self) -> Self {
-        let (length, last, text) = self.before.clone();
-        self.text.truncate(text);
-        self.recorded.pop();
+    pub fn truncated(mut self, count: usize) -> Self {
+        self.ends.truncate(count);
+        self.recorded.truncate(count);
+        let last = self.ends.last().cloned().unwrap_or(RecordEnd {
+            length: 0,
+            text: 0,
+            checksum: INITIAL_CHECKSUM.to_owned(),
+        });
+        self.text.truncate(last.text);
         Self {
-            length,
-            last,
+            length: last.length,
+            last: last.checksum,
             ..self
         }
     }
@@ -365,6 +384,19 @@ mod tests {
             let length = whole.max().copied().unwrap_or(0);
             assert_eq!(read.length, length as u64, "at {cut}");
             assert_eq!(read.is_torn, cut > length, "at {cut}");
+        }
+    }
+
+    #[test]
+    fn truncated_journal_is_that_of_its_first_records() {
+        let text = journal(&LINES);
+        for count in 0..=LINES.len() {
+            let read = Journal::read(&text).expect("whole").truncated(count);
+            let first = journal(&LINES[..count]);
+            assert_eq!(read.length, first.len() as u64);
+            let again = Journal::read(&first).expect("whole");
+            assert_eq!((read.text, read.last), (again.text, again.last));
+            assert_eq!(read.recorded.len(), count);
         }
     }
 

@@ -12,6 +12,7 @@
 //! - [`process_world`], [`world_protocol`], [`belief_updates`]: a world that is a process
 //!   (`docs/formats/world-protocol.md`). [`realtime`]: a simulated world on the wall clock.
 //! - [`run`], [`resume`]: assembly of a run from its specification, and recovery from its journal.
+//! - [`EmbeddedWorld`]: a world that is an object in the process of its executive.
 //! - [`http`], [`api`], [`trace_buffer`]: HTTP server and client, the interface of an executive (`docs/serve.md`), and
 //!   the buffer of the trace for clients.
 //! - [`clock`], [`memory_limit`], [`messages`]: wall clock, memory limit, texts of messages.
@@ -26,8 +27,10 @@ mod background_task;
 pub mod belief_updates;
 pub mod clock;
 pub mod completion_signal;
+mod embedded_world;
 mod error;
 mod executive;
+mod goal_request;
 pub mod http;
 pub mod journal;
 pub mod journaling;
@@ -44,7 +47,9 @@ pub mod resume;
 pub mod run;
 mod running_actions;
 pub mod trace_buffer;
+mod world_connection;
 pub mod world_protocol;
 
+pub use embedded_world::{EmbeddedWorld, StartedAction};
 pub use error::{Error, WarningSink};
 pub use executive::{Executive, ExecutiveSettings, make_persistent};

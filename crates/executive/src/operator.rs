@@ -68,12 +68,15 @@ impl OperatorInterface {
         self.0.as_ref().map(|channels| &channels.status)
     }
 
-    /// Returns a callback that publishes the belief state of the run.
+    /// Returns a callback that publishes the belief state of the run after each answer of the world, and then
+    /// acknowledges the requests that were part of the answer.
     pub fn listener(&self) -> impl FnMut(&elbowroom::execution::Progression) + Send + use<> {
-        let status = self.status().cloned();
+        let channels = self.0.clone();
         move |belief| {
-            if let Some(status) = &status {
-                status.believe(belief);
+            let Some(channels) = &channels else { return };
+            channels.status.believe(belief);
+            if let Some(queue) = &channels.queue {
+                queue.acknowledge();
             }
         }
     }
@@ -91,7 +94,6 @@ impl OperatorInterface {
             task: Arc::clone(task),
             channels: self.0.clone(),
             written_ahead,
-            unprocessed: 0,
         }
     }
 }
@@ -102,8 +104,6 @@ pub struct TeeRecorder<R> {
     task: Arc<Task>,
     channels: Option<Channels>,
     written_ahead: bool,
-    /// Number of observations that the run has received but not processed.
-    unprocessed: usize,
 }
 
 impl<R: Recorder> Recorder for TeeRecorder<R> {
@@ -113,21 +113,10 @@ impl<R: Recorder> Recorder for TeeRecorder<R> {
             channels.status.record(entry);
             let line = Line::of(&self.task, entry);
             channels.buffer.add(&format!("{}\n", line.text()));
-            let Some(queue) = &channels.queue else { return };
-            match entry {
-                Entry::Passed { observations, .. } => {
-                    self.unprocessed = observations.len();
-                    if !self.written_ahead {
-                        queue.note_recorded();
-                    }
-                }
-                Entry::Taken { .. } => {
-                    self.unprocessed = self.unprocessed.saturating_sub(1);
-                }
-                _ => return,
-            }
-            if self.unprocessed == 0 {
-                queue.acknowledge();
+            if let (Some(queue), Entry::Passed { .. }) = (&channels.queue, entry)
+                && !self.written_ahead
+            {
+                queue.note_recorded();
             }
         }
     }

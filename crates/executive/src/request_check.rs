@@ -1,12 +1,13 @@
 //! Checks of operators' requests against the problem of a run, before the run receives them.
 
 use elbowroom::execute::{misfit, obstacle_to_deadline, read_goal};
-use elbowroom::execution::Request;
+use elbowroom::execution::{Request, Ticket};
+use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 
 use crate::error::Error;
-use crate::request_queue::ExternalRequest;
+use crate::request_queue::{ExternalRequest, RequestQueue};
 
 /// Limit on the name of a goal, in bytes.
 const LONGEST_NAME: usize = 64;
@@ -49,6 +50,60 @@ pub(crate) fn check(request: &ExternalRequest, task: &Task) -> Result<(), Error>
         ExternalRequest::Fact { fact, .. } => check_fact(fact, task),
         ExternalRequest::Number { fluent, .. } => check_fluent(fluent, task),
     }
+}
+
+/// Checks that the open goal or the running action of a request is known to the run. While requests are pending, and
+/// while a journal is replayed, they may come yet.
+///
+/// # Errors
+/// When it is unknown.
+pub(crate) fn check_target(
+    request: &ExternalRequest,
+    status: &Status,
+    queue: &RequestQueue,
+) -> Result<(), Error> {
+    if !queue.is_idle() || status.is_replayed() {
+        return Ok(());
+    }
+    match request {
+        ExternalRequest::Request(Request::Abandon { name }) => check_open_goal(name, status),
+        ExternalRequest::Request(Request::CancelAction { ticket })
+        | ExternalRequest::Outcome { ticket, .. } => check_ticket(*ticket, status),
+        _ => Ok(()),
+    }
+}
+
+fn check_open_goal(name: &str, status: &Status) -> Result<(), Error> {
+    let open = status.goals();
+    if open.iter().any(|known| known == name) {
+        return Ok(());
+    }
+    let help = match open.as_slice() {
+        [] => "no goals are open".to_owned(),
+        open => format!("these are open: {}", open.join(", ")),
+    };
+    Err(Error::new("no goal of that name is open", help))
+}
+
+fn check_ticket(ticket: Ticket, status: &Status) -> Result<(), Error> {
+    let running = status.state().running;
+    if running.iter().any(|it| it.ticket == ticket.0) {
+        return Ok(());
+    }
+    let help = match running.as_slice() {
+        [] => "no action is running".to_owned(),
+        running => {
+            let running = running
+                .iter()
+                .map(|it| format!("{} {}", it.ticket, it.action));
+            format!(
+                "these are running: {}",
+                running.collect::<Vec<_>>().join(", ")
+            )
+        }
+    };
+    let error = format!("no action with the ticket {} is running", ticket.0);
+    Err(Error::new(error, help))
 }
 
 fn check_goal(goal: &str, has_deadline: bool, task: &Task) -> Result<(), Error> {

@@ -13,6 +13,9 @@ use crate::clock::Clock;
 /// Limit on pending requests.
 const MOST_PENDING: usize = 1000;
 
+/// Answer time of the world from which the state reports it as unanswered.
+const SILENCE_THRESHOLD: Duration = Duration::from_secs(1);
+
 /// Request or observation from outside the run. Facts and fluents are names. They are resolved when the run
 /// drains the queue, so that a replay numbers them in the same order.
 #[derive(Clone, Debug)]
@@ -227,6 +230,13 @@ impl RequestQueue {
     /// Returns the time since the pending question to the world, or `None` if there is none.
     pub fn unanswered(&self) -> Option<Duration> {
         self.lock().asked.map(Clock::elapsed)
+    }
+
+    /// Returns the time in seconds for which the world has not answered, if that is more than one second. An interactive
+    /// run queries its world many times a second.
+    pub fn silence(&self) -> Option<u64> {
+        let silence = self.unanswered()?;
+        (silence > SILENCE_THRESHOLD).then_some(silence.as_secs())
     }
 
     /// Records that the run has processed the recorded requests, and that its published status includes them.

@@ -1,24 +1,21 @@
-//! World process that can be started again: when a run is resumed from its journal, and when the program ends while
-//! the run continues.
+//! World that can be connected again: when a run is resumed from its journal, and when the program of a world ends
+//! while the run continues.
 //!
-//! After a start, the program is asked about the actions that were running. Those that it does not know have failed.
+//! After that, the world is asked about the actions that were running. Those that it does not know have failed.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom::execution::{
     Command, Ending, Event, Observation, Passage, Ticket, World, WorldError,
 };
-use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
-use elbowroom::num::work::Stop;
 
 use crate::belief_updates::BeliefUpdates;
 use crate::clock::Clock;
-use crate::error::{Error, WarningSink};
-use crate::process_world::{ProcessLimits, ProcessWorld};
+use crate::error::Error;
 use crate::running_actions::RunningActions;
+use crate::world_connection::{Launch, WorldConnection, WorldSource};
 
 /// Delay before the first restart. Each further one in a row takes twice as long.
 const FIRST_DELAY: Duration = Duration::from_millis(500);
@@ -32,25 +29,16 @@ const RELIABLE_AFTER: Duration = Duration::from_secs(600);
 /// Interval between two checks for a request to stop the run.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Arguments for a start of the world process.
-pub(crate) struct Launch<'a> {
-    pub(crate) command: String,
-    pub(crate) task: &'a Arc<Task>,
-    pub(crate) limits: ProcessLimits,
-    pub(crate) stop: Stop,
-    pub(crate) warnings: WarningSink,
-}
-
 /// Computes the world's time since the last record, or returns the reason why it is unknown.
 pub(crate) type Elapsed<'a> = Box<dyn Fn() -> Result<Rational, &'static str> + Send + 'a>;
 
 /// See the module.
 pub(crate) struct RestartableWorld<'a> {
     launch: Launch<'a>,
-    process: Option<ProcessWorld>,
+    world: Option<WorldConnection<'a>>,
     running: RunningActions,
     beliefs: BeliefUpdates,
-    /// Time since the end of the journal, until the process of a resumed run is started.
+    /// Time since the end of the journal, until the world of a resumed run is connected.
     elapsed: Option<Elapsed<'a>>,
     /// Runs since the world has reported its time.
     answered: Clock,
@@ -66,25 +54,19 @@ pub(crate) struct RestartableWorld<'a> {
 }
 
 impl<'a> RestartableWorld<'a> {
-    /// Starts the program for a new run.
+    /// Connects the world of a new run.
     ///
     /// # Errors
-    /// As [`ProcessWorld::start`].
-    pub(crate) fn start(launch: Launch<'a>, beliefs: BeliefUpdates) -> Result<Self, Error> {
-        let process = ProcessWorld::start(
-            &launch.command,
-            launch.task,
-            launch.limits.clone(),
-            launch.stop.clone(),
-        )?;
-        let process = process.with_beliefs(beliefs.clone());
+    /// When its program cannot be started.
+    pub(crate) fn start(mut launch: Launch<'a>, beliefs: BeliefUpdates) -> Result<Self, Error> {
+        let connection = WorldConnection::start(&mut launch, &beliefs)?;
         let running = RunningActions::default();
         let mut world = Self::later(launch, running, Rational::ZERO, beliefs);
-        world.process = Some(process);
+        world.world = Some(connection);
         Ok(world)
     }
 
-    /// Starts the program for a resumed run when it is needed first. These actions were `running` at the end of the
+    /// Connects the world of a resumed run when it is needed first. These actions were `running` at the end of the
     /// journal, at the time `last`.
     pub(crate) fn resumed(
         launch: Launch<'a>,
@@ -106,7 +88,7 @@ impl<'a> RestartableWorld<'a> {
     ) -> Self {
         Self {
             launch,
-            process: None,
+            world: None,
             running,
             beliefs,
             elapsed: None,
@@ -128,39 +110,30 @@ impl<'a> RestartableWorld<'a> {
 
     /// Stops the program, if it runs.
     pub(crate) fn stop(self) {
-        if let Some(process) = self.process {
-            process.stop();
+        if let Some(world) = self.world {
+            world.stop();
         }
     }
 
-    /// Returns the process. Starts it if it does not run, and requests the outcome of running actions.
-    fn process(&mut self) -> Result<&mut ProcessWorld, WorldError> {
-        if self.process.is_none() {
-            let launch = &self.launch;
-            let resumed = self.running.message(&self.last);
-            let world = ProcessWorld::resume(
-                &launch.command,
-                launch.task,
-                launch.limits.clone(),
-                launch.stop.clone(),
-                (&resumed, self.running.given()),
-            );
-            let world = world.map_err(|error| WorldError::new(error.message()))?;
-            self.process = Some(world.with_beliefs(self.beliefs.clone()));
+    /// Returns the world. Connects it if it is not connected, and requests the outcome of running actions.
+    fn world(&mut self) -> Result<&mut WorldConnection<'a>, WorldError> {
+        if self.world.is_none() {
+            let (launch, last) = (&mut self.launch, &self.last);
+            let world = WorldConnection::resume(launch, &self.beliefs, &self.running, last);
+            self.world = Some(world.map_err(|error| WorldError::new(error.message()))?);
             self.started = Clock::start();
             self.reconcile()?;
         }
         let missing = || WorldError::new("the world is not there");
-        self.process.as_mut().ok_or_else(missing)
+        self.world.as_mut().ok_or_else(missing)
     }
 
     /// Requests the outcome of running actions, and repeats cancellations.
     fn reconcile(&mut self) -> Result<(), WorldError> {
-        let Some(world) = &mut self.process else {
+        let Some(world) = &mut self.world else {
             return Ok(());
         };
-        let tickets = self.running.tickets();
-        let (passage, knows) = world.recall(&tickets)?;
+        let (passage, knows) = world.recall(&self.running, &self.last)?;
         let is_resumed = self.elapsed.is_some();
         if knows {
             self.shift = Rational::ZERO;
@@ -199,8 +172,9 @@ impl<'a> RestartableWorld<'a> {
                 };
                 news.push(failed(Ticket(ticket), &self.last, why));
             }
-            // The world may have received the cancellation already. An action that it does not know may still run.
-            if is_cancelled || !is_told {
+            // The world may have received the cancellation already. An action that it does not know may still run,
+            // but not in a new object.
+            if (is_cancelled || !is_told) && (knows || world.is_program()) {
                 let ticket = Ticket(ticket);
                 let told = (&self.last - &self.shift).max(Rational::ZERO);
                 world.command(&told, &Command::Cancel { ticket })?;
@@ -214,15 +188,18 @@ impl<'a> RestartableWorld<'a> {
         Ok(())
     }
 
-    /// Starts the program again after a failure, as often as it may be, and returns the failure otherwise.
+    /// Starts a program again after a failure, as often as it may be, and returns the failure otherwise.
     fn restart(&mut self, failure: WorldError) -> Result<(), WorldError> {
         let mut failure = failure;
         if self.started.elapsed() > RELIABLE_AFTER {
             self.restarts = 0;
         }
+        if let WorldSource::Embedded(_) = self.launch.source {
+            return Err(failure);
+        }
         while self.restarts < self.launch.limits.restarts && !self.launch.stop.is_requested() {
-            if let Some(process) = self.process.take() {
-                process.stop();
+            if let Some(world) = self.world.take() {
+                world.stop();
             }
             let delay = FIRST_DELAY.saturating_mul(1 << self.restarts.min(16));
             self.restarts += 1;
@@ -231,7 +208,7 @@ impl<'a> RestartableWorld<'a> {
                 failure.message, self.restarts, self.launch.limits.restarts
             ));
             self.pause(delay.min(LONGEST_DELAY));
-            match self.process() {
+            match self.world() {
                 Ok(_) => return Ok(()),
                 Err(error) => failure = error,
             }
@@ -251,13 +228,13 @@ impl<'a> RestartableWorld<'a> {
         }
     }
 
-    /// Asks the process. Returns `None` if it was started again instead.
+    /// Asks the world. Returns `None` if it was started again instead.
     fn ask<T>(
         &mut self,
-        question: impl FnOnce(&mut ProcessWorld) -> Result<T, WorldError>,
+        question: impl FnOnce(&mut WorldConnection<'a>) -> Result<T, WorldError>,
     ) -> Result<Option<T>, WorldError> {
-        let answer = match self.process() {
-            Ok(process) => question(process),
+        let answer = match self.world() {
+            Ok(world) => question(world),
             Err(error) => Err(error),
         };
         match answer {
@@ -303,7 +280,7 @@ fn shifted(mut observations: Vec<Observation>, shift: &Rational) -> Vec<Observat
 
 impl World for RestartableWorld<'_> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
-        if self.process.is_none() {
+        if self.world.is_none() {
             self.ask(|_| Ok(()))?;
         }
         if let (Some(news), Command::Start { ticket, .. }) = (&mut self.news, command) {
@@ -312,21 +289,20 @@ impl World for RestartableWorld<'_> {
             news.push(failed(*ticket, &self.last, why));
             return Ok(());
         }
-        self.running.note(command);
+        self.running.note(now, command);
         let told = (now - &self.shift).max(Rational::ZERO);
-        self.ask(|process| process.command(&told, command))
-            .map(drop)
+        self.ask(|world| world.command(&told, command)).map(drop)
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        if self.process.is_none() {
+        if self.world.is_none() {
             self.ask(|_| Ok(()))?;
         }
         if let Some(news) = self.take_news() {
             return Ok(news);
         }
         let local = until - &self.shift;
-        let Some(passage) = self.ask(|process| process.wait(&local))? else {
+        let Some(passage) = self.ask(|world| world.wait(&local))? else {
             let now = self.last.clone();
             return Ok(self.take_news().unwrap_or(Passage {
                 now,
@@ -352,7 +328,7 @@ impl World for RestartableWorld<'_> {
     ) -> Result<Vec<Observation>, WorldError> {
         // After a restart the question is repeated.
         let seen = loop {
-            if let Some(seen) = self.ask(|process| process.look(facts, fluents))? {
+            if let Some(seen) = self.ask(|world| world.look(facts, fluents))? {
                 break seen;
             }
         };

@@ -21,6 +21,7 @@ use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
+use elbowroom::report::trace::line::ObservationLine;
 use elbowroom::report::trace::{Line, ReplayWorld, Stored};
 use serde_json::Value;
 
@@ -28,14 +29,16 @@ use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
 use crate::background_preparer::BackgroundPreparer;
 use crate::belief_updates::BeliefUpdates;
 use crate::clock::Clock;
+use crate::embedded_world::EmbeddedWorld;
 use crate::error::{Error, WarningSink};
 use crate::journal::{DAMAGE_ADVICE, Journal, JournalFile, WallTime, is_journal};
 use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
 use crate::operator::InteractiveWorld;
 use crate::process_world::ProcessLimits;
-use crate::restartable_world::{Launch, RestartableWorld};
+use crate::restartable_world::RestartableWorld;
 use crate::run::{EntryObserver, JournaledOutcome, RunError, RunHost, ViewedRecorder, both};
 use crate::running_actions::{self, RunningActions};
+use crate::world_connection::{Launch, WorldSource};
 use elapsed::Elapsed;
 use journal_replay::{JournalReplay, ReplayRecorder, ReplayWatcher, ResumedPlanner};
 
@@ -47,8 +50,8 @@ pub struct InterruptedRun {
     length: u64,
     stored: Stored,
     spec: RunSpec,
-    /// Command of the world process.
-    command: String,
+    /// The journal, once it is opened.
+    file: Option<JournalFile>,
 }
 
 /// Run of a journal.
@@ -63,6 +66,8 @@ pub enum JournaledRun {
 pub struct ResumeSettings<'a> {
     /// The problem of the specification, with a new table of facts.
     pub task: &'a Arc<Task>,
+    /// The world, if it is an object in this process.
+    pub embedded: Option<&'a mut dyn EmbeddedWorld>,
     /// Background planning, with the stop request of the run.
     pub background: BackgroundSettings,
     /// Limits of the world process.
@@ -103,11 +108,8 @@ impl InterruptedRun {
             stored.map_err(|error| unreadable(&name, &error.to_string(), OTHER_VERSION))
         };
         let mut stored = read(&journal)?;
-        // A world that has died may be started again.
-        if let Some(Line::Over(report)) = stored.lines.last()
-            && report.verdict == WORLD_FAILED
-        {
-            journal = journal.without_last();
+        if let Some(end) = end_by_world(&stored.lines) {
+            journal = journal.truncated(stored.first_number() - 1 + end);
             stored = read(&journal)?;
         }
         if let Some(Line::Over(report)) = stored.lines.last()
@@ -125,22 +127,44 @@ impl InterruptedRun {
         let spec = stored.header();
         let spec: RunSpec =
             spec.map_err(|error| Error::new(format!("{name}, {error}"), OTHER_VERSION))?;
-        let Some(command) = spec.world_process.clone() else {
+        if spec.world_process.is_none() {
             return Err(unreadable(&name, "its world was no process", OTHER_VERSION));
-        };
+        }
         Ok(JournaledRun::Interrupted(Box::new(Self {
             path: path.to_owned(),
             journal,
             length,
             stored,
             spec,
-            command,
+            file: None,
         })))
     }
 
     /// Returns the specification of the run.
     pub fn spec(&self) -> &RunSpec {
         &self.spec
+    }
+
+    /// Returns the names of the goals that were given to the run.
+    pub(crate) fn goal_names(&self) -> impl Iterator<Item = &str> {
+        let lines = self.stored.lines.iter().filter_map(|line| match line {
+            Line::Passed(line) => Some(&line.observations),
+            Line::Looked(line) => Some(&line.observations),
+            _ => None,
+        });
+        lines.flatten().filter_map(|line| match line {
+            ObservationLine::Goal { name, .. } => Some(name.as_str()),
+            _ => None,
+        })
+    }
+
+    /// Opens the journal, so that no other program resumes the run. [`InterruptedRun::resume`] does so otherwise.
+    ///
+    /// # Errors
+    /// When the journal cannot be written, or is written by another program.
+    pub fn reserved(mut self) -> Result<Self, Error> {
+        self.file = Some(JournalFile::reopen(&self.path, &self.journal, self.length)?);
+        Ok(self)
     }
 
     /// Sets the number of threads of the planner, which does not change its plans.
@@ -150,7 +174,7 @@ impl InterruptedRun {
         self
     }
 
-    /// Replays the journal, starts the world again, and continues the run.
+    /// Replays the journal, connects the world again, and continues the run.
     ///
     /// # Errors
     /// When the journal is written by another program or cannot be written, its replay deviates, or the host rejects
@@ -167,16 +191,18 @@ impl InterruptedRun {
             length,
             stored,
             spec,
-            command,
+            file,
         } = self;
         let ResumeSettings {
             task,
+            embedded,
             background,
             limits,
             observer,
             warnings,
         } = settings;
         let name = path.display().to_string();
+        let source = WorldSource::of(&spec, embedded)?;
         let wrong = |error: &dyn fmt::Display| unreadable(&name, &error.to_string(), OTHER_VERSION);
         // Before any other fact is mentioned: the table of facts has to be as it was.
         let snapshot = stored.snapshot().map_err(|error| wrong(&error))?;
@@ -185,8 +211,8 @@ impl InterruptedRun {
         let now = snapshot.as_ref().map(|it| it.now().clone());
         let first = spec.has_plan.then(|| stored.first_plan(task));
         let first = first.transpose().map_err(|error| wrong(&error))?.flatten();
-        let mut file =
-            JournalFile::reopen(&path, &journal, length)?.with_rotation(host.segments(), &warnings);
+        let file = file.map_or_else(|| JournalFile::reopen(&path, &journal, length), Ok)?;
+        let mut file = file.with_rotation(host.segments(), &warnings);
         let operator = host.operator(&spec, task)?;
         if let Some(snapshot) = &snapshot {
             operator.begin_at(snapshot);
@@ -222,7 +248,7 @@ impl InterruptedRun {
                 .recorded_by(ViewedRecorder::new(recorder, task, buffer, observer));
             let elapsed = Elapsed::of(&journal, &stored, snapshot.as_ref());
             let launch = Launch {
-                command,
+                source,
                 task,
                 limits,
                 stop: stop.clone(),
@@ -235,7 +261,7 @@ impl InterruptedRun {
                 journal: ReplayWorld::new(&stored, task),
                 left: stored.lines.iter().filter(|line| is_answer(line)).count(),
                 replay: Arc::clone(&replay),
-                process: RestartableWorld::resumed(launch, running, since, beliefs),
+                world: RestartableWorld::resumed(launch, running, since, beliefs),
                 status: operator.status().cloned(),
             };
             let world = JournaledWorld::new(world, health.clone());
@@ -250,7 +276,7 @@ impl InterruptedRun {
                 health,
             };
             let outcome = execute(request, &mut world, &mut watcher);
-            world.into_inner().into_inner().process.stop();
+            world.into_inner().into_inner().world.stop();
             outcome?
         };
         if let Some(line) = replay.difference() {
@@ -290,32 +316,44 @@ const WORLD_FAILED: &str = "world-failed";
 /// well.
 const WITHOUT_PLAN: [&str; 2] = ["no-plan", "planner-failed"];
 
+/// Returns the number of lines before the end of a run whose world has failed. Such a world may be replaced, or started
+/// again.
+fn end_by_world(lines: &[Line]) -> Option<usize> {
+    let is_end = |line: &Line| match line {
+        // The cancellations that follow are repeated.
+        Line::WorldFailed(_) => true,
+        Line::Over(report) => report.verdict == WORLD_FAILED,
+        _ => false,
+    };
+    lines.iter().position(is_end)
+}
+
 /// Returns `true` for an answer of the world.
 fn is_answer(line: &Line) -> bool {
     matches!(line, Line::Passed(_) | Line::Looked(_))
 }
 
-/// World that replays the journal, then starts the process.
+/// World that replays the journal, then connects to the world itself.
 struct ResumedWorld<'a> {
     journal: ReplayWorld,
     /// Number of answers that the journal still has.
     left: usize,
     replay: Arc<JournalReplay>,
-    process: RestartableWorld<'a>,
+    world: RestartableWorld<'a>,
     /// Published status of the run.
     status: Option<Status>,
 }
 
 impl<'a> ResumedWorld<'a> {
     /// Returns the world behind the journal, unless the replay has deviated.
-    fn process(&mut self) -> Result<&mut RestartableWorld<'a>, WorldError> {
+    fn world(&mut self) -> Result<&mut RestartableWorld<'a>, WorldError> {
         if self.replay.difference().is_some() {
             return Err(WorldError::new("the journal leads to other decisions"));
         }
         if let Some(status) = self.status.take() {
             status.set_replayed(false);
         }
-        Ok(&mut self.process)
+        Ok(&mut self.world)
     }
 }
 
@@ -324,16 +362,16 @@ impl World for ResumedWorld<'_> {
         if self.replay.has_last() {
             return Ok(());
         }
-        self.process()?.command(now, command)
+        self.world()?.command(now, command)
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
         let Some(left) = self.left.checked_sub(1) else {
-            return self.process()?.wait(until);
+            return self.world()?.wait(until);
         };
         self.left = left;
         let passage = self.journal.wait(until)?;
-        self.process.note_time(&passage.now);
+        self.world.note_time(&passage.now);
         Ok(passage)
     }
 
@@ -343,7 +381,7 @@ impl World for ResumedWorld<'_> {
         fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
         let Some(left) = self.left.checked_sub(1) else {
-            return self.process()?.look(facts, fluents);
+            return self.world()?.look(facts, fluents);
         };
         self.left = left;
         self.journal.look(facts, fluents)

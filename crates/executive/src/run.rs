@@ -19,14 +19,16 @@ use crate::background_planner::{BackgroundPlanner, BackgroundSettings};
 use crate::background_preparer::BackgroundPreparer;
 use crate::belief_updates::BeliefUpdates;
 use crate::clock::Clock;
+use crate::embedded_world::EmbeddedWorld;
 use crate::error::{Error, WarningSink};
 use crate::journal::{JournalFile, Segments};
 use crate::journaling::{JournalHealth, JournalWriter, JournaledWorld};
 use crate::operator::{InteractiveWorld, OperatorInterface};
 use crate::process_world::ProcessLimits;
 use crate::realtime::{Realtime, ScaledClock, TimedPlanner};
-use crate::restartable_world::{Launch, RestartableWorld};
+use crate::restartable_world::RestartableWorld;
 use crate::trace_buffer::TraceBuffer;
+use crate::world_connection::{Launch, WorldSource};
 
 /// Application that embeds a run. The defaults have neither operators nor viewers.
 pub trait RunHost {
@@ -121,6 +123,8 @@ pub struct RunInputs<'a> {
     pub task: &'a Arc<Task>,
     /// The first plan; without it, the planner makes one.
     pub first_plan: Option<TimeTriggeredPlan>,
+    /// The world, if it is an object in this process.
+    pub embedded: Option<&'a mut dyn EmbeddedWorld>,
     /// Channels to operators.
     pub operator: &'a OperatorInterface,
     /// Background planning, with the stop request of the run.
@@ -154,11 +158,11 @@ impl<'a> RunInputs<'a> {
         written.map_err(|error| Error::new(format!("cannot write the trace: {error}"), ""))?;
         let writer = self.operator.publishing(&mut writer, task, false);
         let mut writer = ViewedRecorder::new(writer, task, buffer, self.observer.take());
-        let Some(command) = &self.spec.world_process else {
+        if self.spec.world_process.is_none() {
             return Ok(self.simulated(&mut writer, host, watcher)?);
-        };
+        }
         let beliefs = BeliefUpdates::default();
-        let world = RestartableWorld::start(self.launch(command), beliefs.clone())?;
+        let world = RestartableWorld::start(self.launch()?, beliefs.clone())?;
         let mut world = self.interactive(world, &Rational::ONE);
         host.started();
         let outcome = self.run(&mut world, &mut writer, beliefs.listener(), watcher);
@@ -166,7 +170,7 @@ impl<'a> RunInputs<'a> {
         Ok(outcome?)
     }
 
-    /// Executes a run in a world that is a process, with an empty journal.
+    /// Executes a run in a world that is a process or in this process, with an empty journal.
     ///
     /// # Errors
     /// As [`RunInputs::execute`], and when the first record cannot be written.
@@ -192,9 +196,8 @@ impl<'a> RunInputs<'a> {
         }
         let health = JournalHealth::default();
         let buffer = host.open_viewers(spec, task, self.operator)?;
-        let command = spec.world_process.as_deref().unwrap_or_default();
         let beliefs = BeliefUpdates::default();
-        let world = RestartableWorld::start(self.launch(command), beliefs.clone())?;
+        let world = RestartableWorld::start(self.launch()?, beliefs.clone())?;
         let world = JournaledWorld::new(world, health.clone());
         let mut world = self.interactive(world, &Rational::ONE);
         host.started();
@@ -215,15 +218,15 @@ impl<'a> RunInputs<'a> {
         })
     }
 
-    /// Returns the arguments for the start of the world process.
-    fn launch(&self, command: &str) -> Launch<'a> {
-        Launch {
-            command: command.to_owned(),
+    /// Returns the arguments for the connection to the world.
+    fn launch(&mut self) -> Result<Launch<'a>, Error> {
+        Ok(Launch {
+            source: WorldSource::of(self.spec, self.embedded.take())?,
             task: self.task,
             limits: self.limits.clone(),
             stop: self.background.stop.clone(),
             warnings: self.warnings.clone(),
-        }
+        })
     }
 
     /// Wraps a world for operators' requests and background planning.

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom::execution::{Command, Event};
+use elbowroom::execution::{Command, Event, Ticket};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::line::{GivenLine, ObservationLine};
 use elbowroom::report::trace::{Line, SnapshotLine, Stored};
 use elbowroom::report::wire;
 use serde_json::{Value, json};
+
+use crate::embedded_world::StartedAction;
 
 /// Actions that were started and whose end is not in the journal.
 #[derive(Debug, Default)]
@@ -21,7 +23,10 @@ pub(crate) struct RunningActions {
 #[derive(Debug)]
 struct Open {
     action: String,
-    is_instantaneous: bool,
+    /// Planned duration; `None` for an instantaneous action.
+    duration: Option<Rational>,
+    /// Time of its command.
+    ordered: Rational,
     has_started: bool,
     is_cancelled: bool,
 }
@@ -38,7 +43,8 @@ impl RunningActions {
         let open = starts.filter(|it| it.is_open()).map(|it| {
             let open = Open {
                 action: it.action.clone(),
-                is_instantaneous: it.duration.is_none(),
+                duration: it.duration.as_ref().map(|it| it.0.clone()),
+                ordered: it.ordered.0.clone(),
                 has_started: it.started.is_some(),
                 is_cancelled: it.cancelled.is_some(),
             };
@@ -50,7 +56,7 @@ impl RunningActions {
         };
         for line in &stored.lines {
             match line {
-                Line::Command(line) => running.note_line(&line.command),
+                Line::Command(line) => running.note_line(&line.now.0, &line.command),
                 Line::Passed(line) => line.observations.iter().for_each(|it| running.read(it)),
                 Line::Looked(line) => line.observations.iter().for_each(|it| running.read(it)),
                 _ => {}
@@ -59,34 +65,41 @@ impl RunningActions {
         running
     }
 
-    fn note_line(&mut self, command: &GivenLine) {
+    fn note_line(&mut self, now: &Rational, command: &GivenLine) {
         match command {
             GivenLine::Start {
                 ticket,
                 action,
                 duration,
-            } => self.start(*ticket, action, duration.is_none()),
+            } => self.start(now, *ticket, action, duration.as_ref().map(|it| &it.0)),
             GivenLine::Cancel { ticket } => self.cancel(*ticket),
         }
     }
 
     /// Records a command that the world receives.
-    pub(crate) fn note(&mut self, command: &Command) {
+    pub(crate) fn note(&mut self, now: &Rational, command: &Command) {
         match command {
             Command::Start {
                 ticket,
                 action,
                 duration,
-            } => self.start(ticket.0, &action.name, duration.is_none()),
+            } => self.start(now, ticket.0, &action.name, duration.as_ref()),
             Command::Cancel { ticket } => self.cancel(ticket.0),
         }
     }
 
-    fn start(&mut self, ticket: u64, action: &str, is_instantaneous: bool) {
+    fn start(
+        &mut self,
+        ordered: &Rational,
+        ticket: u64,
+        action: &str,
+        duration: Option<&Rational>,
+    ) {
         self.given = self.given.max(ticket + 1);
         let open = Open {
             action: action.to_owned(),
-            is_instantaneous,
+            duration: duration.cloned(),
+            ordered: ordered.clone(),
             has_started: false,
             is_cancelled: false,
         };
@@ -118,7 +131,7 @@ impl RunningActions {
 
     fn started(&mut self, ticket: u64) {
         match self.open.get_mut(&ticket) {
-            Some(open) if open.is_instantaneous => self.ended(ticket),
+            Some(open) if open.duration.is_none() => self.ended(ticket),
             Some(open) => open.has_started = true,
             None => {}
         }
@@ -142,6 +155,17 @@ impl RunningActions {
     /// Tickets below this one were issued.
     pub(crate) fn given(&self) -> u64 {
         self.given
+    }
+
+    /// Returns the actions, for a world in this process.
+    pub(crate) fn actions(&self) -> Vec<StartedAction> {
+        let open = self.open.iter().map(|(ticket, open)| StartedAction {
+            ticket: Ticket(*ticket),
+            action: open.action.clone(),
+            duration: open.duration.clone(),
+            ordered: open.ordered.clone(),
+        });
+        open.collect()
     }
 
     /// Returns the message about these actions for the world.

@@ -30,6 +30,19 @@ const MOST_KEPT: usize = 4_000_000;
 #[derive(Clone, Default)]
 pub struct TraceBuffer(Arc<Shared>);
 
+/// New lines of a trace.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NewLines {
+    /// The lines, without their line feeds.
+    pub lines: Vec<String>,
+    /// Number of earlier lines that are no longer kept.
+    pub missed: usize,
+    /// Number of the last line.
+    pub last: usize,
+    /// `true` if the run has ended: no further lines follow.
+    pub is_over: bool,
+}
+
 #[derive(Default)]
 struct Shared {
     state: Mutex<State>,
@@ -201,6 +214,27 @@ impl TraceBuffer {
         elbowroom_page::live_page(TRACE_NAME, &trace, left_out).map_err(|error| error.to_string())
     }
 
+    /// Returns the lines after line `sent`, without their line feeds. Waits for at most `timeout` if there are none and
+    /// the run continues.
+    pub fn lines_after(&self, sent: usize, timeout: Duration) -> NewLines {
+        let waits = |state: &mut State| state.lines() <= sent && !state.is_over;
+        let waited = self
+            .0
+            .changed
+            .wait_timeout_while(self.lock(), timeout, waits);
+        let (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let (news, missed) = state.after(sent.min(state.lines()));
+        NewLines {
+            lines: news
+                .iter()
+                .map(|line| line.trim_end_matches('\n').to_owned())
+                .collect(),
+            missed,
+            last: state.lines(),
+            is_over: state.is_over,
+        }
+    }
+
     /// Sends an event for each change, until the run ends or the client disconnects.
     ///
     /// # Errors
@@ -314,6 +348,8 @@ impl TraceBuffer {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::{Subscriber, TraceBuffer};
 
     impl Subscriber for Vec<u8> {
@@ -382,6 +418,23 @@ mod tests {
             assert_eq!(behind.matches("event: entry").count(), lines - until);
             assert!(!behind.contains("missed"));
         }
+    }
+
+    #[test]
+    fn new_lines_are_counted() {
+        let buffer = filled(Some(3000), 600);
+        let until = buffer.last_omitted_line().expect("600 lines are more");
+        let short = Duration::from_millis(1);
+        let late = buffer.lines_after(until - 7, short);
+        assert_eq!((late.missed, late.last), (7, 600));
+        assert_eq!(late.lines.len(), 600 - until);
+        assert_eq!(format!("{}\n", late.lines[0]), line(until + 1));
+        let last = buffer.lines_after(599, short);
+        assert_eq!(last.lines, [line(600).trim_end()]);
+        assert_eq!(buffer.lines_after(600, short).lines, [""; 0]);
+        assert!(!last.is_over);
+        buffer.close();
+        assert!(buffer.lines_after(600, Duration::MAX).is_over);
     }
 
     #[test]

@@ -32,6 +32,7 @@
 
 mod campaign;
 mod command;
+mod executive;
 mod odds;
 mod planner;
 mod plans;
@@ -53,6 +54,8 @@ mod native {
     use crate::campaign::{Experiment, experiment_files};
     #[pymodule_export]
     use crate::command::command;
+    #[pymodule_export]
+    use crate::executive::Executive;
     #[pymodule_export]
     use crate::odds::odds;
     #[pymodule_export]

@@ -8,6 +8,7 @@ use elbowroom::answers::plan::PlannerFailure;
 use elbowroom::execute::SpecError;
 use elbowroom::num::Rational;
 use elbowroom::text::Diagnostics;
+use elbowroom_executive::run::RunError;
 use elbowroom_laboratory::answer::CompareError;
 use pyo3::prelude::*;
 
@@ -21,6 +22,8 @@ pub(crate) enum Trouble {
     Unsupported(String),
     /// The judge cannot tell.
     Undecided(String),
+    /// An executive cannot be started or resumed.
+    Executive(String),
     /// A planner could not be run.
     Planner(String),
     /// Something in Python has failed, which says so itself.
@@ -42,6 +45,7 @@ impl Trouble {
             Self::Request(message) => exception(py, "RequestError", (message,)),
             Self::Unsupported(message) => exception(py, "UnsupportedError", (message,)),
             Self::Undecided(message) => exception(py, "UndecidedError", (message,)),
+            Self::Executive(message) => exception(py, "ExecutiveError", (message,)),
             Self::Planner(message) => exception(py, "PlannerError", (message,)),
             Self::Python(error) => error,
         }
@@ -76,6 +80,16 @@ impl From<SpecError> for Trouble {
             SpecError::World(wrong) | SpecError::Likelihoods(wrong) => Self::Read(wrong),
             SpecError::Planner(wrong) => Self::Planner(wrong.to_string()),
             other => Self::request(other),
+        }
+    }
+}
+
+impl From<RunError> for Trouble {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Problem(wrong) => Self::Read(wrong),
+            RunError::Spec(wrong) => wrong.into(),
+            RunError::Failed(error) => Self::Executive(advised(&error)),
         }
     }
 }
@@ -130,6 +144,14 @@ where
         .and_then(|module| module.getattr(name))
         .and_then(|class| class.call1(arguments));
     made.map_or_else(|error| error, PyErr::from_value)
+}
+
+/// Returns the message of an error with its advice.
+pub(crate) fn advised(error: &elbowroom_executive::Error) -> String {
+    match error.advice() {
+        "" => error.message().to_owned(),
+        advice => format!("{}; {advice}", error.message()),
+    }
 }
 
 /// A document.

@@ -8,6 +8,7 @@ use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::wire;
+use elbowroom_executive::{EmbeddedWorld, StartedAction};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -126,6 +127,34 @@ impl World for PyWorld {
             Some(text) => self.understood(read_observations(&text, &self.task)),
             None => Ok(Vec::new()),
         }
+    }
+}
+
+impl EmbeddedWorld for PyWorld {
+    fn recall(
+        &mut self,
+        now: &Rational,
+        running: &[StartedAction],
+    ) -> Result<Option<Passage>, WorldError> {
+        let running = running.iter().map(|it| {
+            let duration = it.duration.as_ref().map(ToString::to_string);
+            (
+                it.ticket.0,
+                it.action.as_str(),
+                duration,
+                it.ordered.to_string(),
+            )
+        });
+        let told = (now.to_string(), running.collect::<Vec<_>>());
+        let answered = Python::attach(|py| {
+            self.call(py, "recall", told, |it| it.extract::<Option<String>>())
+        })?;
+        let Some(text) = answered.flatten() else {
+            return Ok(None);
+        };
+        let passage = self.understood(read_passage(&text, &self.task))?;
+        self.now = passage.now.clone();
+        Ok(Some(passage))
     }
 }
 

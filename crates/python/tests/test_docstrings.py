@@ -8,7 +8,7 @@ import importlib
 import pytest
 from conftest import names
 
-MODULES = ["", "._answers", "._errors", "._executable", "._execution", "._numbers", "._odds", "._problem",
+MODULES = ["", "._answers", "._errors", "._executable", "._execution", "._executive", "._numbers", "._odds", "._problem",
            "._stepped", "._stop", "._tables", "._world"]  # fmt: skip
 
 

@@ -343,6 +343,7 @@ impl Job<'_> {
             spec,
             task: self.task,
             first_plan: self.first,
+            embedded: None,
             operator: self.operator,
             background: background(arguments, interrupt),
             limits: limits(arguments),

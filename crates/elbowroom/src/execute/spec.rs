@@ -58,6 +58,14 @@ pub struct RunSpec {
     /// changes of facts. Omitted if it believes the file of the simulation, or knows nothing of its process.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub believed: Option<String>,
+    /// `true` if the world is an object in the process of the run, and `world_process` its description. Omitted if
+    /// `false`.
+    #[serde(
+        default,
+        rename = "embedded_world",
+        skip_serializing_if = "std::ops::Not::not"
+    )]
+    pub is_world_embedded: bool,
     /// A world that lets each action end when that is worst; left out where it is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spoiler: Option<Spoiler>,
@@ -212,6 +220,7 @@ impl RunSpec {
             world: None,
             world_process: None,
             believed: None,
+            is_world_embedded: false,
             spoiler: None,
             planner: EMBEDDED.to_owned(),
             planner_time: None,
@@ -329,5 +338,5 @@ impl RunSpec {
 }
 
 fn read_world(text: &str, problem: &Problem) -> Result<WorldModel, Diagnostics> {
-    WorldModel::read(&Source::new("world", text), problem)
+    WorldModel::read(Source::new("world", text), problem)
 }

@@ -2,7 +2,6 @@
 //! its queue.
 
 use std::collections::BTreeSet;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use elbowroom::execution::run::FIRST_GOAL;
@@ -20,7 +19,7 @@ use serde::de::DeserializeOwned;
 use super::router::{Accepted, ApiError, ApiRouter, ServedRun};
 use crate::error::Error;
 use crate::messages::counted;
-use crate::request_check::check;
+use crate::request_check::{check, check_target};
 use crate::request_queue::{ExternalRequest, RequestStatus};
 
 /// Time limit for a client to wait until the run accepts its request.
@@ -116,7 +115,7 @@ impl ApiRouter {
 
     /// Returns the reason why a request is still pending.
     fn obstacle(&self) -> String {
-        match self.unanswered() {
+        match self.queue().silence() {
             Some(seconds) => format!(
                 "the world answers, which it has not done for {}",
                 counted(usize::try_from(seconds).unwrap_or(usize::MAX), "second")
@@ -126,67 +125,27 @@ impl ApiRouter {
     }
 
     fn goal(&self, given: NewGoal) -> Result<Taken, ApiError> {
-        let status = &self.run()?.status;
-        let open = status.goals();
-        let name = given.name.unwrap_or_else(|| self.new_name(&open));
-        let goal = given.goal.trim().to_owned();
-        let value = given.value.map_or(Rational::ONE, |value| value.0);
-        let refused = |error: String, help| Err(ApiError::new(422, error, help));
-        let request = match (given.deadline, given.within) {
-            (Some(_), Some(_)) => {
-                let error = "the goal has a deadline and a time within which it is to be achieved";
-                return refused(error.to_owned(), "leave out one of them");
-            }
-            (Some(deadline), None) if deadline.0 <= status.state().now.0 => {
-                let now = status.state().now.0.to_decimal(3);
-                let error = format!("the deadline has passed: it is {now}");
-                return refused(
-                    error,
-                    "give a later time, or the seconds from now (`within`)",
-                );
-            }
-            (None, Some(within)) => ExternalRequest::GoalWithin {
-                name: name.clone(),
-                goal,
-                value,
-                within: within.0,
-            },
-            (deadline, None) => ExternalRequest::Request(Request::Pursue {
-                name: name.clone(),
-                goal,
-                value,
-                deadline: deadline.map(|it| it.0),
-            }),
-        };
+        let invalid = |error: Error| ApiError::new(422, error.message(), error.advice());
+        let request = self.names.request(given, &self.run()?.status);
+        let (name, request) = request.map_err(invalid)?;
         self.submit_checked(request, Some(name))
     }
 
-    /// Returns a name that no open goal has.
-    fn new_name(&self, open: &[String]) -> String {
-        loop {
-            let number = self.named.fetch_add(1, Ordering::SeqCst) + 1;
-            let name = format!("goal-{number}");
-            if !open.contains(&name) {
-                return name;
-            }
-        }
+    /// Submits a request about an open goal or a running action if the run knows it.
+    fn submit_about(
+        &self,
+        request: ExternalRequest,
+        name: Option<String>,
+    ) -> Result<Taken, ApiError> {
+        let unknown = |error: Error| ApiError::new(404, error.message(), error.advice());
+        check_target(&request, &self.run()?.status, self.queue()).map_err(unknown)?;
+        self.submit(vec![request], name)
     }
 
     fn abandon(&self, name: &str) -> Result<Taken, ApiError> {
-        let status = &self.run()?.status;
-        let open = status.goals();
-        // A pending request, or the journal that is replayed, may add the goal.
-        let is_known = open.iter().any(|known| known == name) || !self.queue().is_idle();
-        if !is_known && !status.is_replayed() {
-            let help = match open.as_slice() {
-                [] => "no goals are open".to_owned(),
-                open => format!("these are open: {}", open.join(", ")),
-            };
-            return Err(ApiError::new(404, "no goal of that name is open", help));
-        }
         let name = name.to_owned();
         let request = Request::Abandon { name: name.clone() };
-        self.submit(vec![ExternalRequest::Request(request)], Some(name))
+        self.submit_about(ExternalRequest::Request(request), Some(name))
     }
 
     fn action(&self, given: &NewOutcome) -> Result<Taken, ApiError> {
@@ -202,20 +161,7 @@ impl ApiRouter {
                 return Err(ApiError::new(422, error, help));
             }
         };
-        let running = self.run()?.status.state().running;
-        if !running.iter().any(|it| it.ticket == given.ticket) && self.queue().is_idle() {
-            let running = running
-                .iter()
-                .map(|it| format!("{} {}", it.ticket, it.action));
-            let running: Vec<String> = running.collect();
-            let help = match running.as_slice() {
-                [] => "no action is running".to_owned(),
-                running => format!("these are running: {}", running.join(", ")),
-            };
-            let error = format!("no action with the ticket {} is running", given.ticket);
-            return Err(ApiError::new(404, error, help));
-        }
-        self.submit(vec![request], None)
+        self.submit_about(request, None)
     }
 
     fn fact(&self, given: NewFact) -> Result<Taken, ApiError> {

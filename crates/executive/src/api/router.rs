@@ -2,7 +2,6 @@
 
 use std::io;
 use std::net::SocketAddr;
-use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -14,6 +13,7 @@ use elbowroom::report::trace::TraceWriter;
 use serde::Serialize;
 
 use crate::error::Error;
+use crate::goal_request::GoalNames;
 use crate::http::{
     AccessControl, Request, RequestError, Stream, is_local_name, respond, respond_with_events,
 };
@@ -93,8 +93,8 @@ pub struct ApiRouter {
     /// Number of mutations in progress.
     changing: Mutex<usize>,
     answered: Condvar,
-    /// Number of goals that were named by the router.
-    pub(super) named: AtomicU64,
+    /// Names of goals that are submitted without a name.
+    pub(super) names: GoalNames,
 }
 
 impl ApiRouter {
@@ -119,7 +119,7 @@ impl ApiRouter {
             initial: InitialProblem::default(),
             changing: Mutex::new(0),
             answered: Condvar::new(),
-            named: AtomicU64::new(0),
+            names: GoalNames::default(),
         }
     }
 

@@ -37,6 +37,8 @@ from ._errors import (
     DamagedWarning,
     Diagnostic,
     ElbowroomError,
+    ExecutiveError,
+    ExecutiveWarning,
     InterruptedWarning,
     PlannerError,
     ReadError,
@@ -46,6 +48,8 @@ from ._errors import (
     WorldError,
 )
 from ._execution import Cancel, Look, Over, Start, Stepped, Wait
+from ._executive import Executive
+from ._executive_answers import Doubt, Goal, PlannedAction, RunningAction, Status
 from ._odds import ActionShare, FactShare, Happening, Loss, Odds, Sampled
 from ._plans import Plans
 from ._problem import Problem, read
@@ -102,12 +106,17 @@ __all__ = [
     "Constraint",
     "DamagedWarning",
     "Diagnostic",
+    "Doubt",
     "ElbowroomError",
     "Envelope",
     "Execution",
+    "Executive",
+    "ExecutiveError",
+    "ExecutiveWarning",
     "ExecutorInfo",
     "Experiment",
     "FactShare",
+    "Goal",
     "Happening",
     "InterruptedWarning",
     "Look",
@@ -118,6 +127,7 @@ __all__ = [
     "Odds",
     "Over",
     "Plan",
+    "PlannedAction",
     "PlannerError",
     "Plans",
     "Problem",
@@ -126,8 +136,10 @@ __all__ = [
     "RequestError",
     "Room",
     "Run",
+    "RunningAction",
     "Sampled",
     "Start",
+    "Status",
     "Step",
     "Stepped",
     "SteppedWorld",

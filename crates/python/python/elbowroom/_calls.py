@@ -7,6 +7,7 @@ import contextvars
 import inspect
 import queue
 import threading
+import weakref
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
@@ -28,6 +29,12 @@ class WorldThread:
         self._jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
         self._last: Future[Any] | None = None
         self._has_thread = False
+        self._threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
+
+    @property
+    def is_current(self) -> bool:
+        """``True`` in a thread of this world."""
+        return threading.current_thread() in self._threads
 
     def __call__(self, method: Callable[..., Any], *arguments: Any) -> Future[Any]:
         is_blocked = self._last is not None and not self._last.done()
@@ -39,6 +46,7 @@ class WorldThread:
                 target=context.run, args=(_work, self._jobs), name="elbowroom-world", daemon=True
             )
             thread.start()
+            self._threads.add(thread)
             self._has_thread = True
         future: Future[Any] = Future()
         future.set_running_or_notify_cancel()
@@ -70,6 +78,14 @@ class WorldLoop:
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
 
+    @property
+    def is_current(self) -> bool:
+        """``True`` in the thread of the event loop while it runs."""
+        try:
+            return asyncio.get_running_loop() is self._loop
+        except RuntimeError:
+            return False
+
     def __call__(self, method: Callable[..., Any], *arguments: Any) -> Future[Any]:
         async def call() -> Any:
             made = method(*arguments)
@@ -83,5 +99,5 @@ class WorldLoop:
 
 def has_coroutines(world: object) -> bool:
     """Returns ``True`` if methods of a world are coroutines."""
-    methods = (getattr(world, name, None) for name in ("start", "cancel", "wait", "look", "stop"))
+    methods = (getattr(world, name, None) for name in ("start", "cancel", "wait", "look", "resume", "stop"))
     return any(inspect.iscoroutinefunction(method) for method in methods)

@@ -38,6 +38,10 @@ class ClockCheck:
         self._jumps = 0
         self._steps_back = 0
 
+    def begin(self, now: Fraction) -> None:
+        """Sets the time from which the clock of a resumed run advances."""
+        self._last = now
+
     def expect(self, until: Fraction) -> Overdue:
         """Returns the message for a wait until ``until`` that takes too long."""
         before = self._last

@@ -89,6 +89,19 @@ class WorldError(ElbowroomError):
         self.run = run
 
 
+class ExecutiveError(ElbowroomError):
+    """An executive cannot be started or resumed, its journal cannot be written, or it has ended.
+
+    ``run`` is what came of the run until then, if there was one.
+    """
+
+    run: Any
+
+    def __init__(self, message: str, run: Any = None) -> None:
+        super().__init__(message)
+        self.run = run
+
+
 class CampaignError(ElbowroomError):
     """Parts of a campaign are missing, or could not be made; it says which."""
 
@@ -109,6 +122,10 @@ class InterruptedWarning(UserWarning):
 
 class ClockWarning(UserWarning):
     """The clock of a world in Python does not advance, jumps, or is set back; see :attr:`Run.warnings`."""
+
+
+class ExecutiveWarning(UserWarning):
+    """Something about the journal or the clock of an executive that continues; see :attr:`Executive.warnings`."""
 
 
 class DamagedWarning(UserWarning):

@@ -19,7 +19,6 @@ from concurrent.futures import Future
 from fractions import Fraction
 from typing import Any
 
-from . import _native
 from ._calls import WorldLoop, WorldThread
 from ._clock import ClockCheck, Overdue
 from ._errors import ClockWarning
@@ -49,7 +48,7 @@ class Blocked(Exception):
 class Lifecycle:
     """Passes commands and waits of a run to a world, and ends the run on request.
 
-    The native module calls ``start``, ``cancel``, ``wait``, ``look`` and ``begin_end``, all in one thread.
+    The native module calls ``recall``, ``start``, ``cancel``, ``wait``, ``look`` and ``begin_end``, all in one thread.
     :meth:`request_end` and :meth:`interrupt` may be called from any thread and from signal handlers.
     """
 
@@ -57,12 +56,12 @@ class Lifecycle:
         self,
         world: Any,
         submit: WorldThread | WorldLoop,
-        stop: _native.Stop,
+        request_stop: Callable[[], None],
         time_limit: float | None = None,
     ) -> None:
         self._world = world
         self._submit = submit
-        self._stop = stop
+        self._request_stop = request_stop
         self._time_limit = None if time_limit is None else time.monotonic() + time_limit
         self._actions: dict[int, Action] = {}
         self._open: dict[int, Action] = {}
@@ -77,6 +76,8 @@ class Lifecycle:
         # The run has cancelled its actions, or does so next; waits are for late outcomes only.
         self._is_closing = False
         self._is_abandoned = False
+        # The clock of a resumed world restarts at its next answer.
+        self._is_clock_new = False
         # The first failure after the request to end.
         self._failure: Exception | None = None
         self._interrupts = 0
@@ -91,7 +92,7 @@ class Lifecycle:
         """Ends the run in order."""
         if self._ends_since is None:
             self._ends_since = time.monotonic()
-        self._stop.request()
+        self._request_stop()
         self._inbox.put(None)
 
     def interrupt(self) -> None:
@@ -100,6 +101,11 @@ class Lifecycle:
         if self._interrupts >= 3:
             self._is_abandoned = True
         self.request_end()
+
+    @property
+    def interrupts(self) -> int:
+        """The number of calls of :meth:`interrupt`."""
+        return self._interrupts
 
     @property
     def is_interrupted(self) -> bool:
@@ -141,7 +147,46 @@ class Lifecycle:
         self._is_abandoned = True
         self.request_end()
 
+    @property
+    def is_in_world(self) -> bool:
+        """``True`` in the thread in which methods of the world are called: nothing may wait for the run there."""
+        return self._submit.is_current
+
     # Calls from the native module.
+
+    def recall(self, now: str, running: list[tuple[int, str, str | None, str]]) -> str | None:
+        self._now = now
+        self._is_clock_new = True
+        resume = getattr(self._world, "resume", None)
+        if resume is None:
+            return None
+        actions = [
+            Action(ticket, name, None if duration is None else Fraction(duration), Fraction(ordered))
+            for ticket, name, duration, ordered in running
+        ]
+        # If the world raises, they are cancelled.
+        known = {action.ticket: action for action in actions}
+        self._actions.update(known)
+        self._open.update(known)
+        answer = self._call(resume, Fraction(now), actions)
+        if answer is None:
+            for ticket in known:
+                del self._actions[ticket], self._open[ticket]
+            return None
+        try:
+            passed = passage(answer, "resume")
+        except Exception:
+            self.begin_end()
+            raise
+        self._now = passed["now"]
+        self.clock.begin(Fraction(self._now))
+        self._is_clock_new = False
+        reported = {fields.get("ticket") for fields in passed["observations"]}
+        for ticket in known.keys() - reported:
+            # It has failed.
+            del self._open[ticket]
+        self._note(passed["observations"])
+        return json.dumps(passed)
 
     def start(self, now: str, ticket: int, name: str, duration: str | None) -> None:
         lasts = None if duration is None else Fraction(duration)
@@ -323,8 +368,11 @@ class Lifecycle:
         return json.dumps(passage((Fraction(self._now), ())))
 
     def _check_clock(self, until: Fraction, now: Fraction, is_silent: bool) -> None:
+        if self._is_clock_new:
+            self._is_clock_new = False
+            self.clock.begin(now)
         # A wait that is cut short at the end of the run continues beyond its time.
-        if not self._is_closing:
+        elif not self._is_closing:
             message = self.clock.note(until, now, is_silent)
             if message is not None:
                 warnings.warn(message, ClockWarning, 2)

@@ -23,7 +23,9 @@ from ._stop import Stop
 from ._texts import PlannerCallable, asked, named_text, seconds
 from ._world import AsyncWorld
 
-_TEXTS = ("precision", "planning_time", "realtime", "time_limit", "planner_time", "epsilon")
+_TEXTS = (
+    "precision", "planning_budget", "planning_time", "realtime", "time_limit", "planner_time", "epsilon",
+)  # fmt: skip
 
 _MARGIN = 1.0
 """Further seconds before a cancelled task is left alone with a planner that blocks."""
@@ -57,6 +59,51 @@ def run_options(
     return chosen
 
 
+def world_lifecycle(
+    world: Any,
+    request_stop: Callable[[], None],
+    limit: float | None = None,
+    loop: asyncio.AbstractEventLoop | None = None,
+) -> Lifecycle:
+    """The lifecycle of a world in Python. With ``loop``, its methods may be coroutines of that event loop."""
+    is_in_loop = isinstance(world, AsyncWorld) or has_coroutines(world)
+    submit = WorldLoop(loop) if loop is not None and is_in_loop else WorldThread()
+    lifecycle: Lifecycle | None = None
+    if isinstance(world, SteppedWorld):
+        world = SteppedAdapter(world, lambda: lifecycle is not None and lifecycle.is_ending)
+    lifecycle = Lifecycle(world, submit, request_stop, limit)
+    return lifecycle
+
+
+def description(world: object) -> str:
+    """The description of a world in Python in a specification. What it does is its own; nothing is known of it."""
+    return f"python {type(world).__qualname__}"
+
+
+def concluded(
+    run: Run,
+    raised: BaseException | None,
+    failure: Exception | None,
+    lifecycle: Lifecycle | None,
+) -> list[str]:
+    """Warnings about the end of a run. ``raised`` is the exception of the world, ``failure`` one after its end.
+
+    Raises:
+        WorldError: if the world has failed.
+    """
+    if lifecycle is not None:
+        run.warnings += lifecycle.clock.messages
+    raised = failure if raised is None or isinstance(raised, Blocked) else raised
+    if raised is not None:
+        raise WorldError(f"{type(raised).__name__}: {raised}", run) from raised
+    if run.verdict == "world-failed":
+        raise WorldError(f"the world broke its contract: {run.why}", run)
+    if lifecycle is None or not (lifecycle.is_ended_early and lifecycle.running):
+        return []
+    running = ", ".join(lifecycle.running)
+    return [f"these actions were cancelled, and have not ended: {running}"]
+
+
 class RunRequest:
     """A run that has not begun. With ``loop``, methods of the world are coroutines of that event loop."""
 
@@ -87,16 +134,8 @@ class RunRequest:
         elif isinstance(world, AsyncWorld) and loop is None:
             raise TypeError("this world has coroutines; `await problem.run_async(…)`")
         elif world is not None:
-            is_in_loop = isinstance(world, AsyncWorld) or has_coroutines(world)
-            submit = WorldLoop(loop) if loop is not None and is_in_loop else WorldThread()
-            # What the world does is its own; nothing is known of it.
-            self._chosen["world_process"] = f"python {type(world).__qualname__}"
-            if isinstance(world, SteppedWorld):
-                world = SteppedAdapter(world, self._is_ending)
-            self._lifecycle = Lifecycle(world, submit, self._stop, self._limit)
-
-    def _is_ending(self) -> bool:
-        return self._lifecycle is not None and self._lifecycle.is_ending
+            self._chosen["world_process"] = description(world)
+            self._lifecycle = world_lifecycle(world, self._stop.request, self._limit, loop)
 
     def execute(self) -> tuple[Run, str | None]:
         """Executes the run. Returns it, and a warning.
@@ -215,26 +254,14 @@ class RunRequest:
         self, answered: tuple[str, str | None, bool, BaseException | None], failure: Exception | None
     ) -> tuple[Run, str | None]:
         answer, record, is_interrupted, raised = answered
-        run = Run(document(answer), record)
-        if self._lifecycle is not None:
-            run.warnings += self._lifecycle.clock.messages
+        run, lifecycle = Run(document(answer), record), self._lifecycle
         if self._handle is not None:
             self._handle.run = run
-        if isinstance(raised, Blocked):
-            raised = None
-        raised = raised or failure
-        if raised is not None:
-            raise WorldError(f"{type(raised).__name__}: {raised}", run) from raised
-        if run.verdict == "world-failed":
-            raise WorldError(f"the world broke its contract: {run.why}", run)
-        lifecycle, said = self._lifecycle, []
+        said = concluded(run, raised, failure, lifecycle)
         if lifecycle is not None:
             is_interrupted = lifecycle.is_interrupted
         elif self._handle is not None and self._handle.is_requested:
             is_interrupted = False
         if is_interrupted:
-            said.append("ended by Ctrl-C; this is what was found until then")
-        if lifecycle is not None and lifecycle.is_ended_early and lifecycle.running:
-            running = ", ".join(lifecycle.running)
-            said.append(f"these actions were cancelled, and have not ended: {running}")
+            said.insert(0, "ended by Ctrl-C; this is what was found until then")
         return run, "; ".join(said) or None

@@ -75,6 +75,12 @@ class SteppedWorld:
         """As :meth:`elbowroom.World.look`."""
         return ()
 
+    def resume(
+        self, now: Fraction, actions: Sequence[Action]
+    ) -> tuple[Number, Sequence[Observation]] | None:
+        """As :meth:`elbowroom.World.resume`. Actions that are reported as started, and not as ended, are running."""
+        return None
+
     def stop(self) -> None:
         """As :meth:`elbowroom.World.stop`."""
 
@@ -113,6 +119,8 @@ class SteppedAdapter(World):
         self._is_to_end = is_to_end
         self._has_yielded = False
         world._time, world._running, world._reports = Fraction(0), set(), deque()
+        # The time of the simulation at `_begun` on the real clock.
+        self._origin = Fraction(0)
         self._begun = time.monotonic()
 
     def start(self, action: Action) -> None:
@@ -154,10 +162,25 @@ class SteppedAdapter(World):
     def look(self, facts: Sequence[str], fluents: Sequence[str]) -> Sequence[Observation]:
         return self._world.look(facts, fluents)
 
+    def resume(
+        self, now: Fraction, actions: Sequence[Action]
+    ) -> tuple[Number, Sequence[Observation]] | None:
+        answer = self._world.resume(now, actions)
+        if answer is not None:
+            time_now, observations = answer
+            self._world._time = Fraction(text(time_now))
+            self._origin = self._world._time
+            for fields in (it.fields for it in observations):
+                if fields["type"] == "started":
+                    self._world._running.add(fields["ticket"])
+                elif fields["type"] == "ended":
+                    self._world._running.discard(fields["ticket"])
+        return answer
+
     def stop(self) -> None:
         self._world.stop()
 
     def _keep_pace(self) -> None:
         if self._world.speed is not None:
-            due = self._begun + float(self._world._time) / self._world.speed
+            due = self._begun + float(self._world._time - self._origin) / self._world.speed
             time.sleep(max(0.0, due - time.monotonic()))

@@ -123,12 +123,26 @@ class World:
         """What is true of these now; nothing, if the world cannot look."""
         return ()
 
+    def resume(
+        self, now: Fraction, actions: Sequence[Action]
+    ) -> tuple[Number, Sequence[Observation]] | None:
+        """Reports the outcome of actions that another process has started.
+
+        Called once, before anything else, when :meth:`elbowroom.Executive.resume` resumes a run. ``now`` is the time of
+        the last record in the journal, ``actions`` are those that had not ended.
+
+        Returns what time it is, and :func:`started` or :func:`ended` for each action whose outcome is known. The others
+        have failed, and are cancelled. ``None``: nothing of the actions runs any more; all of them have failed, and the
+        clock of this world restarts.
+        """
+        return None
+
     def stop(self) -> None:
         """Stops everything. Called once at the end of each run, whatever has ended it."""
 
 
 class AsyncWorld:
-    """A world whose methods are coroutines, for :meth:`elbowroom.Problem.run_async`."""
+    """A world whose methods are coroutines, for :meth:`elbowroom.Problem.run_async` and :class:`elbowroom.Executive`."""
 
     async def start(self, action: Action) -> None:
         """As :meth:`World.start`."""
@@ -146,17 +160,25 @@ class AsyncWorld:
         """As :meth:`World.look`."""
         return ()
 
+    async def resume(
+        self, now: Fraction, actions: Sequence[Action]
+    ) -> tuple[Number, Sequence[Observation]] | None:
+        """As :meth:`World.resume`."""
+        return None
+
     async def stop(self) -> None:
         """As :meth:`World.stop`."""
 
 
-def passage(answer: tuple[Number, Sequence[Observation]]) -> dict[str, Any]:
+def passage(
+    answer: tuple[Number, Sequence[Observation]], method: str = "wait"
+) -> dict[str, Any]:
     """The answer to a wait, as the native module reads it in JSON."""
     try:
         now, observations = answer
     except (TypeError, ValueError):
         raise TypeError(
-            f"wait() must return what time it is and a list of observations, not {answer!r}"
+            f"{method}() must return what time it is and a list of observations, not {answer!r}"
         ) from None
     return {"now": text(now), "observations": wire(observations)}
 

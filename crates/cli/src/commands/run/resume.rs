@@ -129,6 +129,7 @@ pub(in crate::commands) fn run(
     let interrupt = Interrupt::listen_with_world();
     let learning = super::learning(arguments, path)?;
     let settings = ResumeSettings {
+        embedded: None,
         task: &task,
         background: background(arguments, &interrupt),
         limits: limits(arguments),

@@ -1,0 +1,141 @@
+"""Answers of an executive: its status, its goals and its plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+
+class Goal(NamedTuple):
+    """A goal of an executive; true in conditions if it was achieved."""
+
+    name: str
+    """Its name; that of the problem's own goal is ``problem``."""
+    goal: str
+    """The goal, in PDDL."""
+    value: Fraction
+    """Its value, a positive number."""
+    deadline: Fraction | None
+    """Its deadline on the world's clock, if there is one."""
+    state: str
+    """``"pursued"``; ``"set-aside"`` while others are pursued; ``"impossible"`` if no plan exists, or ``"unplanned"`` if
+    none was found, from where the executive rests; ``"achieved"``; ``"cancelled"``; or ``"failed"`` if it was not achieved by
+    its deadline."""
+    given: Fraction | None
+    """When it was given, by the world's clock; ``None`` if an earlier segment of the journal has it."""
+    since: Fraction
+    """Since when it is in this state."""
+    why: str | None
+    """The reason for another state than ``"pursued"`` and ``"achieved"``, if it is known."""
+
+    def __bool__(self) -> bool:
+        return self.state == "achieved"
+
+    @property
+    def is_open(self) -> bool:
+        """``True`` if the executive still pursues the goal, or may do so again."""
+        return self.state not in ("achieved", "cancelled", "failed")
+
+    @property
+    def is_undecided(self) -> bool:
+        """``True`` while the executive pursues the goal, or other goals first."""
+        return self.state in ("pursued", "set-aside")
+
+
+class RunningAction(NamedTuple):
+    """An action that is running."""
+
+    ticket: int
+    """The number of its start."""
+    action: str
+    """The action."""
+    since: Fraction
+    """When it was started."""
+    planned: Fraction | None
+    """How long it was planned to take."""
+    needed: Fraction | None
+    """From when on a new plan is needed if it has not ended, once that is near."""
+    times_out: Fraction | None
+    """When it times out and is cancelled, once that is near."""
+    completion: Fraction | None
+    """The part that is done, from 0 to 1, if the world has said so."""
+    note: str | None
+    """What the world has said last about it."""
+
+
+class Doubt(NamedTuple):
+    """A fact or a number that is in doubt."""
+
+    name: str
+    """The fact or the number."""
+    since: Fraction
+    """Since when."""
+    why: str
+    """The reason, and how the doubt can be settled."""
+
+
+class PlannedAction(NamedTuple):
+    """An action of the plan that is executed."""
+
+    action: str
+    """The action."""
+    start: Fraction
+    """When it was started, or is planned to start."""
+    duration: Fraction | None
+    """Its planned duration; ``None`` for an instantaneous action."""
+    state: str
+    """``"to-come"``, ``"running"``, ``"succeeded"``, ``"failed"`` or ``"cancelled"``."""
+    ticket: int | None
+    """The number of its start, once it is started."""
+
+
+class Status(NamedTuple):
+    """The state of an executive."""
+
+    now: Fraction
+    """The time by the world's clock."""
+    activity: str
+    """``"beginning"``, ``"planning"``, ``"executing"``, ``"paused"``, ``"resting"`` or ``"over"``."""
+    why: str | None
+    """The reason, for example for a rest, if there is something to say."""
+    unanswered: int | None
+    """For how many seconds the world has not answered, if that is more than one second."""
+    running: list[RunningAction]
+    """The running actions."""
+    plans: int
+    """The number of plans that were adopted so far."""
+    facts: frozenset[str]
+    """The facts that are believed to be true."""
+    numbers: Mapping[str, Fraction]
+    """The believed values of numeric fluents."""
+    in_doubt: list[Doubt]
+    """Facts and numbers that are in doubt. Such a fact counts as false."""
+
+
+def goals(document: dict[str, Any]) -> list[Goal]:
+    """The goals in a document: first those that were closed, then the open ones, each in their order."""
+    return [Goal(*(it[field] for field in Goal._fields)) for it in document["goals"]]
+
+
+def planned(document: dict[str, Any]) -> list[PlannedAction]:
+    """The actions of the plan in a document."""
+    fields = PlannedAction._fields
+    return [PlannedAction(*(it[field] for field in fields)) for it in document["steps"]]
+
+
+def status(document: dict[str, Any]) -> Status:
+    """The state in a document."""
+    running = document["running"]
+    fields = RunningAction._fields
+    return Status(
+        now=document["now"],
+        activity=document["activity"],
+        why=document["why"],
+        unanswered=document["unanswered"],
+        running=[RunningAction(*(it[field] for field in fields)) for it in running],
+        plans=document["plans"],
+        facts=frozenset(document["facts"]),
+        numbers={it["fluent"]: it["value"] for it in document["numbers"]},
+        in_doubt=[Doubt(it["name"], it["since"], it["why"]) for it in document["in_doubt"]],
+    )
