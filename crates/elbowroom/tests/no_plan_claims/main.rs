@@ -10,6 +10,7 @@
 #[path = "../../../stn/tests/game/mod.rs"]
 mod game;
 
+mod amid;
 mod draft;
 mod situations;
 mod unsolvable;
