@@ -74,14 +74,44 @@ fn action(random: &mut Random, number: usize) -> String {
 }
 
 fn ground(random: &mut Random) -> String {
-    atom(random, OBJECTS[random_object(random)])
+    let object = OBJECTS[random_object(random)];
+    atom(random, object)
 }
 
 fn random_object(random: &mut Random) -> usize {
     random.below(OBJECTS.len())
 }
 
+/// Draws a problem with tokens that actions carry between three places. One token too few keeps the goal out of reach;
+/// that needs a closed set of states.
+fn tokens(random: &mut Random) -> Amid {
+    let [carry, wait] = [random.whole(1, 3), random.whole(1, 3)];
+    let domain = format!(
+        "(define (domain d) (:requirements :adl :durative-actions :typing :timed-initial-literals)
+         (:types thing) (:predicates (p0 ?x - thing) (p1 ?x - thing) (p2 ?x - thing) (q) (r))
+         (:durative-action a1 :parameters (?x - thing) :duration (= ?duration {wait})
+           :condition (and (at start (r)) (at start (not (p0 ?x)))) :effect (and (at start (not (r))) (at end (p1 ?x))))
+         (:durative-action a0 :parameters (?x - thing) :duration (= ?duration {carry})
+           :condition (at start (p0 ?x)) :effect (and (at start (not (p0 ?x))) (at end (r))))
+         (:durative-action a2 :parameters (?x - thing) :duration (= ?duration {carry})
+           :condition (and (at start (r)) (over all (q)) (at start (not (p0 ?x))))
+           :effect (and (at start (not (r))) (at end (p0 ?x)))))"
+    );
+    let mut init = "(q)".to_owned();
+    for object in OBJECTS.iter().take(random.below(3)) {
+        let _ = write!(init, " (p0 {object})");
+    }
+    if random.below(2) == 0 {
+        let _ = write!(init, " (at {} (not (q)))", random.whole(1, 12));
+    }
+    let goal = ["(p0 a) (p0 b) (p0 c)", "(p0 a) (p0 b)", "(p0 a) (p1 b)"][random.below(3)];
+    amid(random, &domain, &init, goal, 3)
+}
+
 fn draw(random: &mut Random) -> Amid {
+    if random.below(4) == 0 {
+        return tokens(random);
+    }
     let count = 2 + random.below(3);
     let actions: String = (0..count).map(|number| action(random, number)).collect();
     let domain = format!(
@@ -110,11 +140,16 @@ fn draw(random: &mut Random) -> Amid {
     for _ in 0..=random.below(2) {
         let _ = write!(goal, " {}", ground(random));
     }
+    amid(random, &domain, &init, &goal, count)
+}
+
+/// Draws a situation in the middle of the execution of a problem with `count` actions.
+fn amid(random: &mut Random, domain: &str, init: &str, goal: &str, count: usize) -> Amid {
     let problem = format!(
         "(define (problem p) (:domain d) (:objects a b c - thing) (:init {init}) (:goal (and {goal})))"
     );
     let sources = (
-        Source::new("domain", domain.as_str()),
+        Source::new("domain", domain),
         Source::new("problem", problem.as_str()),
     );
     let task = match read_problem(&sources.0, &sources.1) {
@@ -215,7 +250,9 @@ fn others(situation: &Situation, random: &mut Random) -> Vec<Situation> {
         });
     }
     for fact in situation.state.facts.clone() {
-        note(&|own| drop(own.state.facts.remove(&fact)));
+        note(&|own| {
+            own.state.facts.remove(&fact);
+        });
     }
     let earlier = Rational::from(random.whole(1, 4));
     note(&|own| {
@@ -228,7 +265,7 @@ fn others(situation: &Situation, random: &mut Random) -> Vec<Situation> {
     others
 }
 
-/// Returns certificates of closed sets with one change each, none of which is a proof.
+/// Returns certificates of closed sets with one change each. No such certificate is a proof.
 fn forged(certificate: &NoPlan) -> Vec<NoPlan> {
     let mut all = Vec::new();
     let Some(closed) = &certificate.closed else {
