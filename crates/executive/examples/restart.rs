@@ -9,8 +9,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use elbowroom::execute::{NamedText, RunSpec};
-use elbowroom::execution::Request;
-use elbowroom::num::Rational;
+use elbowroom::execution::{GoalTerms, Request};
 use elbowroom_executive::request_queue::ExternalRequest;
 use elbowroom_executive::{Executive, ExecutiveSettings};
 
@@ -45,13 +44,8 @@ fn first_run(journal: &Path) -> Result<(), Box<dyn Error>> {
         scope.spawn(|| executive.run());
         wait_for(&executive, "(lies parcel office)");
         let (name, goal) = ("home".to_owned(), GOAL.to_owned());
-        let value = Rational::ONE;
-        let request = ExternalRequest::Request(Request::Pursue {
-            name,
-            goal,
-            value,
-            deadline: None,
-        });
+        let terms = GoalTerms::default();
+        let request = ExternalRequest::Request(Request::Pursue { name, goal, terms });
         executive.submit(request, Duration::from_secs(10))?;
         std::process::abort()
     })

@@ -5,7 +5,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use elbowroom::execute::{NamedText, RunSpec};
-use elbowroom::execution::Request;
+use elbowroom::execution::{GoalTerms, Request};
 use elbowroom::executive::documents::Activity;
 use elbowroom::num::Rational;
 use elbowroom_executive::request_queue::{ExternalRequest, RequestStatus};
@@ -43,8 +43,7 @@ fn pursue(goal: &str) -> ExternalRequest {
     ExternalRequest::Request(Request::Pursue {
         name: "next".to_owned(),
         goal: goal.to_owned(),
-        value: Rational::ONE,
-        deadline: None,
+        terms: GoalTerms::default(),
     })
 }
 

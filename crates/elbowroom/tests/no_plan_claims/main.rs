@@ -11,6 +11,7 @@
 mod game;
 
 mod amid;
+mod conflicts;
 mod draft;
 mod situations;
 mod unsolvable;

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use elbowroom::execution::run::FIRST_GOAL;
-use elbowroom::execution::{Request, Ticket};
+use elbowroom::execution::{GoalTerms, Request, Ticket};
 use elbowroom::executive::documents::{
     Activity, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, State, Taken,
 };
@@ -138,8 +138,12 @@ impl ApiRouter {
                 return refused(error.to_owned(), "leave out one of them");
             }
             (Some(deadline), None) if deadline.0 <= status.state().now.0 => {
-                let now = status.state().now.0.to_decimal(3);
-                let error = format!("the deadline has passed: it is {now}");
+                let now = status.state().now.0;
+                let error = format!(
+                    "the deadline has passed: it is {}, {} s later",
+                    now.to_decimal(3),
+                    (&now - &deadline.0).to_decimal(3)
+                );
                 return refused(
                     error,
                     "give a later time, or the seconds from now (`within`)",
@@ -154,8 +158,10 @@ impl ApiRouter {
             (deadline, None) => ExternalRequest::Request(Request::Pursue {
                 name: name.clone(),
                 goal,
-                value,
-                deadline: deadline.map(|it| it.0),
+                terms: GoalTerms {
+                    value,
+                    deadline: deadline.map(|it| it.0),
+                },
             }),
         };
         self.submit_checked(request, Some(name))
@@ -316,12 +322,11 @@ fn requests_for(new: &Task, task: &Task, state: &State) -> Vec<ExternalRequest> 
         requests.push(ExternalRequest::Request(Request::Abandon { name }));
     }
     let (name, goal) = (FIRST_GOAL.to_owned(), goal_text(new));
-    let value = Rational::ONE;
+    let terms = GoalTerms::default();
     requests.push(ExternalRequest::Request(Request::Pursue {
         name,
         goal,
-        value,
-        deadline: None,
+        terms,
     }));
     requests
 }
