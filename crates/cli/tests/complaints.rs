@@ -13,7 +13,7 @@ use std::process::{self, Command, Stdio};
 use command::{elbowroom, root};
 use elbowroom::execute::Execution;
 use elbowroom::execution::run::{ExecutedStep, RunSettings, Verdict};
-use elbowroom::execution::{Cause, Ending, Event, Observation, Request};
+use elbowroom::execution::{Cause, Ending, Event, GoalTerms, Observation, Request};
 use elbowroom::num::Rational;
 use toy::{ERRANDS, Fault, Faults, Toy, Warnings, causes, errands, run, task};
 
@@ -301,8 +301,7 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
                 Request::Pursue {
                     name,
                     goal,
-                    value: Rational::ONE,
-                    deadline: None,
+                    terms: GoalTerms::default(),
                 },
             ),
         ],
@@ -636,8 +635,7 @@ fn two_robots_do_two_things_at_once_and_goals_come_while_they_do() {
             event: Event::Asked(Request::Pursue {
                 name,
                 goal,
-                value: Rational::ONE,
-                deadline: None,
+                terms: GoalTerms::default(),
             }),
         }],
         ..Toy::default()

@@ -21,6 +21,7 @@ mod race;
 mod rehearse;
 pub mod rewrite;
 mod rollouts;
+mod shortfall;
 mod spec;
 mod spoiling;
 mod validated;

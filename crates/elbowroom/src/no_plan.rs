@@ -5,6 +5,7 @@
 //! accepted. This module is the only source of the answer that no plan exists.
 
 mod closed;
+mod conflict;
 mod pairs;
 mod without_value;
 
@@ -16,9 +17,10 @@ use elbowroom_num::{Interval, Rational};
 use elbowroom_verify::Exact;
 use elbowroom_verify::no_plan::pairs::Structure;
 use elbowroom_verify::no_plan::{
-    Instances, NoPlan, Reached, no_plan_certificate, verify_no_plan_from,
+    Instances, NoPlan, Reached, no_plan_certificate, verify_earliest, verify_no_plan_from,
 };
 
+pub use conflict::conflict;
 pub use without_value::fluents_without_value;
 
 /// Limit on the objects tried for parameters of actions, for each round (about a second).
@@ -89,6 +91,27 @@ pub fn no_plan_certificate_within(
         Ok(()) => Ok(certificate),
         Err(flaw) => Err(format!("the verifier refuses the certificate: {flaw}")),
     }
+}
+
+/// Returns times before which these conditions do not hold, whatever happens from the situation; `None` for a condition
+/// that never holds. The verifier has accepted them.
+///
+/// # Errors
+/// The reason for which they are not known, in words.
+pub fn earliest_times(
+    task: &Task,
+    situation: &Situation,
+    conditions: &[&Condition],
+    effort: &mut Effort<'_>,
+) -> Result<Vec<Option<Rational>>, String> {
+    let instances = Instances::from(task, situation);
+    let mut instances = instances.map_err(|flaw| flaw.to_string())?;
+    let certificate = no_plan_certificate(task, &reached(&mut instances, effort)?);
+    let times = conditions
+        .iter()
+        .map(|condition| verify_earliest(task, situation, &certificate, condition));
+    let times: Result<Vec<_>, _> = times.collect();
+    times.map_err(|flaw| flaw.to_string())
 }
 
 /// Returns the situation with nothing assumed about its running actions: each may end at any time, with any

@@ -114,12 +114,8 @@ pub enum Request {
         name: String,
         /// The goal, as the domain's language writes it.
         goal: String,
-        /// Its value, a positive number: if not all goals can be reached together, those with the greatest sum of values
-        /// are pursued.
-        value: Rational,
-        /// The time, on the run's clock, at which the goal has failed if it has not been achieved; `None` if it may take
-        /// as long as it takes. Plans achieve it by then.
-        deadline: Option<Rational>,
+        /// Its value and its times.
+        terms: GoalTerms,
     },
     /// To reach the goal of that name no more.
     Abandon {
@@ -135,6 +131,26 @@ pub enum Request {
     Pause,
     /// To go on after a pause.
     Resume,
+}
+
+/// Value and times of a goal.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GoalTerms {
+    /// A positive number: if not all goals can be reached together, those with the greatest sum of values are pursued.
+    pub value: Rational,
+    /// The time, on the run's clock, at which the goal has failed if it has not been achieved; `None` for no limit. Plans
+    /// achieve it by then.
+    pub deadline: Option<Rational>,
+}
+
+impl Default for GoalTerms {
+    /// A value of 1, and no deadline.
+    fn default() -> Self {
+        Self {
+            value: Rational::ONE,
+            deadline: None,
+        }
+    }
 }
 
 /// The outcome of an action.

@@ -46,14 +46,14 @@ pub mod run;
 mod separation;
 mod world;
 
-pub use event::{Command, Ending, Event, Measured, Observation, Request, Ticket};
+pub use event::{Command, Ending, Event, GoalTerms, Measured, Observation, Request, Ticket};
 pub use executor::{
     Decided, Decision, Executor, Mission, Moment, Need, News, Order, Planned, StepId,
 };
 pub use forms::Forms;
 pub use odds::{Compared, Odds, Remainder};
 pub use outlook::{Move, Outlook, Standing, Weighed};
-pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
+pub use planning::{Lateness, NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner, Shortfall};
 pub use preparation::{PrepareError, Prepared, Preparer, Region, Wanted};
 pub use progression::{Doubt, Guards, Parts, Progression, Underway, UnderwayParts, Unreadable};
 pub use reason::{About, Behind, Cause, Changed, Promise, Reason};

@@ -97,6 +97,60 @@ pub struct Planned {
     pub seconds: Option<Rational>,
     /// What there is to say about the plan, for people: why it and not another one.
     pub remark: Option<String>,
+    /// Known reasons for which the goals have no plan.
+    pub shortfall: Shortfall,
+}
+
+/// Reasons for which there is no plan, as far as the planner knows any.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Shortfall {
+    /// The deadlines that cannot be met, or for which no plan was found.
+    pub late: Vec<Lateness>,
+    /// Conjuncts of the goal that exclude each other, as a certificate proves; none is known to be needless for that.
+    pub conflict: Vec<String>,
+}
+
+/// A deadline that is missed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Lateness {
+    /// Its position among the deadlines of the task ([`Task::deadlines`]).
+    pub place: usize,
+    /// The time at which the earliest plan found without deadlines reaches the goal.
+    pub reached: Option<Rational>,
+    /// A time before which no plan reaches the goal, as a certificate proves.
+    pub least: Option<Rational>,
+}
+
+impl Lateness {
+    /// Returns the lateness in words, after this deadline.
+    pub fn in_words(&self, deadline: &Rational) -> Option<String> {
+        let by = |time: &Rational| (time - deadline).to_decimal(3);
+        let at = |time: &Rational| time.to_decimal(3);
+        match (&self.reached, &self.least) {
+            (Some(reached), Some(least)) if reached == least => Some(format!(
+                "{} s late: it cannot be reached before {}",
+                by(reached),
+                at(least)
+            )),
+            (Some(reached), Some(least)) => Some(format!(
+                "{} s late: the earliest plan found reaches it at {}, and it cannot be reached before {}",
+                by(reached),
+                at(reached),
+                at(least)
+            )),
+            (Some(reached), None) => Some(format!(
+                "{} s late: the earliest plan found reaches it at {}",
+                by(reached),
+                at(reached)
+            )),
+            (None, Some(least)) => Some(format!(
+                "at least {} s late: it cannot be reached before {}",
+                by(least),
+                at(least)
+            )),
+            (None, None) => None,
+        }
+    }
 }
 
 impl From<PlanAnswer> for Planned {
@@ -106,6 +160,7 @@ impl From<PlanAnswer> for Planned {
             answer,
             seconds: None,
             remark: None,
+            shortfall: Shortfall::default(),
         }
     }
 }

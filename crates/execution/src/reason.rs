@@ -109,6 +109,8 @@ pub enum Cause {
     NeverAgain,
     /// Each part of the goal could still become true, but not all of them.
     NotTogether,
+    /// A goal would be reached after its deadline.
+    TooLate,
 }
 
 impl Cause {
@@ -135,6 +137,7 @@ impl Cause {
         (Self::Asked, "asked"),
         (Self::NeverAgain, "never-again"),
         (Self::NotTogether, "not-together"),
+        (Self::TooLate, "too-late"),
     ];
 
     /// The word by which traces name it.
@@ -256,6 +259,8 @@ impl Reason {
                 Some(_) => format!("{about} can never become true again"),
                 None => format!("{about} could never become true"),
             },
+            Cause::NotTogether if known.is_some() => format!("{about} exclude each other"),
+            Cause::TooLate => about.to_owned(),
             Cause::NotTogether => {
                 "each part of the goal could still become true if nothing were undone and there \
                  were time, but no plan makes all of it true"

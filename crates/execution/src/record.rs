@@ -5,6 +5,7 @@ use elbowroom_num::Rational;
 
 use crate::event::{Command, Observation, Ticket};
 use crate::executor::{Decided, Mission, Planned};
+use crate::planning::Shortfall;
 use crate::reason::Reason;
 use crate::run::{Report, Stand, Verdict};
 
@@ -167,6 +168,8 @@ pub enum Entry<'a> {
         has_failed: bool,
         /// What the planner has to say about it.
         remark: Option<&'a str>,
+        /// Known reasons for which the goals have no plan.
+        shortfall: &'a Shortfall,
     },
     /// An action has used most of the time that the plan tolerates, or most of its time-out.
     Warning {

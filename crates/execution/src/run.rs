@@ -97,6 +97,7 @@ mod room;
 mod search;
 mod selection;
 mod settings;
+mod shortfall;
 mod stand;
 mod timeout;
 mod waits;

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use elbowroom::execution::Request;
+use elbowroom::execution::{GoalTerms, Request};
 use elbowroom::executive::Status;
 use elbowroom::executive::documents::NewGoal;
 use elbowroom::num::Rational;
@@ -56,9 +56,11 @@ impl GoalNames {
                 return Err(Error::new(error, "leave out one of them"));
             }
             (Some(deadline), None) if deadline.0 <= status.state().now.0 => {
-                let now = status.state().now.0.to_decimal(3);
+                let now = status.state().now.0;
+                let late = (&now - &deadline.0).to_decimal(3);
+                let now = now.to_decimal(3);
                 return Err(Error::new(
-                    format!("the deadline has passed: it is {now}"),
+                    format!("the deadline has passed: it is {now}, {late} s later"),
                     "give a later time, or the seconds from now (`within`)",
                 ));
             }
@@ -71,8 +73,10 @@ impl GoalNames {
             (deadline, None) => ExternalRequest::Request(Request::Pursue {
                 name: name.clone(),
                 goal,
-                value,
-                deadline: deadline.map(|it| it.0),
+                terms: GoalTerms {
+                    value,
+                    deadline: deadline.map(|it| it.0),
+                },
             }),
         };
         Ok((name, request))

@@ -19,15 +19,10 @@ const LONGEST_NAME: usize = 64;
 /// When a goal, its name or its value is invalid, or a fact or fluent is unknown.
 pub(crate) fn check(request: &ExternalRequest, task: &Task) -> Result<(), Error> {
     match request {
-        ExternalRequest::Request(Request::Pursue {
-            name,
-            goal,
-            value,
-            deadline,
-        }) => {
-            check_goal(goal, deadline.is_some(), task)?;
+        ExternalRequest::Request(Request::Pursue { name, goal, terms }) => {
+            check_goal(goal, terms.deadline.is_some(), task)?;
             check_name(name)?;
-            check_value(value)
+            check_value(&terms.value)
         }
         ExternalRequest::GoalWithin {
             name,
@@ -183,7 +178,7 @@ fn check_fluent(text: &str, task: &Task) -> Result<(), Error> {
 
 #[cfg(test)]
 mod tests {
-    use elbowroom::execution::Request;
+    use elbowroom::execution::{GoalTerms, Request};
     use elbowroom::model::Task;
     use elbowroom::num::Rational;
     use elbowroom::pddl::{Source, read_problem};
@@ -210,8 +205,10 @@ mod tests {
         ExternalRequest::Request(Request::Pursue {
             name: name.to_owned(),
             goal: goal.to_owned(),
-            value: Rational::from(value),
-            deadline: None,
+            terms: GoalTerms {
+                value: Rational::from(value),
+                ..GoalTerms::default()
+            },
         })
     }
 
@@ -219,8 +216,10 @@ mod tests {
         ExternalRequest::Request(Request::Pursue {
             name: "x".to_owned(),
             goal: goal.to_owned(),
-            value: Rational::ONE,
-            deadline: Some(Rational::from(100)),
+            terms: GoalTerms {
+                deadline: Some(Rational::from(100)),
+                ..GoalTerms::default()
+            },
         })
     }
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use elbowroom::execution::{Ending, Event, Observation, Request, Ticket};
+use elbowroom::execution::{Ending, Event, GoalTerms, Observation, Request, Ticket};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 
@@ -174,8 +174,10 @@ impl RequestQueue {
             } => Some(Event::Asked(Request::Pursue {
                 name,
                 goal,
-                value,
-                deadline: Some(now + &within),
+                terms: GoalTerms {
+                    value,
+                    deadline: Some(now + &within),
+                },
             })),
             ExternalRequest::Fact { fact, becomes } => Some(Event::Fact {
                 fact: task.fact_named(&fact)?,

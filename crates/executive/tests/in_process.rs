@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::execution::{
-    Command as WorldCommand, Ending, Event, Observation, Passage, Request, Ticket, World,
-    WorldError,
+    Command as WorldCommand, Ending, Event, GoalTerms, Observation, Passage, Request, Ticket,
+    World, WorldError,
 };
 use elbowroom::executive::documents::{Activity, GoalNow, NewGoal};
 use elbowroom::model::ground::{FactId, FluentId};
@@ -47,8 +47,7 @@ fn pursue(goal: &str) -> ExternalRequest {
     ExternalRequest::Request(Request::Pursue {
         name: "next".to_owned(),
         goal: goal.to_owned(),
-        value: Rational::ONE,
-        deadline: None,
+        terms: GoalTerms::default(),
     })
 }
 

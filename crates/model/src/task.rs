@@ -193,15 +193,39 @@ impl Task {
             self.grounding(|grounder| grounder.ground_condition(condition, &mut Vec::new()))
         };
         let deadlines = deadlines.into_iter();
-        let within = deadlines.map(|(deadline, it)| Modal::Within(deadline, ground(it)));
+        Some(self.with_ground_deadlines(deadlines.map(|(deadline, it)| (deadline, ground(it)))))
+    }
+
+    /// The same task with these deadlines in place of its constraints, as [`Task::with_deadlines`].
+    #[must_use]
+    pub fn with_ground_deadlines(
+        &self,
+        deadlines: impl IntoIterator<Item = (Rational, Condition)>,
+    ) -> Self {
+        let deadlines = deadlines.into_iter();
         let constraints = Constraints {
-            hard: within.collect(),
+            hard: deadlines
+                .map(|(deadline, it)| Modal::Within(deadline, it))
+                .collect(),
             begin_now: true,
             ..Constraints::default()
         };
-        Some(Self {
+        Self {
             constraints: Arc::new(constraints),
             ..self.clone()
+        }
+    }
+
+    /// The deadlines of [`Task::with_deadlines`], in their order, each with its condition.
+    pub fn deadlines(&self) -> impl Iterator<Item = (&Rational, &Condition)> {
+        let hard = self
+            .constraints
+            .hard
+            .iter()
+            .filter(|_| self.constraints.begin_now);
+        hard.filter_map(|constraint| match constraint {
+            Modal::Within(deadline, condition) => Some((deadline, condition)),
+            _ => None,
         })
     }
 

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use elbowroom::execution::{PlanAnswer, Planner, PlannerAnswer};
+use elbowroom::execution::{PlanAnswer, Planner, PlannerAnswer, Shortfall};
 use elbowroom::external::{Question, Request};
 use elbowroom::model::validate::{self, Settings, Verdict};
 use elbowroom::model::{Situation, Task};
@@ -80,6 +80,7 @@ impl Planner for PyPlanner {
             answer: answer.unwrap_or_else(|why| PlanAnswer::NotFound { why }),
             seconds: Some(Rational::new(micros, 1_000_000)),
             remark: None,
+            shortfall: Shortfall::default(),
         }
     }
 }

@@ -7,8 +7,11 @@ use serde::{Deserialize, Serialize};
 use crate::exact::{self, Exact};
 
 mod goal;
+mod shortfall;
 
-pub use goal::{GoalChangeLine, GoalState};
+pub(crate) use goal::members;
+pub use goal::{GoalChangeLine, GoalState, terms};
+pub use shortfall::{LatenessLine, ShortfallLine};
 
 /// A line of a trace, but for its first one.
 ///
@@ -479,6 +482,9 @@ pub struct PlannedLine {
     /// What the planner has to say about it: why it is this plan; left out where it is nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
+    /// Known reasons for which the goals have no plan; left out if none is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shortfall: Option<ShortfallLine>,
 }
 
 /// An action has used most of the time that the plan tolerates, or most of its time-out.

@@ -161,7 +161,7 @@ impl<'a> Validation<'a> {
                         None => task.goal().clone(),
                         Some(text) => self.read(text)?,
                     },
-                    deadline: given.deadline.clone(),
+                    deadline: given.terms.deadline.clone(),
                 })
             });
             self.goals = read.collect();
@@ -364,19 +364,14 @@ impl<'a> Validation<'a> {
 
     fn asked(&mut self, request: &Request) {
         match request {
-            Request::Pursue {
-                name,
-                goal,
-                deadline,
-                ..
-            } => {
+            Request::Pursue { name, goal, terms } => {
                 let Some(condition) = self.read(goal) else {
                     return;
                 };
                 let given = Goal {
                     name: name.clone(),
                     condition,
-                    deadline: deadline.clone(),
+                    deadline: terms.deadline.clone(),
                 };
                 match self.goals.iter_mut().find(|known| known.name == *name) {
                     Some(known) => *known = given,

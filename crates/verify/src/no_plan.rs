@@ -35,14 +35,14 @@ mod valueless;
 use std::collections::BTreeMap;
 
 use elbowroom_model::problem::{ObjectId, PredicateId};
-use elbowroom_model::{Situation, Task};
+use elbowroom_model::{Situation, Task, ground};
 use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
 
 use crate::Exact;
 pub use closed::{Closed, ClosedState};
 pub use instances::{Breach, Instances};
-use moments::Moments;
+use moments::{HeldTo, Moments};
 use pairs::Structure;
 
 /// A predicate and its objects.
@@ -238,20 +238,7 @@ pub fn verify_no_plan_from(
     if certificate.proves != certificate.kind().proves() {
         return Err(NoPlanFlaw::Claim);
     }
-    let mut instances = Instances::from(task, situation)?;
-    let reached = listed(task, certificate)?;
-    instances.extend(&reached, MOST_STEPS)?;
-    if let Some(breach) = instances.breaches(&reached).into_iter().next() {
-        let said = reached.get(&breach.fact);
-        return Err(NoPlanFlaw::Breach {
-            fact: task
-                .problem()
-                .apply_predicate(breach.fact.0, &breach.fact.1),
-            time: breach.time.to_string(),
-            by: breach.by,
-            said: said.map_or_else(|| "never".to_owned(), |from| format!("not before {from}")),
-        });
-    }
+    let (instances, reached) = verified_list(task, situation, certificate)?;
     if !instances.is_goal_in_reach(&reached) {
         return Ok(());
     }
@@ -271,6 +258,45 @@ pub fn verify_no_plan_from(
     } else {
         Err(NoPlanFlaw::GoalInReach)
     }
+}
+
+/// Returns a time before which the condition holds in no course of events from the situation, by the certificate's list
+/// of facts; `None` if it never holds. The goal of the task and the certificate's other parts do not count.
+///
+/// # Errors
+/// The first fact that can become true and is not listed, or is listed for later.
+pub fn verify_earliest(
+    task: &Task,
+    situation: &Situation,
+    certificate: &NoPlan,
+    condition: &ground::Condition,
+) -> Result<Option<Rational>, NoPlanFlaw> {
+    let (instances, reached) = verified_list(task, situation, certificate)?;
+    let moments = instances.moments(&reached);
+    Ok(moments.next(condition, &situation.time, HeldTo::All))
+}
+
+/// Checks that the certificate's list of facts is an invariant. Returns it with the instances that it allows.
+fn verified_list(
+    task: &Task,
+    situation: &Situation,
+    certificate: &NoPlan,
+) -> Result<(Instances, Reached), NoPlanFlaw> {
+    let mut instances = Instances::from(task, situation)?;
+    let reached = listed(task, certificate)?;
+    instances.extend(&reached, MOST_STEPS)?;
+    if let Some(breach) = instances.breaches(&reached).into_iter().next() {
+        let said = reached.get(&breach.fact);
+        return Err(NoPlanFlaw::Breach {
+            fact: task
+                .problem()
+                .apply_predicate(breach.fact.0, &breach.fact.1),
+            time: breach.time.to_string(),
+            by: breach.by,
+            said: said.map_or_else(|| "never".to_owned(), |from| format!("not before {from}")),
+        });
+    }
+    Ok((instances, reached))
 }
 
 /// How a certificate proves that there is no plan.

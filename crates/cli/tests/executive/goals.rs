@@ -66,6 +66,13 @@ fn goals_with_deadlines_are_achieved_or_fail() {
         let (status, refusal) = own.post("/v1/goals", &goal);
         assert_eq!(status, 422, "{goal}: {refusal}");
     }
+    let past = json!({"goal": "(done b2)", "deadline": 0});
+    let (_, refusal) = own.post("/v1/goals", &past);
+    let refusal = refusal.to_string();
+    assert!(
+        refusal.contains("the deadline has passed: it is") && refusal.contains("s later"),
+        "{refusal}"
+    );
     let both = json!({"goal": "(done b2)", "within": 5, "deadline": 1_000_000});
     assert_eq!(own.post("/v1/goals", &both).0, 422);
     let late = ("soon", "(not (open a1))", "0.001", (1, "failed"));
@@ -105,4 +112,57 @@ fn operators_report_and_cancel_running_actions() {
     own.await_state(|state| state["activity"] == "resting");
     let (_, all) = own.get("/v1/goals");
     assert_eq!(all["goals"][0]["state"], "achieved", "{all}");
+}
+
+#[test]
+fn goal_that_misses_its_deadline_says_by_how_much() {
+    let own = simulated("late");
+    own.await_state(|state| state["activity"] == "resting");
+    assert_eq!(
+        own.post("/v1/facts", &json!({"fact": "(done a3)", "becomes": false}))
+            .0,
+        200
+    );
+    // An errand takes two seconds.
+    let goal = json!({"name": "soon", "goal": "(done a3)", "within": 1.5});
+    assert_eq!(own.post("/v1/goals", &goal).0, 200);
+    let mut goal = Value::Null;
+    while goal["state"] != "failed" {
+        let (_, all) = own.get("/v1/goals");
+        let goals = all["goals"].as_array().expect("goals");
+        goal = goals
+            .iter()
+            .find(|it| it["name"] == "soon")
+            .cloned()
+            .unwrap_or_default();
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let why = goal["why"].as_str().expect("a reason");
+    assert!(why.contains("s late: it cannot be reached before"), "{why}");
+    let told = ctl(&["--to", &own.address(), "goals"]);
+    assert!(
+        String::from_utf8_lossy(&told.stdout).contains("s late"),
+        "{told:?}"
+    );
+    let lines = own.trace_lines();
+    let failed = lines
+        .iter()
+        .find(|it| it["becomes"] == "failed")
+        .expect("a line");
+    assert_eq!(failed["why"], goal["why"], "{failed}");
+}
+
+#[test]
+fn goals_that_exclude_each_other_are_named() {
+    let own = simulated("conflict");
+    own.await_state(|state| state["activity"] == "resting");
+    let conflict = json!({"name": "odd", "goal": "(and (idle r) (not (idle r)))"});
+    assert_eq!(own.post("/v1/goals", &conflict).0, 200);
+    let is_about_it = |state: &Value| state["why"].as_str().is_some_and(|why| why.contains("odd"));
+    let state = own.await_state(|state| state["activity"] == "resting" && is_about_it(state));
+    let why = state["why"].as_str().expect("a reason");
+    assert!(
+        why.contains("`(idle r)` and `(not (idle r))` exclude each other"),
+        "{why}"
+    );
 }

@@ -371,3 +371,37 @@ fn time_passes_between_kill_and_resume() {
     assert_eq!(replayed.status.code(), Some(0), "{replayed:?}");
     fs::remove_dir_all(&place).expect("the folder is there");
 }
+
+/// An executive that was idle since its beginning has no report of its world in the journal.
+#[test]
+fn time_passes_while_an_executive_is_idle_from_its_beginning() {
+    if !python_is_there() {
+        return;
+    }
+    let place = folder("idle-time");
+    let journal = place.join("journal").display().to_string();
+    let problem = place.join("problem.pddl").display().to_string();
+    let text = fs::read_to_string(super::command::root().join(super::PROBLEM)).expect("a problem");
+    let (before, _) = text.split_once("(:goal").expect("a goal");
+    fs::write(&problem, format!("{before}(:goal (and)))")).expect("written");
+    let robot = "python3 crates/cli/tests/files/forgetful.py";
+    let line = ["--world-process", robot, "--journal", &journal];
+    let line = [&[super::DOMAIN, &problem], &line[..]].concat();
+    let mut own = Executive::start(&place, &line);
+    own.await_state(|state| state["activity"] == "resting");
+    let pause = std::time::Duration::from_secs(2);
+    std::thread::sleep(pause);
+    own.kill();
+    assert_eq!(passed(&journal), Vec::<Value>::new());
+    std::thread::sleep(pause);
+    let mut again = Executive::start(&place, &["--resume", &journal]);
+    // The world is started after the journal was replayed.
+    let state = again.await_state(|state| super::exact(&state["now"]) > 0.0);
+    assert!(
+        super::exact(&state["now"]) >= 2.0 * pause.as_secs_f64(),
+        "{state}"
+    );
+    again.post("/v1/stop", &Value::Null);
+    assert_eq!(again.end().status.code(), Some(0));
+    fs::remove_dir_all(&place).expect("the folder is there");
+}

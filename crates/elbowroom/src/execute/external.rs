@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer};
+use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer, Shortfall};
 use elbowroom_external::{self as external, Event, Outcome, Report, Request, Settings};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -95,6 +95,7 @@ impl External<'_> {
             answer,
             seconds: Some(seconds(before + report.statistics.elapsed)),
             remark,
+            shortfall: Shortfall::default(),
         }
     }
 }

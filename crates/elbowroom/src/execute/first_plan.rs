@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer};
+use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer, Shortfall};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::{Rational, work};
 use elbowroom_plan::partial_order::partial_order;
@@ -406,6 +406,7 @@ impl Planner for Choosing<'_> {
             answer,
             seconds: Some((self.clock)() - begun),
             remark,
+            shortfall: Shortfall::default(),
         }
     }
 

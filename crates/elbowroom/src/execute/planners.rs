@@ -45,9 +45,11 @@ impl Planner for Embedded<'_> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let begun = self.clock.map(|clock| clock());
         let (answer, _) = self.counted(task, situation);
+        let (answer, shortfall) = self.with_shortfall(task, situation, answer);
         let seconds = self.clock.map(|clock| clock() - begun.unwrap_or_default());
         PlannerAnswer {
             seconds,
+            shortfall,
             ..PlannerAnswer::from(answer)
         }
     }

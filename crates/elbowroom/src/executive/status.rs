@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::run::{FIRST_GOAL, TimeoutRule, Verdict};
 use elbowroom_execution::{
-    Cause, Command, Decided, Decision, Doubt, Entry, Event, Mission, Observation, Progression,
-    Promise, Request, StepId, Ticket, WarningCause,
+    Cause, Command, Decided, Decision, Doubt, Entry, Event, GoalTerms, Mission, Observation,
+    Progression, Promise, Request, StepId, Ticket, WarningCause,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Task};
@@ -18,7 +18,7 @@ use elbowroom_plan::{ParameterId, ParameterKind};
 use elbowroom_report::exact::Exact;
 use elbowroom_report::trace::SnapshotLine;
 
-use goals::{Given, GoalList};
+use goals::GoalList;
 
 use super::documents::{
     Activity, GoalsNow, GuaranteeNow, InDoubt, LowerEnd, NextNow, NumberNow, PlanNow, Room,
@@ -62,13 +62,8 @@ impl Status {
     pub fn new(task: &Task, timeout: TimeoutRule) -> Self {
         let mut goals = GoalList::default();
         if !task.problem().goal.is_trivial() {
-            let own = Given {
-                name: FIRST_GOAL,
-                goal: &goal_text(task),
-                value: &Rational::ONE,
-                deadline: None,
-            };
-            goals.give(&own, &Rational::ZERO);
+            let goal = goal_text(task);
+            goals.give((FIRST_GOAL, &goal), &GoalTerms::default(), &Rational::ZERO);
         }
         let known = Known {
             timeout,
@@ -549,20 +544,9 @@ impl Known {
 
     fn asked(&mut self, request: &Request) {
         match request {
-            Request::Pursue {
-                name,
-                goal,
-                value,
-                deadline,
-            } => {
+            Request::Pursue { name, goal, terms } => {
                 self.goals.cancel(name, "replaced", &self.now);
-                let given = Given {
-                    name,
-                    goal,
-                    value,
-                    deadline: deadline.as_ref(),
-                };
-                self.goals.give(&given, &self.now);
+                self.goals.give((name, goal), terms, &self.now);
             }
             Request::Abandon { name } => self.goals.cancel(name, "abandoned", &self.now),
             Request::CancelAction { .. } => {}

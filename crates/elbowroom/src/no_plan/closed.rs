@@ -100,13 +100,13 @@ fn states(
         if node.under_way.len() > MOST_UNDER_WAY {
             return Err(Failure::TooMany);
         }
-        let mut node = node;
+        // As the verifier does: it compares states with the listed ones before bounds are widened.
+        let mut node = closure.settled(node);
         node.zone = if with_times {
             widened(&node, closure.times().len(), last.as_ref())
         } else {
             Zone::any(node.zone.size())
         };
-        let node = closure.settled(node);
         if closure.is_goal(&node) {
             return Err(Failure::InReach);
         }

@@ -10,6 +10,8 @@
 #[path = "../../../stn/tests/game/mod.rs"]
 mod game;
 
+mod amid;
+mod conflicts;
 mod draft;
 mod situations;
 mod unsolvable;

@@ -14,6 +14,7 @@ use super::dead_end::hopeless_conditions;
 use super::goals::OpenGoal;
 use super::search::Lost;
 use super::selection::{Selection, Set, Step};
+use super::shortfall::Conflict;
 use super::{Run, Verdict};
 use crate::record::{Entry, GoalChange};
 
@@ -48,6 +49,16 @@ impl Choosing {
 
     fn position(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|it| it == name)
+    }
+
+    /// Notes that no plan reaches all goals of a conflict.
+    fn note_conflicts(&mut self, conflicts: &[Conflict]) {
+        for conflict in conflicts {
+            let members = conflict.goals.iter().map(|name| self.position(name));
+            if let Some(set) = members.collect::<Option<Set>>() {
+                self.selection.exclude(set);
+            }
+        }
     }
 
     /// Returns the names of those goals of the set that are open.
@@ -95,7 +106,7 @@ impl Run<'_> {
     /// Returns the next deadline of an open goal that is still to come.
     pub(super) fn next_deadline_of_a_goal(&self) -> Option<Rational> {
         let goals = self.lasting.iter().flat_map(|it| &it.goals);
-        let deadlines = goals.filter_map(|goal| goal.deadline.as_ref());
+        let deadlines = goals.filter_map(|goal| goal.terms.deadline.as_ref());
         deadlines.filter(|it| **it > self.now).min().cloned()
     }
 
@@ -103,7 +114,7 @@ impl Run<'_> {
     /// known.
     pub(super) fn close_goals_due_before(&mut self, time: &Rational) {
         let goals = self.lasting.iter().flat_map(|it| &it.goals);
-        let deadlines = goals.filter_map(|goal| goal.deadline.clone());
+        let deadlines = goals.filter_map(|goal| goal.terms.deadline.clone());
         let due: BTreeSet<Rational> = deadlines.filter(|it| it < time).collect();
         for deadline in due {
             let _ = self.belief.advance(&deadline);
@@ -119,7 +130,7 @@ impl Run<'_> {
         };
         let belief = &self.belief;
         let is_achieved = |goal: &mut OpenGoal| {
-            goal.deadline.is_some() && belief.is_certain(&goal.ground) == Ok(true)
+            goal.terms.deadline.is_some() && belief.is_certain(&goal.ground) == Ok(true)
         };
         let achieved: Vec<OpenGoal> = lasting.goals.extract_if(.., is_achieved).collect();
         let is_any_left = lasting.goals.iter().any(OpenGoal::is_pursued);
@@ -140,7 +151,8 @@ impl Run<'_> {
         let Some(lasting) = &mut self.lasting else {
             return;
         };
-        let is_due = |goal: &mut OpenGoal| goal.deadline.as_ref().is_some_and(|it| it <= time);
+        let is_due =
+            |goal: &mut OpenGoal| goal.terms.deadline.as_ref().is_some_and(|it| it <= time);
         let due: Vec<OpenGoal> = lasting.goals.extract_if(.., is_due).collect();
         // Some may have been achieved at this very moment.
         let is_achieved = |goal: &OpenGoal| self.belief.is_certain(&goal.ground) == Ok(true);
@@ -149,7 +161,10 @@ impl Run<'_> {
         for goal in &late {
             let why = match &goal.aside {
                 Some(aside) => format!("its deadline has passed; it was set aside: {aside}"),
-                None => "its deadline has passed".to_owned(),
+                None => match &goal.late {
+                    Some(late) => format!("its deadline has passed; it would have been {late}"),
+                    None => "its deadline has passed".to_owned(),
+                },
             };
             self.ports.recorder.record(&Entry::Goal {
                 now: &self.now,
@@ -208,7 +223,7 @@ impl Run<'_> {
         let candidates = candidates.unwrap_or_default();
         let (mut planned, mut new) = (Vec::new(), Vec::new());
         for goal in &mut lasting.goals {
-            let known = (goal.name.clone(), goal.value.clone());
+            let known = (goal.name.clone(), goal.terms.value.clone());
             if lasting.planned_goals.contains(&goal.name) {
                 planned.push(known);
             } else if goal.is_pursued() || candidates.contains(&goal.name) {
@@ -311,6 +326,7 @@ impl Run<'_> {
         };
         if let Some(mut choosing) = lasting.choosing.take() {
             self.note_hopeless_goals();
+            choosing.note_conflicts(&self.conflicts());
             let step = choosing.selection.after_failure(choosing.tried.clone());
             return self.follow(choosing, step, true);
         }
@@ -320,6 +336,7 @@ impl Run<'_> {
         let tried = lasting.goals.iter().filter(|goal| goal.is_pursued());
         let tried: BTreeSet<String> = tried.map(|goal| goal.name.clone()).collect();
         let mut choosing = Choosing::among(self.set_hopeless_goals_aside());
+        choosing.note_conflicts(&self.conflicts());
         let positions = tried.iter().map(|name| choosing.position(name));
         let step = match positions.collect::<Option<Set>>() {
             Some(tried) => choosing.selection.after_failure(tried),
@@ -341,10 +358,10 @@ impl Run<'_> {
                 others.push(&*goal);
             }
         }
-        others.sort_by_key(|goal| (goal.deadline.is_none(), goal.deadline.as_ref()));
+        others.sort_by_key(|goal| (goal.terms.deadline.is_none(), goal.terms.deadline.as_ref()));
         let others = others.iter();
         others
-            .map(|goal| (goal.name.clone(), goal.value.clone()))
+            .map(|goal| (goal.name.clone(), goal.terms.value.clone()))
             .collect()
     }
 
@@ -403,6 +420,7 @@ impl Run<'_> {
     /// Pursues the goals of the next step. Returns `false` if there is no plan for any goal. A plan is requested or kept
     /// for goals that are tried, and if `is_to_plan` for the selected ones.
     fn follow(&mut self, mut choosing: Choosing, mut step: Step, is_to_plan: bool) -> bool {
+        let conflicts = self.conflicts();
         let Some(lasting) = &mut self.lasting else {
             return false;
         };
@@ -430,14 +448,25 @@ impl Run<'_> {
             let position = choosing.position(&goal.name).unwrap_or_default();
             let why = || match &goal.hopeless {
                 Some(why) => why.clone(),
-                None if choosing.selection.is_excluded(position) => match goal.deadline {
-                    Some(_) => "no plan reaches it by its deadline".to_owned(),
+                None if choosing.selection.is_excluded(position) => match goal.terms.deadline {
+                    Some(_) => match &goal.late {
+                        Some(late) => {
+                            format!("no plan reaches it by its deadline; it would be {late}")
+                        }
+                        None => "no plan reaches it by its deadline".to_owned(),
+                    },
                     None => "no plan reaches it".to_owned(),
                 },
                 None if choosing.selection.is_untried(position) => {
                     format!("a plan for {list} is found first")
                 }
-                None => format!("no plan reaches it together with {list}"),
+                None => match conflicts
+                    .iter()
+                    .find(|it| it.excludes(&goal.name, &pursued))
+                {
+                    Some(conflict) => format!("{} exclude each other", conflict.in_words()),
+                    None => format!("no plan reaches it together with {list}"),
+                },
             };
             goal.aside = is_aside.then(why);
         }

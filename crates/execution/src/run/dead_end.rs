@@ -68,7 +68,12 @@ impl Run<'_> {
             return Vec::new();
         };
         if lost.is_empty() {
-            return vec![Reason::new(Cause::NotTogether)];
+            let conflict = self.conflicts().into_iter().next();
+            let reason = Reason::new(Cause::NotTogether);
+            return vec![match conflict {
+                Some(conflict) => reason.about(About::Said(conflict.in_words())),
+                None => reason,
+            }];
         }
         let explained = lost.iter().take(MOST_NAMED).map(|goal| past.explain(goal));
         explained.collect()

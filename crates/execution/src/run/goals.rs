@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use elbowroom_model::ground::Condition;
 use elbowroom_model::{Task, problem};
-use elbowroom_num::Rational;
 
 use super::Run;
 use super::lasting::{FIRST_GOAL, Turn};
 use super::stand::{GivenGoal, Goals};
+use crate::event::GoalTerms;
 use crate::executor::Need;
 use crate::reason::{About, Cause, Reason};
 
@@ -18,16 +18,15 @@ pub(super) struct OpenGoal {
     /// As it was given; `None` for that of the problem.
     pub(super) text: Option<String>,
     pub(super) condition: problem::Condition,
-    /// Its value, a positive number.
-    pub(super) value: Rational,
-    /// Its deadline on the world's clock, if there is one.
-    pub(super) deadline: Option<Rational>,
+    pub(super) terms: GoalTerms,
     /// The same condition, grounded.
     pub(super) ground: Condition,
     /// The reason for which it can never become true, if that is known.
     pub(super) hopeless: Option<String>,
     /// The reason for which it is set aside while other goals are pursued.
     pub(super) aside: Option<String>,
+    /// Lateness in words, if its deadline is known to be missed.
+    pub(super) late: Option<String>,
     /// `true` if the record says that it is set aside.
     pub(super) is_announced: bool,
 }
@@ -45,10 +44,10 @@ impl OpenGoal {
             text,
             ground: task.with_goal(condition.clone()).goal().clone(),
             condition,
-            value: Rational::ONE,
-            deadline: None,
+            terms: GoalTerms::default(),
             hopeless: None,
             aside: None,
+            late: None,
             is_announced: false,
         }
     }
@@ -122,8 +121,8 @@ impl Run<'_> {
     /// constraints of the problem, respect no deadlines of goals.
     fn planned_for(&self, task: &Task, goals: &[OpenGoal]) -> Task {
         let pursued = goals.iter().filter(|it| it.is_pursued());
-        let deadlines = pursued.filter_map(|it| Some((it.deadline.clone()?, &it.condition)));
-        let others = goals.iter().filter(|it| it.deadline.is_none());
+        let deadlines = pursued.filter_map(|it| Some((it.terms.deadline.clone()?, &it.condition)));
+        let others = goals.iter().filter(|it| it.terms.deadline.is_none());
         let in_time = task.with_goal(together(others)).with_deadlines(deadlines);
         let chooses_order = self.ports.executor.need() == Need::PartialOrder;
         match in_time.filter(|_| !chooses_order) {
@@ -158,9 +157,9 @@ impl Run<'_> {
                 }
             };
             Some(OpenGoal {
-                value: given.value.clone(),
-                deadline: given.deadline.clone(),
+                terms: given.terms.clone(),
                 aside: given.aside.clone(),
+                late: given.late.clone(),
                 is_announced: given.aside.is_some(),
                 ..goal
             })

@@ -179,7 +179,9 @@ impl Run<'_> {
             is_unsolvable: planned.answer == PlanAnswer::Unsolvable,
             has_failed: matches!(planned.answer, PlanAnswer::Failed { .. }),
             remark: planned.remark.as_deref(),
+            shortfall: &planned.shortfall,
         });
+        self.note_shortfall(&self.goals(), &planned.shortfall);
         self.heed()?;
         if attempt.is_optional {
             match planned.answer {

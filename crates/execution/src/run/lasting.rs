@@ -82,6 +82,8 @@ pub(super) struct Lasting<'a> {
     pub(super) change: Option<Turn>,
     /// The selection among the goals, while it lasts.
     pub(super) choosing: Option<Choosing>,
+    /// Conjuncts of goals that exclude each other, as the planner's answers during the selection have proved.
+    pub(super) conflicts: Vec<Vec<String>>,
     /// The plan that is executed, on the world's clock.
     pub(super) plan: Option<TimeTriggeredPlan>,
     /// The names of the goals that it is for.
@@ -129,6 +131,7 @@ impl<'a> Run<'a> {
             is_paused: false,
             change: None,
             choosing: None,
+            conflicts: Vec::new(),
             plan: None,
             planned_goals: BTreeSet::new(),
             rests_since: None,
@@ -160,22 +163,16 @@ impl<'a> Run<'a> {
             Request::Pursue { .. } if lasting.at_rest != AtRest::Waits => {
                 Some("this run takes no other goals; nothing was made of it")
             }
-            Request::Pursue { value, .. } if !value.is_positive() => {
+            Request::Pursue { terms, .. } if !terms.value.is_positive() => {
                 Some("the value of a goal is not positive; nothing was made of it")
             }
-            Request::Pursue {
-                name,
-                goal,
-                value,
-                deadline,
-            } => {
+            Request::Pursue { name, goal, terms } => {
                 let Ok(condition) = lasting.reader.read(&self.task, goal) else {
                     return Some("it is no goal of this problem; nothing was made of it");
                 };
                 let text = Some(goal.clone());
                 let mut given = OpenGoal::new(&self.task, name.clone(), text, condition);
-                given.value.clone_from(value);
-                given.deadline.clone_from(deadline);
+                given.terms.clone_from(terms);
                 let known = lasting.goals.iter_mut().find(|known| known.name == *name);
                 let is_new = known.is_none();
                 match known {
@@ -375,6 +372,11 @@ impl<'a> Run<'a> {
             lasting.rests_since = None;
             let pursued = goals.open.iter().filter(|it| it.aside.is_none());
             lasting.planned_goals = pursued.map(|it| it.name.clone()).collect();
+            let planned = &lasting.planned_goals;
+            let goals = lasting.goals.iter_mut();
+            for goal in goals.filter(|goal| planned.contains(&goal.name)) {
+                goal.late = None;
+            }
             self.choose_after_success();
         }
     }
@@ -477,12 +479,13 @@ impl<'a> Run<'a> {
             return;
         }
         self.announce_goals();
-        let dead_end = match verdict {
-            Verdict::Unsolvable if self.is_explaining => self.dead_end(),
-            _ => Vec::new(),
-        };
+        let mut reasons = self.missed_deadlines();
+        let is_explained = reasons.len() == self.pursued_goals();
+        if *verdict == Verdict::Unsolvable && self.is_explaining && !is_explained {
+            reasons.extend(self.dead_end());
+        }
         self.drop_plan();
-        self.rest_because(Some(verdict), &dead_end);
+        self.rest_because(Some(verdict), &reasons);
     }
 
     fn rest_because(&mut self, verdict: Option<&Verdict>, dead_end: &[Reason]) {

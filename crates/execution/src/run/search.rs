@@ -470,7 +470,14 @@ impl Run<'_> {
         let Some(mut search) = self.search.take() else {
             return Ok(());
         };
-        let Some(Planned { answer, remark, .. }) = search.answer.take() else {
+        let answer = search.answer.take();
+        let Some(Planned {
+            answer,
+            remark,
+            shortfall,
+            ..
+        }) = answer
+        else {
             return Ok(());
         };
         let took = &self.now - &search.begun;
@@ -483,7 +490,9 @@ impl Run<'_> {
             is_unsolvable: answer == PlanAnswer::Unsolvable,
             has_failed: matches!(answer, PlanAnswer::Failed { .. }),
             remark: remark.as_deref(),
+            shortfall: &shortfall,
         });
+        self.note_shortfall(&search.goals, &shortfall);
         self.heed()?;
         match answer {
             PlanAnswer::Plan(_) if search.guess == Guess::Cancelled => {

@@ -66,6 +66,13 @@ impl Selection {
         Self::Growth(growth)
     }
 
+    /// Notes that there is no plan for this set, which may not have been tried.
+    pub(super) fn exclude(&mut self, set: Set) {
+        if let Self::Exact { failed, .. } = self {
+            failed.push(set);
+        }
+    }
+
     /// Returns `true` if it is known that there is no plan for this goal alone.
     pub(super) fn is_excluded(&self, goal: usize) -> bool {
         match self {

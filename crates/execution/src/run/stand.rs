@@ -19,7 +19,7 @@ use super::agenda::Todo;
 use super::beginning::Course;
 use super::goals::OpenGoal;
 use super::{Refusals, Run, Verdict};
-use crate::event::Ticket;
+use crate::event::{GoalTerms, Ticket};
 use crate::executor::News;
 use crate::progression::Progression;
 
@@ -100,12 +100,12 @@ pub struct GivenGoal {
     pub name: String,
     /// Its text in PDDL; `None` for the goal of the problem.
     pub text: Option<String>,
-    /// Its value, a positive number.
-    pub value: Rational,
-    /// Its deadline on the world's clock, if there is one.
-    pub deadline: Option<Rational>,
+    /// Its value and its times.
+    pub terms: GoalTerms,
     /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
     pub aside: Option<String>,
+    /// Lateness in words, if its deadline is known to be missed.
+    pub late: Option<String>,
 }
 
 impl GivenGoal {
@@ -113,9 +113,9 @@ impl GivenGoal {
         Self {
             name: goal.name.clone(),
             text: goal.text.clone(),
-            value: goal.value.clone(),
-            deadline: goal.deadline.clone(),
+            terms: goal.terms.clone(),
             aside: goal.aside.clone(),
+            late: goal.late.clone(),
         }
     }
 }

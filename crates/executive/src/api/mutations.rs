@@ -5,14 +5,13 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use elbowroom::execution::run::FIRST_GOAL;
-use elbowroom::execution::{Request, Ticket};
+use elbowroom::execution::{GoalTerms, Request, Ticket};
 use elbowroom::executive::documents::{
     Activity, NewFact, NewGoal, NewNumber, NewOutcome, NewProblem, State, Taken,
 };
 use elbowroom::executive::goal_text;
 use elbowroom::model::ground::{Change, FactId};
 use elbowroom::model::{Problem, Task};
-use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use serde::de::DeserializeOwned;
 
@@ -262,12 +261,11 @@ fn requests_for(new: &Task, task: &Task, state: &State) -> Vec<ExternalRequest> 
         requests.push(ExternalRequest::Request(Request::Abandon { name }));
     }
     let (name, goal) = (FIRST_GOAL.to_owned(), goal_text(new));
-    let value = Rational::ONE;
+    let terms = GoalTerms::default();
     requests.push(ExternalRequest::Request(Request::Pursue {
         name,
         goal,
-        value,
-        deadline: None,
+        terms,
     }));
     requests
 }

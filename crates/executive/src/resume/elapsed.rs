@@ -28,7 +28,16 @@ impl Elapsed {
                 wall: (*wall)?,
             })
         });
-        let first = readings.next();
+        // Before the first answer of the world, its clock shows 0. The header is written before the world starts.
+        let begun = || {
+            let mut walls = journal.recorded.iter().flatten();
+            let header = walls.next().filter(|_| snapshot.is_none())?;
+            Some(Reading {
+                world: Rational::ZERO,
+                wall: *walls.next().unwrap_or(header),
+            })
+        };
+        let first = readings.next().or_else(begun);
         let last = readings.last().or_else(|| first.clone());
         Self {
             readings: first.zip(last),

@@ -1,8 +1,24 @@
 //! Lines about single goals.
 
+use elbowroom_execution::GoalTerms;
+use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
 
 use crate::exact::Exact;
+
+/// Returns the terms of a goal from the members of its line.
+pub fn terms(value: Option<&Exact>, deadline: Option<&Exact>) -> GoalTerms {
+    GoalTerms {
+        value: value.map_or(Rational::ONE, |it| it.0.clone()),
+        deadline: deadline.map(|it| it.0.clone()),
+    }
+}
+
+/// Returns the members of a line for the terms of its goal: value and deadline.
+pub(crate) fn members(terms: &GoalTerms) -> (Option<Exact>, Option<Exact>) {
+    let value = (terms.value != Rational::ONE).then(|| Exact(terms.value.clone()));
+    (value, terms.deadline.clone().map(Exact))
+}
 
 /// One of several goals of a lasting run is closed, set aside, or pursued again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

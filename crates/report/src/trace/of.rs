@@ -15,7 +15,8 @@ use super::line::{
     GoalChangeLine, GoalState, InstanceLine, InterruptedLine, IntervalLine, KeptLine, Line,
     LookedLine, NetworkLine, ObservationLine, ObservedLine, OrderLine, ParameterLine, PassedLine,
     PlanLine, PlannedLine, PlanningLine, ReasonLine, ReportLine, RestingLine, RunningLine,
-    SituationLine, StepLine, WarningLine, WindowLine, WorldFailedLine,
+    ShortfallLine, SituationLine, StepLine, WarningLine, WindowLine, WorldFailedLine, members,
+    terms,
 };
 use crate::exact::Exact;
 
@@ -84,6 +85,7 @@ impl Line {
                 is_unsolvable,
                 has_failed,
                 remark,
+                shortfall,
             } => Self::Planned(PlannedLine {
                 now: exact(now),
                 took: exact(took),
@@ -92,6 +94,7 @@ impl Line {
                 is_unsolvable,
                 has_failed,
                 remark: remark.map(str::to_owned),
+                shortfall: ShortfallLine::of(shortfall),
             }),
             Entry::Warning {
                 now,
@@ -263,18 +266,16 @@ impl ObservationLine {
 impl ObservationLine {
     fn asked(request: &Request, time: Exact) -> Self {
         match request {
-            Request::Pursue {
-                name,
-                goal,
-                value,
-                deadline,
-            } => Self::Goal {
-                name: name.clone(),
-                goal: goal.clone(),
-                value: (*value != Rational::ONE).then(|| exact(value)),
-                deadline: deadline.as_ref().map(exact),
-                time,
-            },
+            Request::Pursue { name, goal, terms } => {
+                let (value, deadline) = members(terms);
+                Self::Goal {
+                    name: name.clone(),
+                    goal: goal.clone(),
+                    value,
+                    deadline,
+                    time,
+                }
+            }
             Request::Abandon { name } => Self::Abandon {
                 name: name.clone(),
                 time,
@@ -308,8 +309,7 @@ impl ObservationLine {
                 let request = Request::Pursue {
                     name: name.clone(),
                     goal: goal.clone(),
-                    value: value.as_ref().map_or(Rational::ONE, |it| it.0.clone()),
-                    deadline: deadline.as_ref().map(|it| it.0.clone()),
+                    terms: terms(value.as_ref(), deadline.as_ref()),
                 };
                 (request, time)
             }

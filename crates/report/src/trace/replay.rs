@@ -14,7 +14,9 @@ use elbowroom_num::Rational;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use super::line::{Line, LookedLine, ObservationLine, PassedLine, PlannedLine, StepLine};
+use super::line::{
+    Line, LookedLine, ObservationLine, PassedLine, PlannedLine, ShortfallLine, StepLine,
+};
 use super::{FORMAT, SNAPSHOT, SnapshotLine, VERSION};
 use crate::wire::read_observation;
 
@@ -370,6 +372,10 @@ impl ReplayPlanner {
             answer,
             seconds: Some(planned.took.0),
             remark: planned.remark,
+            shortfall: planned
+                .shortfall
+                .map(ShortfallLine::read)
+                .unwrap_or_default(),
         }
     }
 }

@@ -132,7 +132,8 @@ pub(super) fn literals(condition: &Condition) -> Vec<Literal> {
 }
 
 impl Instances {
-    /// All processes, those under way at the beginning last, in their order.
+    /// Returns all processes: by schema and arguments those that may start, then those that run at the beginning, in
+    /// the order of the situation.
     pub(super) fn processes(&self, reached: &Reached) -> Vec<Process> {
         let moments = self.moments(reached);
         let of = |action: &Action| {
@@ -163,6 +164,10 @@ impl Instances {
             })
         };
         let mut processes: Vec<Process> = self.actions.iter().filter_map(of).collect();
+        // States list actions in this order, which must not depend on the rounds that found the instances.
+        processes.sort_by(|one, other| {
+            (one.schema, &one.arguments).cmp(&(other.schema, &other.arguments))
+        });
         let truth = &self.task.initial().facts;
         for running in &self.beginning.running {
             let Some(body) = running.action.durative() else {

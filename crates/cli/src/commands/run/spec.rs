@@ -84,12 +84,11 @@ pub(in crate::commands) fn of(
         spec.world = Some(source.text().to_owned());
         worlds.push(source);
     }
-    if let Some(path) = &arguments.believed {
-        if let Some(path) = model_at(path, arguments.learn.as_deref()) {
-            let source = input::source(&path, "world")?;
-            spec.believed = Some(source.text().to_owned());
-            worlds.push(source);
-        }
+    let believed = arguments.believed.as_ref();
+    if let Some(path) = believed.and_then(|path| model_at(path, arguments.learn.as_deref())) {
+        let source = input::source(&path, "world")?;
+        spec.believed = Some(source.text().to_owned());
+        worlds.push(source);
     }
     spec.problem = problem(&spec.domain)?;
     spec.first_plan = match arguments.first_plan_by {

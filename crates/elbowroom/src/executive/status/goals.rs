@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use elbowroom_execution::GoalChange;
+use elbowroom_execution::{GoalChange, GoalTerms};
 use elbowroom_num::Rational;
 use elbowroom_report::exact::Exact;
 use elbowroom_report::trace::SnapshotLine;
@@ -20,14 +20,6 @@ const ACHIEVED: &str = "achieved";
 const CANCELLED: &str = "cancelled";
 const FAILED: &str = "failed";
 
-/// A goal that is given.
-pub(super) struct Given<'a> {
-    pub(super) name: &'a str,
-    pub(super) goal: &'a str,
-    pub(super) value: &'a Rational,
-    pub(super) deadline: Option<&'a Rational>,
-}
-
 /// The open goals, and the last ones that were closed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct GoalList {
@@ -36,13 +28,13 @@ pub(super) struct GoalList {
 }
 
 impl GoalList {
-    /// Adds an open goal.
-    pub(super) fn give(&mut self, given: &Given<'_>, now: &Rational) {
+    /// Adds an open goal with this name and text.
+    pub(super) fn give(&mut self, (name, goal): (&str, &str), terms: &GoalTerms, now: &Rational) {
         self.open.push(GoalNow {
-            name: given.name.to_owned(),
-            goal: given.goal.to_owned(),
-            value: Exact(given.value.clone()),
-            deadline: given.deadline.cloned().map(Exact),
+            name: name.to_owned(),
+            goal: goal.to_owned(),
+            value: Exact(terms.value.clone()),
+            deadline: terms.deadline.clone().map(Exact),
             state: PURSUED.to_owned(),
             given: Some(Exact(now.clone())),
             since: Exact(now.clone()),

@@ -191,9 +191,8 @@ impl Planner for Slow {
         let answer = Embedded::default().plan(task, situation).answer;
         assert!(matches!(answer, PlanAnswer::Plan(_)));
         PlannerAnswer {
-            answer,
             seconds: Some(Rational::from((self.0)(&situation.time))),
-            remark: None,
+            ..PlannerAnswer::from(answer)
         }
     }
 }

@@ -100,7 +100,7 @@ fn goals_that_exclude_each_other_are_reached_one_after_the_other() {
         &told,
         &[
             "0: start (move home lab)",
-            "0: `ward` set aside, because no plan reaches it together with `problem`",
+            "0: `ward` set aside, because `(at lab)` and `(at ward)` exclude each other",
             "10: `problem` achieved",
             "10: `ward` pursued again",
             "start (move lab ward)",
@@ -121,11 +121,11 @@ fn a_goal_of_greater_value_takes_the_place_of_those_of_the_plan() {
     assert_has(
         &told,
         &[
-            "0: `problem` set aside, because no plan reaches it together with `ward`",
+            "0: `problem` set aside, because `(at lab)` and `(at ward)` exclude each other",
             "10: `problem` achieved",
             "20: rest: goal-reached ward",
             "50: `back` achieved",
-            "50: `home` set aside, because no plan reaches it together with `lab`",
+            "50: `home` set aside, because",
             "60: `lab` achieved",
             "rest: goal-reached home",
         ],
@@ -182,6 +182,68 @@ fn goals_with_deadlines_are_reached_in_the_order_of_their_deadlines() {
 }
 
 #[test]
+fn lateness_of_a_single_goal_is_stated_with_its_certificate() {
+    let script = vec![(0, pursue_by("ward", "(at ward)", 5))];
+    let told = run(&rooms("(and)"), 100, script);
+    assert_has(
+        &told,
+        &[
+            "rest: unsolvable-from-here ward: `ward` would be 5.001 s late: it cannot be reached before 10.001",
+            "5: `ward` failed, because its deadline has passed; it would have been 5.001 s late: it cannot be reached before 10.001",
+        ],
+    );
+}
+
+/// In the delete relaxation one robot fetches all at once, so that the certified bound is 10.
+#[test]
+fn lateness_without_certificate_is_that_of_the_earliest_plan_found() {
+    let all = "(and (have book) (have cup) (have key))";
+    let told = run(
+        &task("", "(and)"),
+        100,
+        vec![(0, pursue_by("all", all, 25))],
+    );
+    assert_has(
+        &told,
+        &[
+            "25: `all` failed, because its deadline has passed; it would have been 5.003 s late: the earliest plan found reaches it at 30.003",
+        ],
+    );
+    assert!(!has(&told, "cannot be reached"), "{:#?}", told.notes);
+}
+
+#[test]
+fn conflict_of_three_goals_names_the_two_that_exclude_each_other() {
+    let script = vec![
+        (0, pursue("ward", "(at ward)")),
+        (0, pursue("away", "(not (at home))")),
+    ];
+    let told = run(&rooms("(at lab)"), 100, script);
+    assert_has(
+        &told,
+        &[
+            "`ward` set aside, because `(at lab)` and `(at ward)` exclude each other",
+            "`ward` pursued again",
+            "rest: goal-reached ward",
+        ],
+    );
+    assert!(!has(&told, "`away` set aside"), "{:#?}", told.notes);
+}
+
+#[test]
+fn conflict_within_one_goal_is_named_at_rest() {
+    let told = run(
+        &rooms("(and (at lab) (not (at home)) (at ward))"),
+        20,
+        Vec::<(i64, _)>::new(),
+    );
+    assert_has(
+        &told,
+        &["rest: unsolvable-from-here problem: `(at lab)` and `(at ward)` exclude each other"],
+    );
+}
+
+#[test]
 fn a_goal_that_would_be_late_is_set_aside_and_fails_at_its_deadline() {
     let script = vec![
         (0, pursue_by("ward", "(at ward)", 5)),
@@ -208,7 +270,7 @@ fn a_goal_without_others_fails_at_its_deadline() {
     assert_has(
         &told,
         &[
-            "rest: no-plan ward",
+            "rest: unsolvable-from-here ward",
             "5: `ward` failed, because its deadline has passed",
             "start (move home lab)",
             "rest: goal-reached lab",

@@ -3,8 +3,8 @@
 use elbowroom::execute::{Embedded, Execution};
 use elbowroom::execution::run::{Report, RunSettings, Verdict};
 use elbowroom::execution::{
-    Command, Ending, Entry, Event, GoalChange, Observation, Passage, Planner, PlannerAnswer,
-    Recorder, Request, World, WorldError,
+    Command, Ending, Entry, Event, GoalChange, GoalTerms, Observation, Passage, Planner,
+    PlannerAnswer, Recorder, Request, World, WorldError,
 };
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
@@ -163,10 +163,14 @@ impl Recorder for Notes {
                 now,
                 verdict,
                 goals,
-                ..
+                dead_end,
             } => {
                 let verdict = verdict.map_or("no goals", Verdict::name);
-                self.note(format!("{}: rest: {verdict} {}", at(now), goals.join(" ")));
+                let goals = [goals.join(" ")].into_iter();
+                let words: Vec<String> = goals
+                    .chain(dead_end.iter().map(ToString::to_string))
+                    .collect();
+                self.note(format!("{}: rest: {verdict} {}", at(now), words.join(": ")));
             }
             Entry::Warning {
                 now, action, until, ..
@@ -275,8 +279,10 @@ fn given(name: &str, goal: &str, value: i64, deadline: Option<i64>) -> Event {
     Event::Asked(Request::Pursue {
         name: name.to_owned(),
         goal: goal.to_owned(),
-        value: Rational::from(value),
-        deadline: deadline.map(Rational::from),
+        terms: GoalTerms {
+            value: Rational::from(value),
+            deadline: deadline.map(Rational::from),
+        },
     })
 }
 

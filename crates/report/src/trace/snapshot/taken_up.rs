@@ -3,11 +3,11 @@
 use elbowroom_execution::run::{GivenGoal, Goals, KnownStart, TakesUp};
 use elbowroom_execution::{Guards, News, Ticket};
 use elbowroom_model::{RunningAction, Situation, State, Task};
-use elbowroom_num::{Interval, Rational};
+use elbowroom_num::Interval;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::super::line::StepLine;
+use super::super::line::{StepLine, members, terms};
 use super::super::of::steps;
 use super::super::replay::read_plan;
 use super::starts::{action_of, exact};
@@ -81,6 +81,9 @@ pub struct GoalLine {
     /// The reason for which it is set aside while others are pursued; none if it is pursued.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aside: Option<String>,
+    /// Lateness in words; left out if its deadline is not known to be missed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub late: Option<String>,
 }
 
 /// Something that a plan does not know of.
@@ -106,12 +109,16 @@ pub struct TurnLine {
 }
 
 pub(super) fn goal_lines(goals: &Goals) -> Vec<GoalLine> {
-    let lines = goals.open.iter().map(|given| GoalLine {
-        name: given.name.clone(),
-        goal: given.text.clone(),
-        value: (given.value != Rational::ONE).then(|| exact(&given.value)),
-        deadline: given.deadline.as_ref().map(exact),
-        aside: given.aside.clone(),
+    let lines = goals.open.iter().map(|given| {
+        let (value, deadline) = members(&given.terms);
+        GoalLine {
+            name: given.name.clone(),
+            goal: given.text.clone(),
+            value,
+            deadline,
+            aside: given.aside.clone(),
+            late: given.late.clone(),
+        }
     });
     lines.collect()
 }
@@ -120,9 +127,9 @@ pub(super) fn goals_of(lines: &[GoalLine]) -> Vec<GivenGoal> {
     let goals = lines.iter().map(|line| GivenGoal {
         name: line.name.clone(),
         text: line.goal.clone(),
-        value: line.value.as_ref().map_or(Rational::ONE, |it| it.0.clone()),
-        deadline: line.deadline.as_ref().map(|it| it.0.clone()),
+        terms: terms(line.value.as_ref(), line.deadline.as_ref()),
         aside: line.aside.clone(),
+        late: line.late.clone(),
     });
     goals.collect()
 }

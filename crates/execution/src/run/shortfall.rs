@@ -1,0 +1,106 @@
+//! Known reasons for which goals are not reached: deadlines that are missed, and goals that exclude each other.
+
+use std::collections::BTreeSet;
+
+use super::Run;
+use super::goals::OpenGoal;
+use super::stand::{GivenGoal, Goals};
+use crate::planning::Shortfall;
+use crate::reason::{About, Cause, Reason};
+
+/// Goals that exclude each other.
+pub(super) struct Conflict {
+    /// Their names.
+    pub(super) goals: BTreeSet<String>,
+    /// The conjuncts of these goals that exclude each other.
+    conjuncts: Vec<String>,
+}
+
+impl Conflict {
+    /// Returns `true` if this goal excludes goals that are all pursued.
+    pub(super) fn excludes(&self, goal: &str, pursued: &BTreeSet<String>) -> bool {
+        let mut others = self.goals.iter().filter(|name| *name != goal);
+        self.goals.contains(goal) && others.all(|name| pursued.contains(name))
+    }
+
+    /// Returns the conjuncts as a list in words.
+    pub(super) fn in_words(&self) -> String {
+        let quoted: Vec<String> = self.conjuncts.iter().map(|it| format!("`{it}`")).collect();
+        match quoted.split_last() {
+            Some((last, others)) if !others.is_empty() => {
+                format!("{} and {last}", others.join(", "))
+            }
+            _ => quoted.concat(),
+        }
+    }
+}
+
+impl Run<'_> {
+    /// Notes what the planner's answer to a request for these goals says of them.
+    pub(super) fn note_shortfall(&mut self, goals: &Goals, shortfall: &Shortfall) {
+        let is_choosing = self.is_choosing_goals();
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        if !is_choosing {
+            lasting.conflicts.clear();
+        }
+        if !shortfall.conflict.is_empty() {
+            lasting.conflicts.push(shortfall.conflict.clone());
+        }
+        let pursued: Vec<&GivenGoal> = goals.open.iter().filter(|it| it.aside.is_none()).collect();
+        let is_alone = pursued.len() == 1;
+        let with_deadlines = pursued.iter().filter(|it| it.terms.deadline.is_some());
+        for late in &shortfall.late {
+            let Some(given) = with_deadlines.clone().nth(late.place) else {
+                continue;
+            };
+            let same = |goal: &&mut OpenGoal| goal.name == given.name && goal.terms == given.terms;
+            let goal = lasting.goals.iter_mut().find(same);
+            let Some((goal, deadline)) = goal.zip(given.terms.deadline.as_ref()) else {
+                continue;
+            };
+            let mut late = late.clone();
+            // A plan for several goals may reach this one later than necessary.
+            late.reached = late.reached.filter(|_| is_alone);
+            goal.late = late.in_words(deadline).or(goal.late.take());
+        }
+    }
+
+    /// Returns the known conflicts among the open goals without deadlines.
+    pub(super) fn conflicts(&self) -> Vec<Conflict> {
+        let Some(lasting) = &self.lasting else {
+            return Vec::new();
+        };
+        let conflicts = lasting.conflicts.iter().map(|conjuncts| {
+            let is_member = |goal: &&OpenGoal| {
+                let mut own = goal.ground.conjuncts().into_iter();
+                goal.terms.deadline.is_none()
+                    && own.any(|it| conjuncts.contains(&self.task.describe_condition(it)))
+            };
+            let members = lasting.goals.iter().filter(is_member);
+            Conflict {
+                goals: members.map(|goal| goal.name.clone()).collect(),
+                conjuncts: conjuncts.clone(),
+            }
+        });
+        conflicts.collect()
+    }
+
+    /// Returns the number of goals that are pursued.
+    pub(super) fn pursued_goals(&self) -> usize {
+        let goals = self.lasting.iter().flat_map(|it| &it.goals);
+        goals.filter(|goal| goal.is_pursued()).count()
+    }
+
+    /// Returns how late the pursued goals with deadlines would be, as far as that is known.
+    pub(super) fn missed_deadlines(&self) -> Vec<Reason> {
+        let goals = self.lasting.iter().flat_map(|it| &it.goals);
+        let late = goals.filter(|goal| goal.is_pursued()).filter_map(|goal| {
+            let late = goal.late.as_ref()?;
+            let words = format!("`{}` would be {late}", goal.name);
+            Some(Reason::new(Cause::TooLate).about(About::Said(words)))
+        });
+        late.collect()
+    }
+}
