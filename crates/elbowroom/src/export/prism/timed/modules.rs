@@ -10,7 +10,7 @@ use super::{Bound, Happening, Owner, Process};
 use crate::timed::{Act, Ends, Facts};
 
 impl Process<'_> {
-    /// An action: since when it has been under way, and what is known of its end.
+    /// Writes the module of an action: the time of its start, and its known end.
     pub(super) fn act_module(&self, act: usize, happenings: &[Happening], text: &mut String) {
         let (name, world_act) = (&self.acts[act], &self.world.acts[act]);
         let (since, ends) = (format!("a_{name}"), format!("o_{name}"));
@@ -45,7 +45,7 @@ impl Process<'_> {
                 self.draws(act, "wait", "", text);
             }
             Bound::Upper => {
-                // How long it has been under way no longer matters when its end is known.
+                // The elapsed time is irrelevant once the end is known.
                 let _ = writeln!(
                     text,
                     "  [pass] {ends}<3 -> ({since}'=({ends}>0 ? 1 : ({since}>0 ? {since}+1 : 0)))\
@@ -58,7 +58,7 @@ impl Process<'_> {
         text.push_str("endmodule\n\n");
     }
 
-    /// Whether it ends in the cell, by how long it has been under way.
+    /// Writes the draw of its end in the present cell, by elapsed time.
     fn draws(&self, act: usize, label: &str, guard: &str, text: &mut String) {
         let since = format!("a_{}", self.acts[act]);
         let ends = format!("o_{}", self.acts[act]);
@@ -76,7 +76,7 @@ impl Process<'_> {
         }
     }
 
-    /// What a happening changes about an action.
+    /// Writes the command of an action for a happening.
     fn act_command(&self, act: usize, happening: &Happening, text: &mut String) {
         let (since, ends) = (
             format!("a_{}", self.acts[act]),
@@ -130,7 +130,7 @@ impl Process<'_> {
         }
     }
 
-    /// Whether an action can start, and what it needs over all holds right after that.
+    /// Returns the condition that an action can start and its over-all conditions hold right after the start.
     pub(super) fn can_start(&self, act: &Act) -> Formula {
         let needs = self.holds(&act.start.needs);
         let over_all = act.rest.iter().map(|(over_all, _)| {
@@ -140,7 +140,7 @@ impl Process<'_> {
         Formula::all(std::iter::once(needs).chain(over_all))
     }
 
-    /// Whether what an action needs over all holds after these effects; `None` if they do not
+    /// Returns the over-all conditions of an action after these effects; `None` if they do not
     /// matter to it.
     fn goes_on(&self, act: &Act, adds: Facts, deletes: Facts) -> Option<Formula> {
         let (over_all, _) = act.rest.as_ref()?;
@@ -203,7 +203,7 @@ impl Process<'_> {
     }
 }
 
-/// The ways in which an action under way may end, with `otherwise` for that it does not.
+/// Returns the possible ends of a running action, with `otherwise` for no end.
 fn ends_of(name: &str, hazard: &Ends, otherwise: &str) -> [(Rational, String); 3] {
     let (well, badly) = (exact(hazard.well), exact(hazard.badly()));
     let rest = &(&Rational::ONE - &well) - &badly;
