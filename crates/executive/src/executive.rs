@@ -24,6 +24,7 @@ use crate::embedded_world::EmbeddedWorld;
 use crate::error::{Error, WarningSink};
 use crate::goal_request::GoalNames;
 use crate::journal::{JournalFile, Segments};
+use crate::learning::{Learner, Learning};
 use crate::messages::plain;
 use crate::operator::OperatorInterface;
 use crate::process_world::ProcessLimits;
@@ -38,6 +39,8 @@ use crate::trace_buffer::TraceBuffer;
 pub struct ExecutiveSettings {
     /// File of the journal. Only runs in a world that is a process, or in this process, can have one.
     pub journal: Option<PathBuf>,
+    /// Folder of logs and of the model learnt from them ([`Learner`]). Only runs with a journal can have one.
+    pub learn: Option<PathBuf>,
     /// Rotation of the journal.
     pub segments: Option<Segments>,
     /// Limits of a world that is a process.
@@ -53,6 +56,7 @@ impl Default for ExecutiveSettings {
     fn default() -> Self {
         Self {
             journal: None,
+            learn: None,
             segments: None,
             limits: ProcessLimits {
                 answer_timeout: Rational::from(3600),
@@ -109,6 +113,11 @@ impl Executive {
         spec.planning_time = PlanningTime::Measured;
         make_persistent(&mut spec);
         spec.check()?;
+        if settings.learn.is_some() && settings.journal.is_none() {
+            let error = "a model is learnt from the journal, and the run has none";
+            let advice = "name a journal, or leave out the folder of the model";
+            return Err(RunError::Failed(Error::new(error, advice)));
+        }
         let journal = match &settings.journal {
             Some(_) if spec.world_process.is_none() => {
                 return Err(RunError::Failed(Error::new(
@@ -126,11 +135,12 @@ impl Executive {
         Self::with_start(spec, settings, Start::New(journal), names)
     }
 
-    /// Creates an executive that resumes the run of a journal. `settings.journal` is ignored.
+    /// Creates an executive that resumes the run of a journal, which replaces `settings.journal`.
     ///
     /// # Errors
     /// When the journal cannot be read, is damaged, is written by another program, or is that of a finished run.
-    pub fn resume(journal: &Path, settings: ExecutiveSettings) -> Result<Self, RunError> {
+    pub fn resume(journal: &Path, mut settings: ExecutiveSettings) -> Result<Self, RunError> {
+        settings.journal = Some(journal.to_owned());
         let cannot = |error: &std::io::Error| {
             let message = format!("cannot read {}: {}", journal.display(), plain(error));
             Error::new(message, "check the path of the journal")
@@ -301,6 +311,8 @@ impl Executive {
         let limits = self.settings.limits.clone();
         let operator = self.operator_interface();
         let warnings = self.settings.warnings.clone();
+        let learning = self.learning()?;
+        let observer = learning.as_ref().map(|it| Box::new(it.observer()) as _);
         let journal = match start {
             Start::Resumed(run) => {
                 let settings = ResumeSettings {
@@ -308,10 +320,11 @@ impl Executive {
                     embedded,
                     background,
                     limits,
-                    observer: None,
+                    observer,
                     warnings,
                 };
-                return run.resume(settings, self, &mut watcher);
+                let outcome = run.resume(settings, self, &mut watcher);
+                return concluded(learning, outcome);
             }
             Start::New(journal) => journal,
         };
@@ -324,11 +337,14 @@ impl Executive {
             background,
             limits,
             since: None,
-            observer: None,
+            observer,
             warnings,
         };
         match journal {
-            Some(file) => inputs.execute_journaled(file, self, &mut watcher),
+            Some(file) => {
+                let outcome = inputs.execute_journaled(file, self, &mut watcher);
+                concluded(learning, outcome)
+            }
             None => Ok(JournaledOutcome {
                 outcome: inputs.execute(&mut |_| {}, self, &mut watcher)?,
                 journal_failure: None,
@@ -336,9 +352,27 @@ impl Executive {
         }
     }
 
+    /// Starts learning from the journal if the settings ask for it.
+    fn learning(&self) -> Result<Option<Learning>, Error> {
+        let learn = self.settings.learn.as_ref();
+        let Some((folder, journal)) = learn.zip(self.settings.journal.as_ref()) else {
+            return Ok(None);
+        };
+        let learner = Learner::new(folder, journal, self.settings.warnings.clone())?;
+        Ok(Some(Learning::start(learner)))
+    }
+
     fn operator_interface(&self) -> OperatorInterface {
         OperatorInterface::new(self.queue.clone(), self.status.clone(), self.buffer.clone())
     }
+}
+
+/// Learns from the whole run after its end.
+fn concluded<T>(learning: Option<Learning>, outcome: T) -> T {
+    if let Some(learning) = learning {
+        learning.finish();
+    }
+    outcome
 }
 
 impl RunHost for Executive {

@@ -187,7 +187,7 @@ fn replace(path: &Path, text: &str) -> io::Result<()> {
 /// Learning in a thread of its own: whenever the executive rests, and at the end of the run.
 pub struct Learning {
     missions: Sender<()>,
-    thread: JoinHandle<Learner>,
+    thread: JoinHandle<()>,
 }
 
 impl Learning {
@@ -210,18 +210,16 @@ impl Learning {
         }
     }
 
-    /// Learns from the whole run, once its journal is closed.
+    /// Learns from the whole run, once its journal is closed and its observer is dropped.
     pub fn finish(self) {
         drop(self.missions);
-        if let Ok(mut learner) = self.thread.join() {
-            update(&mut learner);
-        }
+        let _ = self.thread.join();
     }
 }
 
-/// Updates after missions, until all senders are dropped. Between updates, it is idle for ten times as long as the last
+/// Updates after missions and when all senders are dropped. Between updates, it is idle for ten times as long as the last
 /// one took.
-fn updates(mut learner: Learner, ended: &Receiver<()>) -> Learner {
+fn updates(mut learner: Learner, ended: &Receiver<()>) {
     let mut is_due = false;
     while is_due || ended.recv().is_ok() {
         let begun = Clock::start();
@@ -233,12 +231,12 @@ fn updates(mut learner: Learner, ended: &Receiver<()>) -> Learner {
             match ended.recv_timeout(left) {
                 Ok(()) => has_ended = true,
                 Err(RecvTimeoutError::Timeout) => break,
-                Err(RecvTimeoutError::Disconnected) => return learner,
+                Err(RecvTimeoutError::Disconnected) => break,
             }
         }
         is_due = has_ended;
     }
-    learner
+    update(&mut learner);
 }
 
 fn update(learner: &mut Learner) {

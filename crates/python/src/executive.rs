@@ -29,14 +29,15 @@ type Outcome = (String, Option<String>, Option<String>, Option<Py<PyAny>>);
 
 #[pymethods]
 impl Executive {
-    /// Creates an executive for the problem and the options of a run. `segments` are the length from which a journal is
-    /// rotated, and the number of earlier segments that are kept. `warn` receives warnings.
+    /// Creates an executive for the problem and the options of a run. `learn` is the folder of a model, `segments` the length
+    /// from which a journal is rotated, and the number of earlier segments that are kept. `warn` receives warnings.
     #[new]
     fn new(
         py: Python<'_>,
         problem: &Task,
         options: &str,
         journal: Option<PathBuf>,
+        learn: Option<PathBuf>,
         segments: (u64, usize),
         planner_memory: Option<u64>,
         warn: Py<PyAny>,
@@ -45,6 +46,7 @@ impl Executive {
             let spec = problem.specification(options, false)?;
             let settings = ExecutiveSettings {
                 journal,
+                learn,
                 ..settings(segments, planner_memory, warn)
             };
             let inner = elbowroom_executive::Executive::new(spec, settings)?;
@@ -57,12 +59,16 @@ impl Executive {
     fn resume(
         py: Python<'_>,
         journal: PathBuf,
+        learn: Option<PathBuf>,
         segments: (u64, usize),
         planner_memory: Option<u64>,
         warn: Py<PyAny>,
     ) -> PyResult<Self> {
         guarded(py, || {
-            let settings = settings(segments, planner_memory, warn);
+            let settings = ExecutiveSettings {
+                learn,
+                ..settings(segments, planner_memory, warn)
+            };
             let inner = elbowroom_executive::Executive::resume(&journal, settings)?;
             Ok(Self { inner })
         })

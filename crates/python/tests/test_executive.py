@@ -145,7 +145,8 @@ def test_unknown_names_are_refused() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"executor": "policy"}, "goal"),
+        ({"executor": "live:5"}, "must know how the world behaves"),
+        ({"learn": "experience"}, "the run has none"),
         ({"executor": "nobody"}, "nobody"),
         ({"planner": lambda domain, problem: None}, "planner"),
         ({"planning_time": 1}, "planning"),
@@ -393,3 +394,19 @@ executive.wait("problem", HANG)
 """
     done = python(program)
     assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
+
+
+def test_model_is_learnt_from_the_journal_and_believed(tmp_path: Path) -> None:
+    class Slow(Depot):
+        def begin(self, action):
+            super().begin(action)
+            self.left[action] *= 1.5
+
+    experience = tmp_path / "experience"
+    with Executive(*CASE, world=Slow(), journal=tmp_path / "first.journal", learn=experience) as executive:
+        executive.wait("problem", HANG)
+    model = experience / "world.toml"
+    assert 'action = "drive"' in model.read_text()
+    believing = {"executor": "live:5", "believed": model}
+    with Executive(*CASE, world=Slow(), **believing) as executive:
+        assert executive.wait("problem", HANG)

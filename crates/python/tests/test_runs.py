@@ -232,7 +232,7 @@ def test_an_executor_believes_a_model_of_a_world_in_python() -> None:
             super().start(action)
 
     model = 'format = "elbowroom-world"\nversion = 1\n[[duration]]\naction = "short"\nconstant = 12\n'
-    problem = elbowroom.Problem(ROADS, CLOSING)
+    problem = elbowroom.read(ROADS, CLOSING)
     world = Roads()
     assert problem.run(world=world, executor="policy", believed=model).verdict == "goal-reached"
     assert world.begun == ["long", "deliver"]

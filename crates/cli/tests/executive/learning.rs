@@ -127,3 +127,23 @@ fn executors_that_try_plans_out_pursue_changing_goals() {
         assert_eq!(own.end().status.code(), Some(0), "{executor}");
     }
 }
+
+#[test]
+fn stopped_executives_learn_from_the_whole_journal() {
+    if !python_is_there() {
+        return;
+    }
+    let folder = folder("learning");
+    let experience = folder.join("experience").display().to_string();
+    let journal = folder.join("run.journal").display().to_string();
+    let world = format!("python3 {}", roads("world.py"));
+    let (domain, problem) = (roads("domain.pddl"), roads("day.pddl"));
+    let line = [&domain, &problem, "--world-process", &world];
+    let learn = ["--journal", &journal, "--learn", &experience];
+    let mut own = Executive::start(&folder, &[&line[..], &learn].concat());
+    own.await_state(|state| state["why"] == "reached: problem");
+    own.post("/v1/stop", &Value::Null);
+    assert_eq!(own.end().status.code(), Some(0));
+    let model = fs::read_to_string(folder.join("experience/world.toml")).expect("a model");
+    assert!(model.contains("action = \"short-road\""), "{model}");
+}

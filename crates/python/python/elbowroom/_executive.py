@@ -55,6 +55,7 @@ class Executive(BackgroundRun):
         *,
         world: World | AsyncWorld | SteppedWorld | Text | None = None,
         journal: str | os.PathLike[str] | None = None,
+        learn: str | os.PathLike[str] | None = None,
         executor: str = "live",
         planner: str = "embedded",
         seed: int = 0,
@@ -74,6 +75,8 @@ class Executive(BackgroundRun):
                 event loop.
             journal: a new file, from which :meth:`resume` continues after a crash. For worlds in Python, and for
                 ``world_process="COMMAND"``.
+            learn: a folder for logs and for ``world.toml``, the model learnt from the journal at each rest and at the end
+                (``docs/learning.md``). ``believed=`` is the model that the executor believes.
             executor: who decides; :func:`elbowroom.executors` lists them.
             planner: ``"embedded"``, another planner's name, or a command line.
             seed: which trajectory of a simulated world.
@@ -88,7 +91,7 @@ class Executive(BackgroundRun):
         Raises:
             ReadError: if the domain, the problem or the world file cannot be read.
             RequestError: if the options contradict each other.
-            ExecutiveError: if the executor does not support changing goals, or the journal exists or cannot be written.
+            ExecutiveError: if the journal exists or cannot be written.
         """
         if not isinstance(planner, str):
             raise RequestError("an executive needs the name or the command line of a planner")
@@ -106,7 +109,8 @@ class Executive(BackgroundRun):
         given = json.dumps(chosen)
         self._begin()
         self._start(
-            _native.Executive(native, given, journal, segments, planner_memory, self._warn), world
+            _native.Executive(native, given, journal, learn, segments, planner_memory, self._warn),
+            world,
         )
 
     @classmethod
@@ -115,6 +119,7 @@ class Executive(BackgroundRun):
         journal: str | os.PathLike[str],
         world: World | AsyncWorld | SteppedWorld | None = None,
         *,
+        learn: str | os.PathLike[str] | None = None,
         journal_size: int = JOURNAL_SIZE,
         journal_segments: int = 1,
         planner_memory: int | None = None,
@@ -127,6 +132,7 @@ class Executive(BackgroundRun):
         Args:
             journal: the journal.
             world: a new world for a run in a world in Python; ``None`` for one that is a process.
+            learn: the folder of a model, as at the start.
 
         Raises:
             ExecutiveError: if the journal cannot be read, is damaged, is written by another process, or is that of a
@@ -135,7 +141,7 @@ class Executive(BackgroundRun):
         executive = cls.__new__(cls)
         executive._begin()
         segments = _segments(journal_size, journal_segments)
-        native = _native.Executive.resume(journal, segments, planner_memory, executive._warn)
+        native = _native.Executive.resume(journal, learn, segments, planner_memory, executive._warn)
         name = native.embedded_world()
         if name is not None and world is None:
             raise ExecutiveError(

@@ -70,6 +70,7 @@ class Executive:
         problem: Task,
         options: str,
         journal: str | PathLike[str] | None,
+        learn: str | PathLike[str] | None,
         segments: tuple[int, int],
         planner_memory: int | None,
         warn: Callable[[str], object],
@@ -77,6 +78,7 @@ class Executive:
     @staticmethod
     def resume(
         journal: str | PathLike[str],
+        learn: str | PathLike[str] | None,
         segments: tuple[int, int],
         planner_memory: int | None,
         warn: Callable[[str], object],
