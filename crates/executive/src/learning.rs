@@ -35,7 +35,7 @@ pub struct Learner {
     folder: PathBuf,
     journal: PathBuf,
     warnings: WarningSink,
-    /// Drifts that were reported.
+    /// Warnings about logs and drifts.
     reported: BTreeSet<String>,
 }
 
@@ -121,22 +121,32 @@ impl Learner {
         Ok(())
     }
 
-    /// Reads the logs of the folder, oldest first.
-    fn logs(&self) -> io::Result<Vec<Log>> {
+    /// Reads the logs of the folder that are about the domain of the run, oldest first.
+    fn logs(&mut self) -> io::Result<Vec<Log>> {
+        let own = read_log(&self.journal).ok().and_then(|(_, domain)| domain);
         let mut paths: Vec<PathBuf> = Vec::new();
         for entry in fs::read_dir(&self.folder)? {
             let path = entry?.path();
-            if path.extension().is_some_and(|it| it == LOG) {
+            // Opening a named pipe could block forever.
+            let is_file = fs::metadata(&path).is_ok_and(|it| it.is_file());
+            if is_file && path.extension().is_some_and(|it| it == LOG) {
                 paths.push(path);
             }
         }
         paths.sort();
         let mut logs = Vec::with_capacity(paths.len());
         for path in paths {
-            match read_log(&path) {
-                Ok(log) => logs.push(log),
-                Err(why) => self.warn(&format!("{} is left out: {why}", path.display())),
-            }
+            let why = match read_log(&path) {
+                Ok((log, domain)) if own.is_none() || domain.is_none() || domain == own => {
+                    logs.push(log);
+                    continue;
+                }
+                Ok((_, domain)) => {
+                    format!("it is about the domain `{}`", domain.unwrap_or_default())
+                }
+                Err(why) => why,
+            };
+            self.warn_once(format!("{} is left out: {why}", path.display()));
         }
         Ok(logs)
     }
@@ -152,9 +162,15 @@ impl Learner {
                 action.action,
                 self.folder.display()
             );
-            if self.reported.insert(text.clone()) {
-                self.warn(&text);
-            }
+            self.warn_once(text);
+        }
+    }
+
+    /// Issues a warning that was not issued before.
+    fn warn_once(&mut self, text: String) {
+        if !self.reported.contains(&text) {
+            self.warn(&text);
+            self.reported.insert(text);
         }
     }
 
@@ -163,7 +179,8 @@ impl Learner {
     }
 }
 
-fn read_log(path: &Path) -> Result<Log, String> {
+/// Returns a log, and the name of its domain if it has one.
+fn read_log(path: &Path) -> Result<(Log, Option<String>), String> {
     let text = fs::read_to_string(path).map_err(|error| plain(&error))?;
     let text = if is_journal(&text) {
         Journal::read(&text)?.text
@@ -171,7 +188,9 @@ fn read_log(path: &Path) -> Result<Log, String> {
         text
     };
     let source = Source::new(path.display().to_string(), text);
-    Log::read(&source).map_err(|error| error.to_string())
+    let log = Log::read(&source).map_err(|error| error.to_string())?;
+    let domain = log.course.as_ref().map(|course| course.domain().to_owned());
+    Ok((log, domain))
 }
 
 /// Replaces a file, which is complete at any moment.
@@ -230,8 +249,7 @@ fn updates(mut learner: Learner, ended: &Receiver<()>) {
         while let Some(left) = pause.checked_sub(begun.elapsed()) {
             match ended.recv_timeout(left) {
                 Ok(()) => has_ended = true,
-                Err(RecvTimeoutError::Timeout) => break,
-                Err(RecvTimeoutError::Disconnected) => break,
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
             }
         }
         is_due = has_ended;

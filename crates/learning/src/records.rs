@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
-use elbowroom_report::trace::line::{GivenLine, ObservationLine};
+use elbowroom_report::trace::line::{GivenLine, ObservationLine, ObservedLine};
 use elbowroom_report::trace::{Line, Stored};
 
 /// How an attempt to do something ended.
@@ -81,9 +81,10 @@ pub fn of_trace(trace: &Stored) -> Vec<Record> {
                 }
             }
             Line::Passed(line) => last = last.max(float(&line.now.0)),
-            Line::Observed(line) if line.remark.is_none() => match &line.observation {
+            Line::Observed(line) if is_counted(line) => match &line.observation {
                 ObservationLine::Started { ticket, time, .. } => {
-                    let time = float(&time.0);
+                    let commanded = open.get(ticket).map_or(0.0, |open| open.commanded);
+                    let time = float(&time.0).min(float(&line.now.0)).max(commanded);
                     // What takes no time is done when it has started; no end is reported.
                     let is_instantaneous =
                         open.get(ticket).is_some_and(|open| open.planned.is_none());
@@ -101,12 +102,14 @@ pub fn of_trace(trace: &Stored) -> Vec<Record> {
                     ..
                 } => {
                     if let Some(open) = open.remove(ticket) {
+                        let time = float(&time.0).min(float(&line.now.0));
+                        let time = time.max(open.start.unwrap_or(open.commanded));
                         let outcome = match outcome.as_str() {
                             "succeeded" => Outcome::Succeeded,
                             "cancelled" => Outcome::Cancelled,
                             _ => Outcome::Failed,
                         };
-                        records.push((*ticket, closed(open, float(&time.0), outcome)));
+                        records.push((*ticket, closed(open, time, outcome)));
                     }
                 }
                 _ => {}
@@ -121,6 +124,12 @@ pub fn of_trace(trace: &Stored) -> Vec<Record> {
     }
     records.sort_by_key(|(ticket, _)| *ticket);
     records.into_iter().map(|(_, record)| record).collect()
+}
+
+/// Returns `true` for reports that were accepted, also with a corrected time.
+fn is_counted(line: &ObservedLine) -> bool {
+    let remark = line.remark.as_deref();
+    remark.is_none_or(|remark| remark.contains("taken as"))
 }
 
 fn closed(open: Open, end: f64, outcome: Outcome) -> Record {

@@ -57,7 +57,7 @@ fn executors_believe_what_was_learnt_from_journals() {
     let folder = folder("believed");
     let experience = folder.join("experience").display().to_string();
     let believing = ["--executor", "policy", "--believed", &experience, "--json"];
-    // Before the first day there is no model, and the folder of --learn need not exist.
+    // Before the first day there is no model, and all is believed to go as planned.
     let learning = ["--learn", &experience, "--journal"];
     let unused = folder.join("unused.journal").display().to_string();
     let before = run(

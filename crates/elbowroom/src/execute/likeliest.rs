@@ -138,25 +138,26 @@ impl<'a> Likeliest<'a> {
         task: &Task,
         situation: &Situation,
     ) -> Result<(TimeTriggeredPlan, Rational), PlanAnswer> {
-        let mut plans = Vec::new();
         let answer = self.planner.plan(task, situation).answer;
-        if let PlanAnswer::Plan(plan) = &answer {
-            plans.push(plan.clone());
-        }
+        // With longer durations, a plan is no easier to find.
+        let PlanAnswer::Plan(plan) = answer else {
+            return Err(answer);
+        };
+        let share = self.probability_of(task, situation, &plan);
+        let mut best = (plan, share);
         // Times of what is running already are no more to be chosen.
-        if situation.running.is_empty() && answer != PlanAnswer::Unsolvable {
+        if situation.running.is_empty() {
             for quantile in QUANTILES {
-                plans.extend(self.slow_plan(task, situation, quantile));
+                let Some(plan) = self.slow_plan(task, situation, quantile) else {
+                    continue;
+                };
+                let share = self.probability_of(task, situation, &plan);
+                if share > best.1 {
+                    best = (plan, share);
+                }
             }
         }
-        let mut best: Option<(TimeTriggeredPlan, Rational)> = None;
-        for plan in plans {
-            let share = self.probability_of(task, situation, &plan);
-            if best.as_ref().is_none_or(|(_, known)| share > *known) {
-                best = Some((plan, share));
-            }
-        }
-        best.ok_or(answer)
+        Ok(best)
     }
 
     /// A plan for a world in which every action takes long, as a plan of the task.

@@ -1,6 +1,6 @@
 //! From the command line to what a run is.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use elbowroom::execute::{
     FirstPlan, FirstPlanError, MOST_STATES, NamedText, RunSpec, SpecError, Spoiler, SpoilerError,
@@ -84,9 +84,8 @@ pub(in crate::commands) fn of(
         spec.world = Some(source.text().to_owned());
         worlds.push(source);
     }
-    let believed = arguments.believed.as_ref();
-    if let Some(path) = believed.and_then(|path| model_at(path, arguments.learn.as_deref())) {
-        let source = input::source(&path, "world")?;
+    if let Some(path) = &arguments.believed {
+        let source = believed(path, arguments.learn.as_deref())?;
         spec.believed = Some(source.text().to_owned());
         worlds.push(source);
     }
@@ -101,21 +100,24 @@ pub(in crate::commands) fn of(
     Ok((spec, worlds))
 }
 
-/// Returns the world file of `--believed`; of a folder of `--learn`, the model in it, or `None` if it has none yet.
-fn model_at(path: &Path, learn: Option<&Path>) -> Option<PathBuf> {
+/// Reads the world file of `--believed`. In a folder of `--learn` it is the model; until there is one, all goes as planned.
+fn believed(path: &Path, learn: Option<&Path>) -> Result<Source, Failure> {
     let is_new = learn == Some(path) && !path.exists();
     if !path.is_dir() && !is_new {
-        return Some(path.to_owned());
+        return input::source(path, "world");
     }
     let model = path.join(MODEL);
     if model.exists() {
-        return Some(model);
+        return input::source(&model, "world");
     }
     output::warn(&format!(
-        "{} has no model yet: nothing is believed of the world",
+        "{} has no model yet: all is believed to go as planned",
         path.display()
     ));
-    None
+    Ok(Source::new(
+        "world",
+        "format = \"elbowroom-world\"\nversion = 1\n",
+    ))
 }
 
 /// How many threads a planner of this name has. By default one: beside a run, the other processors have

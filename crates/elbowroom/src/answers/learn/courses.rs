@@ -76,6 +76,11 @@ impl Course {
         })
     }
 
+    /// Returns the name of the domain.
+    pub fn domain(&self) -> &str {
+        &self.task.problem().domain
+    }
+
     /// Returns the believed world of the run, if it had one.
     pub(super) fn believed(&self, trace: &Stored) -> Option<WorldModel> {
         let spec: RunSpec = trace.header().ok()?;

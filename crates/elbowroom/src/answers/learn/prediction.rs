@@ -76,6 +76,9 @@ impl Predictions {
         let Ok(exact) = planned.to_string().parse::<Rational>() else {
             return;
         };
+        // Times of reports are rounded in binary.
+        let resolution = world.resolution.to_f64();
+        let observed = (observed / resolution).round() * resolution;
         let share = |side| world.duration_share(&action, &exact, observed, side);
         let is_low = share(Side::UpTo).is_some_and(|share| share < TAILS.0);
         let is_high = share(Side::Below).is_some_and(|share| share > TAILS.1);

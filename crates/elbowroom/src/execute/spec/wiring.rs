@@ -362,6 +362,12 @@ impl RunSpec {
                 .planning_budget
                 .as_ref()
                 .map_or(u64::MAX, planning_work),
+            // Requests wait while plans are made in the thread of the run.
+            patience: if self.is_lasting && self.executor.asks_odds() {
+                1
+            } else {
+                Embedded::default().patience
+            },
             ..Embedded::default()
         }
     }
