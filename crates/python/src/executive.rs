@@ -32,6 +32,10 @@ impl Executive {
     /// Creates an executive for the problem and the options of a run. `learn` is the folder of a model, `segments` the length
     /// from which a journal is rotated, and the number of earlier segments that are kept. `warn` receives warnings.
     #[new]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the keywords of the constructor in Python"
+    )]
     fn new(
         py: Python<'_>,
         problem: &Task,
