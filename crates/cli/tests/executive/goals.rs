@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::client::Executive;
+use super::client::{Executive, folder};
 use super::{ctl, simulated};
 
 /// Gives a goal with `ctl goal --wait`. Returns the exit code and the state of the goal.
@@ -154,15 +154,18 @@ fn goal_that_misses_its_deadline_says_by_how_much() {
 
 #[test]
 fn goals_that_exclude_each_other_are_named() {
-    let own = simulated("conflict");
+    let roads = "crates/cli/tests/files/two-roads";
+    let (domain, problem) = (format!("{roads}/domain.pddl"), format!("{roads}/day.pddl"));
+    let line = [&domain, &problem, "--realtime", "10"];
+    let own = Executive::start(&folder("conflict"), &line);
     own.await_state(|state| state["activity"] == "resting");
-    let conflict = json!({"name": "odd", "goal": "(and (idle r) (not (idle r)))"});
+    let conflict = json!({"name": "odd", "goal": "(and (signed) (home) (there))"});
     assert_eq!(own.post("/v1/goals", &conflict).0, 200);
     let is_about_it = |state: &Value| state["why"].as_str().is_some_and(|why| why.contains("odd"));
     let state = own.await_state(|state| state["activity"] == "resting" && is_about_it(state));
     let why = state["why"].as_str().expect("a reason");
     assert!(
-        why.contains("`(idle r)` and `(not (idle r))` exclude each other"),
+        why.contains("`(home)` and `(there)` exclude each other"),
         "{why}"
     );
 }
