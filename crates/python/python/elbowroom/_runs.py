@@ -53,7 +53,7 @@ def run_options(
         if name == "likelihoods" and isinstance(value, str):
             file, likelihoods = named_text(value, "likelihoods")
             value = {"name": file, "text": likelihoods}
-        if name == "believed" and value is not None:
+        if name == "believed" and isinstance(value, (str, os.PathLike)):
             value = named_text(value, "world")[1]
         chosen[name] = value
     return chosen
