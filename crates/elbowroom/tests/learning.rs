@@ -8,11 +8,13 @@ use elbowroom::answers::learn::{
     ConformalBox, DurationsLearnt, InsideRequest, LearnAnswer, LearnRequest, Log, Settings,
     Verdict, learn,
 };
-use elbowroom::answers::run::{RunRequest, simulate};
+use elbowroom::answers::run::{RunRequest, run as answer_run, simulate};
 use elbowroom::envelope::Guarantee;
 use elbowroom::execute::{NamedText, RunSpec};
 use elbowroom::execution::run::{TimeoutRule, Verdict as Ended};
+use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
 use elbowroom::learning::records::{Outcome, Record, of_trace};
+use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::{End, Rational};
 use elbowroom::pddl::{read_plan, read_problem};
@@ -498,4 +500,56 @@ fn expected_changes_stand_beside_those_that_were_seen() {
     let wrong = world.replace("\"unlocked\"", "\"unlokced\"");
     let refused = asked(&logs, &wrong).expect_err("no such predicate");
     assert!(refused.to_string().contains("unlocked"), "{refused}");
+}
+
+/// A world whose reports are from a moment after they are made, as rounding of binary numbers can make them.
+struct Early<'a>(Box<dyn World + 'a>);
+
+impl World for Early<'_> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.0.command(now, command)
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let mut passage = self.0.wait(until)?;
+        for observation in &mut passage.observations {
+            observation.time = &passage.now + Rational::new(1, 1_000_000_000);
+        }
+        Ok(passage)
+    }
+
+    fn look(
+        &mut self,
+        facts: &[FactId],
+        fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        self.0.look(facts, fluents)
+    }
+}
+
+#[test]
+fn reports_with_corrected_times_count() {
+    let (task, plan) = problem();
+    let spec = spec(WORLD, 3);
+    let mut text = String::new();
+    let mut sink = |line: &str| text.push_str(line);
+    let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
+    writer.header(&spec).expect("texts and numbers");
+    let model = spec
+        .simulation(task.problem())
+        .expect("a world")
+        .expect("a simulation");
+    let mut world = Early(model.world(&task, spec.seed));
+    let request = RunRequest::new(&spec, &task)
+        .beginning_with(plan)
+        .recorded_by(&mut writer);
+    answer_run(request, &mut world, &mut Unwatched).expect("a run");
+    drop(writer);
+    assert!(text.contains("taken as now"), "{text}");
+    let records = of_trace(&Stored::read(&text).expect("a trace"));
+    assert!(records.len() > 4, "{records:?}");
+    for record in &records {
+        assert!(record.start.is_some(), "{record:?}");
+        assert!(record.outcome != Outcome::Running, "{record:?}");
+    }
 }

@@ -112,6 +112,7 @@ pub use account::{Account, ExecutedStep, KnownStart};
 pub use amid::{Amid, Beginning};
 pub use drive::{Next, NotAsked};
 pub use farewell::FAREWELL;
+pub use intake::is_correction;
 pub use lasting::{FIRST_GOAL, GoalReader};
 pub use refusals::Refusals;
 pub use settings::{

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
-use elbowroom_report::trace::line::{GivenLine, ObservationLine, ObservedLine};
+use elbowroom_report::trace::line::{GivenLine, ObservationLine};
 use elbowroom_report::trace::{Line, Stored};
 
 /// How an attempt to do something ended.
@@ -81,10 +81,10 @@ pub fn of_trace(trace: &Stored) -> Vec<Record> {
                 }
             }
             Line::Passed(line) => last = last.max(float(&line.now.0)),
-            Line::Observed(line) if is_counted(line) => match &line.observation {
-                ObservationLine::Started { ticket, time, .. } => {
+            Line::Observed(line) => match &line.counted() {
+                Some(ObservationLine::Started { ticket, time, .. }) => {
                     let commanded = open.get(ticket).map_or(0.0, |open| open.commanded);
-                    let time = float(&time.0).min(float(&line.now.0)).max(commanded);
+                    let time = float(&time.0).max(commanded);
                     // What takes no time is done when it has started; no end is reported.
                     let is_instantaneous =
                         open.get(ticket).is_some_and(|open| open.planned.is_none());
@@ -95,15 +95,14 @@ pub fn of_trace(trace: &Stored) -> Vec<Record> {
                         records.push((*ticket, closed(done, time, Outcome::Succeeded)));
                     }
                 }
-                ObservationLine::Ended {
+                Some(ObservationLine::Ended {
                     ticket,
                     outcome,
                     time,
                     ..
-                } => {
+                }) => {
                     if let Some(open) = open.remove(ticket) {
-                        let time = float(&time.0).min(float(&line.now.0));
-                        let time = time.max(open.start.unwrap_or(open.commanded));
+                        let time = float(&time.0).max(open.start.unwrap_or(open.commanded));
                         let outcome = match outcome.as_str() {
                             "succeeded" => Outcome::Succeeded,
                             "cancelled" => Outcome::Cancelled,
@@ -124,12 +123,6 @@ pub fn of_trace(trace: &Stored) -> Vec<Record> {
     }
     records.sort_by_key(|(ticket, _)| *ticket);
     records.into_iter().map(|(_, record)| record).collect()
-}
-
-/// Returns `true` for reports that were accepted, also with a corrected time.
-fn is_counted(line: &ObservedLine) -> bool {
-    let remark = line.remark.as_deref();
-    remark.is_none_or(|remark| remark.contains("taken as"))
 }
 
 fn closed(open: Open, end: f64, outcome: Outcome) -> Record {

@@ -65,24 +65,24 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         is_paused = snapshot.paused;
     }
     for line in &stored.lines {
-        if let Line::Observed(observed) = line
-            && observed.remark.is_none()
-        {
-            match observed.observation {
+        let counted = match line {
+            Line::Observed(observed) => observed.counted(),
+            _ => None,
+        };
+        if let Some(observation) = &counted {
+            match observation {
                 ObservationLine::Pause { .. } => is_paused = true,
                 ObservationLine::Resume { .. } => is_paused = false,
                 _ => {}
             }
         }
-        if let (Some(belief), Line::Observed(observed)) = (&mut belief, line)
-            && observed.remark.is_none()
-        {
-            match bars.command_of(&observed.observation) {
+        if let (Some(belief), Some(observation)) = (&mut belief, &counted) {
+            match bars.command_of(observation) {
                 Some((ticket, action, planned)) => {
                     let planned = planned.as_ref();
-                    belief.started(ticket, &action, planned, &observed.observation, &mut texts);
+                    belief.started(ticket, &action, planned, observation, &mut texts);
                 }
-                None => belief.reported(&observed.observation, &mut texts),
+                None => belief.reported(observation, &mut texts),
             }
         }
         bars.read(line);

@@ -150,7 +150,7 @@ def test_unknown_names_are_refused() -> None:
         ({"executor": "nobody"}, "nobody"),
         ({"planner": lambda domain, problem: None}, "planner"),
         ({"planning_time": 1}, "planning"),
-        ({"journal": "/tmp/no journal"}, "journal"),
+        ({"journal": "no such folder/run.journal"}, "journal"),
         ({"journal_size": -1}, "journal_size"),
         ({"colour": "red"}, "colour"),
     ],

@@ -15,6 +15,25 @@ use crate::record::Entry;
 /// The objection to a report that is ignored or corrected.
 pub(super) type Remark = Option<&'static str>;
 
+const IN_THE_FUTURE: &str = "its time is in the future; taken as now";
+const BEFORE_THE_COMMAND: &str = "its time is before the command; taken as then";
+const BEFORE_THE_START: &str = "its time is before its start; taken as then";
+const WITHOUT_A_START: &str = "its start was not reported";
+const WITH_THE_COMMAND: &str = "its start was not reported; taken as when it was told to";
+
+/// Returns `true` if a remark on a report means that the report was counted, with another time or with a start. A report
+/// with another remark was ignored.
+pub fn is_correction(remark: &str) -> bool {
+    [
+        IN_THE_FUTURE,
+        BEFORE_THE_COMMAND,
+        BEFORE_THE_START,
+        WITHOUT_A_START,
+        WITH_THE_COMMAND,
+    ]
+    .contains(&remark)
+}
+
 /// The objection to a report on a ticket that was not given out.
 const NEVER_STARTED: &str = "nothing of that number was started";
 
@@ -113,7 +132,7 @@ impl Run<'_> {
                 return Some("cannot be understood; nothing was made of it");
             }
         };
-        remark.or(is_early.then_some("its time is in the future; taken as now"))
+        remark.or(is_early.then_some(IN_THE_FUTURE))
     }
 
     /// An action reports the part of it that is done.
@@ -158,7 +177,7 @@ impl Run<'_> {
         let is_too_early = *time < entry.ordered;
         let time = time.clone().max(entry.ordered.clone());
         self.begin(ticket, &time, measured);
-        is_too_early.then_some("its time is before the command; taken as then")
+        is_too_early.then_some(BEFORE_THE_COMMAND)
     }
 
     /// An action has started, or happened.
@@ -241,7 +260,7 @@ impl Run<'_> {
             .get(ticket)
             .is_some_and(|entry| entry.ended.is_some());
         if is_over {
-            return was_silent.then_some("its start was not reported");
+            return was_silent.then_some(WITHOUT_A_START);
         }
         let timed_out = self.account.get(ticket).and_then(|it| it.timed_out.clone());
         if let Some(since) = timed_out.filter(|_| *ending != Ending::Succeeded) {
@@ -260,8 +279,8 @@ impl Run<'_> {
             None => {}
         }
         match () {
-            () if was_silent => Some("its start was not reported; taken as when it was told to"),
-            () if is_too_early => Some("its time is before its start; taken as then"),
+            () if was_silent => Some(WITH_THE_COMMAND),
+            () if is_too_early => Some(BEFORE_THE_START),
             () => None,
         }
     }

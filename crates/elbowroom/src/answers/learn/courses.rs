@@ -201,7 +201,11 @@ impl Follower {
                 }
             }
             Line::Passed(line) => self.pass(&line.now.0),
-            Line::Observed(line) if line.remark.is_none() => self.observe(&line.observation),
+            Line::Observed(line) => {
+                if let Some(observation) = line.counted() {
+                    self.observe(&observation);
+                }
+            }
             Line::Over(line) => self.pass(&line.time),
             _ => {}
         }
