@@ -50,8 +50,7 @@ impl Executive {
             let spec = problem.specification(options, false)?;
             let settings = ExecutiveSettings {
                 journal,
-                learn,
-                ..settings(segments, planner_memory, warn)
+                ..settings(learn, segments, planner_memory, warn)
             };
             let inner = elbowroom_executive::Executive::new(spec, settings)?;
             Ok(Self { inner })
@@ -69,10 +68,7 @@ impl Executive {
         warn: Py<PyAny>,
     ) -> PyResult<Self> {
         guarded(py, || {
-            let settings = ExecutiveSettings {
-                learn,
-                ..settings(segments, planner_memory, warn)
-            };
+            let settings = settings(learn, segments, planner_memory, warn);
             let inner = elbowroom_executive::Executive::resume(&journal, settings)?;
             Ok(Self { inner })
         })
@@ -267,12 +263,14 @@ impl Executive {
 }
 
 fn settings(
+    learn: Option<PathBuf>,
     (size, kept): (u64, usize),
     planner_memory: Option<u64>,
     warn: Py<PyAny>,
 ) -> ExecutiveSettings {
     let usual = ExecutiveSettings::default();
     ExecutiveSettings {
+        learn,
         segments: Some(Segments { size, kept }),
         planner_memory: planner_memory.or(usual.planner_memory),
         // An exception of the receiver ends nothing.

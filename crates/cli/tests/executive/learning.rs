@@ -147,3 +147,21 @@ fn stopped_executives_learn_from_the_whole_journal() {
     let model = fs::read_to_string(folder.join("experience/world.toml")).expect("a model");
     assert!(model.contains("action = \"short-road\""), "{model}");
 }
+
+#[test]
+fn believed_durations_may_exceed_every_deadline_by_far() {
+    if !python_is_there() {
+        return;
+    }
+    let folder = folder("believed-long");
+    let world = folder.join("world.toml");
+    let endless = "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"short-road\"\nconstant = 1e15\n";
+    fs::write(&world, endless).expect("written");
+    let world = world.display().to_string();
+    let done = run(
+        "closing.pddl",
+        &["--executor", "policy", "--believed", &world],
+    );
+    assert_eq!(done.status.code(), Some(0), "{done:?}");
+    assert!(text(&done.stdout).contains("(long-road)"), "{done:?}");
+}

@@ -187,11 +187,10 @@ impl Set {
 /// such time, a duration or a deadline. It may end before the horizon: that is a loss, too. Seen from above, what
 /// durations are more than a whole number of cells is given away.
 pub(super) fn fitting(world: &TimedWorld, cells: usize, side: Side) -> Option<Fit> {
-    let lasting: Vec<f64> = world
-        .acts
-        .iter()
-        .filter_map(|act| constant(world, act))
-        .collect();
+    // Later times do not matter, however many cells fit into them.
+    let is_within = |time: &f64| *time <= world.horizon;
+    let lasting = world.acts.iter().filter_map(|act| constant(world, act));
+    let lasting: Vec<f64> = lasting.filter(is_within).collect();
     let events = world.events.iter().filter_map(|event| match &event.occurs {
         Occurs::Once { time, .. } => match time.distribution {
             Distribution::Constant(time) => Some(time),
@@ -199,7 +198,7 @@ pub(super) fn fitting(world: &TimedWorld, cells: usize, side: Side) -> Option<Fi
         },
         Occurs::Rate(_) => None,
     });
-    let times: Vec<f64> = events.collect();
+    let times: Vec<f64> = events.filter(is_within).collect();
     #[allow(clippy::cast_precision_loss, reason = "at most 65,535 cells")]
     let wanted = cells as f64;
     let coarsest = world.horizon / wanted;

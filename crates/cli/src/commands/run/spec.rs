@@ -17,9 +17,8 @@ use crate::exit::Failure;
 use crate::input;
 use crate::output;
 
-/// What the arguments ask for. Files are read here; what is wrong with the arguments themselves is
-/// told before that, and before the problem is asked for. The world files come with their names, for what is to be said about
-/// them.
+/// Returns the specification of the arguments, and the world files, whose names messages need. Files are read here.
+/// Mistakes in the arguments themselves are reported before files are read and `problem` is called.
 pub(in crate::commands) fn of(
     arguments: &RunArgs,
     domain: &Path,
