@@ -110,10 +110,10 @@ impl Learner {
             self.warn(&format!("{} is damaged", segment.display()));
             return Ok(());
         };
-        let Some(Some(first)) = journal.recorded.first() else {
+        let Some(name) = name_of_copy(&journal) else {
             return Ok(());
         };
-        let copy = self.folder.join(format!("{first}.{LOG}"));
+        let copy = self.folder.join(name);
         let length = fs::metadata(&copy).map_or(0, |it| it.len());
         if text.len() as u64 > length {
             replace(&copy, &text)?;
@@ -123,7 +123,7 @@ impl Learner {
 
     /// Reads the logs of the folder that are about the domain of the run, oldest first.
     fn logs(&mut self) -> io::Result<Vec<Log>> {
-        let own = read_log(&self.journal).ok().and_then(|(_, domain)| domain);
+        let own = read_log(&self.journal).ok().and_then(|it| it.domain);
         let mut paths: Vec<PathBuf> = Vec::new();
         for entry in fs::read_dir(&self.folder)? {
             let path = entry?.path();
@@ -137,18 +137,31 @@ impl Learner {
         let mut logs = Vec::with_capacity(paths.len());
         for path in paths {
             let why = match read_log(&path) {
-                Ok((log, domain)) if own.is_none() || domain.is_none() || domain == own => {
-                    logs.push(log);
-                    continue;
+                // A journal in this folder, which has its copy beside it.
+                Ok(StoredLog {
+                    copy: Some(copy), ..
+                }) if self.has_other(&copy, &path) => continue,
+                Ok(StoredLog {
+                    domain: Some(domain),
+                    ..
+                }) if own.as_ref().is_some_and(|own| *own != domain) => {
+                    format!("it is about the domain `{domain}`")
                 }
-                Ok((_, domain)) => {
-                    format!("it is about the domain `{}`", domain.unwrap_or_default())
+                Ok(stored) => {
+                    logs.push(stored.log);
+                    continue;
                 }
                 Err(why) => why,
             };
             self.warn_once(format!("{} is left out: {why}", path.display()));
         }
         Ok(logs)
+    }
+
+    /// Returns `true` if the folder has a file of this name that is not the one at `path`.
+    fn has_other(&self, name: &str, path: &Path) -> bool {
+        let other = self.folder.join(name);
+        other != path && other.exists()
     }
 
     fn report_drift(&mut self, action: &ActionLearnt) {
@@ -179,18 +192,34 @@ impl Learner {
     }
 }
 
-/// Returns a log, and the name of its domain if it has one.
-fn read_log(path: &Path) -> Result<(Log, Option<String>), String> {
+/// Log of the folder.
+struct StoredLog {
+    log: Log,
+    /// Name of the domain, if the log contains it.
+    domain: Option<String>,
+    /// Name of its copy in the folder, if it is a journal.
+    copy: Option<String>,
+}
+
+/// Returns the file name of the copy of a journal: the time of its first record.
+fn name_of_copy(journal: &Journal) -> Option<String> {
+    let first = journal.recorded.first()?.as_ref()?;
+    Some(format!("{first}.{LOG}"))
+}
+
+fn read_log(path: &Path) -> Result<StoredLog, String> {
     let text = fs::read_to_string(path).map_err(|error| plain(&error))?;
-    let text = if is_journal(&text) {
-        Journal::read(&text)?.text
+    let (text, copy) = if is_journal(&text) {
+        let journal = Journal::read(&text)?;
+        let copy = name_of_copy(&journal);
+        (journal.text, copy)
     } else {
-        text
+        (text, None)
     };
     let source = Source::new(path.display().to_string(), text);
     let log = Log::read(&source).map_err(|error| error.to_string())?;
     let domain = log.course.as_ref().map(|course| course.domain().to_owned());
-    Ok((log, domain))
+    Ok(StoredLog { log, domain, copy })
 }
 
 /// Replaces a file, which is complete at any moment.
