@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     };
     let (mut spec, worlds) = spec::of(arguments, domain, problem)?;
     spec.is_attended = arguments.token.is_some();
-    let (task, first) = checked(arguments, &spec, &worlds, output)?;
+    let (task, first) = checked(arguments, &mut spec, &worlds, output)?;
     let interrupt = Interrupt::listen_with_world();
     let journal = journal(arguments, RESUME)?;
     let page = Page::open(arguments, &spec, &task, &interrupt)?;
@@ -146,11 +146,12 @@ pub(super) fn access(
 /// before anything is done.
 pub(super) fn checked(
     arguments: &RunArgs,
-    spec: &RunSpec,
+    spec: &mut RunSpec,
     worlds: &[Source],
     output: &mut Output,
 ) -> Result<(Arc<Task>, Option<TimeTriggeredPlan>), Failure> {
     let task = task(spec, output)?;
+    spec::fit_model(arguments, spec, task.problem())?;
     let first = match arguments.plan() {
         Some(path) => Some(input::time_triggered(
             &task,

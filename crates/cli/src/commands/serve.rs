@@ -69,7 +69,7 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     let (mut spec, worlds) = spec::of(&arguments.run, domain, problem)?;
     lasting(&mut spec, arguments);
     let given = if arguments.run.problem.is_some() {
-        Some(checked(&arguments.run, &spec, &worlds, output)?)
+        Some(checked(&arguments.run, &mut spec, &worlds, output)?)
     } else {
         check_domain(&domain_text)?;
         spec.check().map_err(spec::contradiction)?;

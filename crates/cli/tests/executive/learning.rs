@@ -87,9 +87,22 @@ fn executors_believe_what_was_learnt_from_journals() {
     assert_eq!(replay.status.code(), Some(0), "{replay:?}");
     let page = command::elbowroom(&["report", &trace]);
     assert!(text(&page.stdout).contains("Predictions of the believed world"));
+    // A problem need not have all that the model is about.
+    let mut more = fs::read_to_string(&model).expect("a model");
+    more.push_str("\n[[duration]]\naction = \"(fly home)\"\nconstant = 3\n");
+    fs::write(&model, more).expect("written");
+    let other = run("closing.pddl", &believing);
+    assert_eq!(other.status.code(), Some(0), "{other:?}");
+    assert!(
+        text(&other.stderr).contains("1 section left out"),
+        "{other:?}"
+    );
     // Predictions stand beside observations.
     let journal = folder.join("4.journal").display().to_string();
-    let said = command::elbowroom(&["learn", &journal, "--world", &model]);
+    let expected = folder.join("expected.toml").display().to_string();
+    let told = command::elbowroom(&["learn", &journal, "-o", &expected]);
+    assert_eq!(told.status.code(), Some(0), "{told:?}");
+    let said = command::elbowroom(&["learn", &journal, "--world", &expected]);
     let said = text(&said.stdout);
     let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(said.contains("short-road 12 12 1 of 1 0 0 of 1"), "{said}");

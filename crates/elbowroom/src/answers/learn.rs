@@ -3,6 +3,7 @@
 mod changes;
 mod courses;
 mod inside;
+mod other_problem;
 mod prediction;
 mod timeouts;
 
@@ -24,6 +25,7 @@ pub use changes::{ChangesLearnt, RateLearnt};
 pub use courses::Course;
 pub use elbowroom_learning::learn::Settings;
 pub use inside::{ConformalBox, ConformalInterval, InsideRequest, Verdict};
+pub use other_problem::known_sections;
 pub use prediction::{PredictionAnswer, predictions_for};
 
 /// Asks what logs say.

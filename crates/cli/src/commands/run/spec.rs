@@ -2,14 +2,18 @@
 
 use std::path::Path;
 
+use elbowroom::answers::learn::known_sections;
 use elbowroom::execute::{
     FirstPlan, FirstPlanError, MOST_STATES, NamedText, RunSpec, SpecError, Spoiler, SpoilerError,
 };
 use elbowroom::execution::run::{PlanningTime, RunningRule};
+use elbowroom::model::Problem;
 use elbowroom::num::Rational;
 use elbowroom::plan::parametrize::ParametrizeError;
+use elbowroom::sim::WorldModel;
 use elbowroom::text::Source;
 use elbowroom_executive::learning::MODEL;
+use elbowroom_executive::messages::counted;
 
 use super::super::threads;
 use crate::args::{EMBEDDED, FirstPlanChoice, RunArgs, RunningChoice};
@@ -86,7 +90,9 @@ pub(in crate::commands) fn of(
     if let Some(path) = &arguments.believed {
         let source = believed(path, arguments.learn.as_deref())?;
         spec.believed = Some(source.text().to_owned());
-        worlds.push(source);
+        if !path.is_dir() {
+            worlds.push(source);
+        }
     }
     spec.problem = problem(&spec.domain)?;
     spec.first_plan = match arguments.first_plan_by {
@@ -117,6 +123,32 @@ fn believed(path: &Path, learn: Option<&Path>) -> Result<Source, Failure> {
         "world",
         "format = \"elbowroom-world\"\nversion = 1\n",
     ))
+}
+
+/// Leaves the sections of a learnt model out that the problem cannot have, with a warning. World files that are no models
+/// of a folder of `--learn` stay as they are.
+pub(super) fn fit_model(
+    arguments: &RunArgs,
+    spec: &mut RunSpec,
+    problem: &Problem,
+) -> Result<(), Failure> {
+    let Some(folder) = arguments.believed.as_ref().filter(|it| it.is_dir()) else {
+        return Ok(());
+    };
+    let path = folder.join(MODEL).display().to_string();
+    let model = spec.believed.as_deref().unwrap_or_default();
+    let (model, left_out) = known_sections(model, problem);
+    if left_out > 0 {
+        let sections = counted(left_out, "section");
+        output::warn(&format!(
+            "{path}: {sections} left out, as this problem has none of it"
+        ));
+    }
+    let source = Source::new(path, model.as_str());
+    let read = WorldModel::read(&source, problem);
+    read.map_err(|wrong| contradiction(SpecError::World(wrong)))?;
+    spec.believed = Some(model);
+    Ok(())
 }
 
 /// How many threads a planner of this name has. By default one: beside a run, the other processors have
