@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::WindowLine;
 use crate::exact::Exact;
 
-/// An observation, and what was made of it.
+/// An observation, with the remark of the run on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObservedLine {
@@ -15,19 +15,19 @@ pub struct ObservedLine {
     pub now: Exact,
     /// The observation.
     pub observation: ObservationLine,
-    /// When that was planned.
+    /// Planned time.
     pub planned: WindowLine,
-    /// The objection, if the report was ignored or corrected.
+    /// Reason why the report was ignored or corrected; `None` if it was taken as it is.
     pub remark: Option<String>,
 }
 
-/// An observation, as a trace has it.
+/// An observation in a trace.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ObservationLine {
     /// An action has started.
     Started {
-        /// Which start.
+        /// Ticket of its start.
         ticket: u64,
         /// Amounts, by fluent.
         measured: IndexMap<String, Exact>,
@@ -36,39 +36,39 @@ pub enum ObservationLine {
     },
     /// An action has ended.
     Ended {
-        /// Which start.
+        /// Ticket of its start.
         ticket: u64,
-        /// How: `succeeded`, `failed` or `cancelled`.
+        /// Outcome: `succeeded`, `failed` or `cancelled`.
         outcome: String,
         /// Amounts, by fluent.
         measured: IndexMap<String, Exact>,
-        /// Why it failed; where it has.
+        /// Reason of a failure.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         why: Option<String>,
         /// The time.
         time: Exact,
     },
-    /// A running action says how far it has come.
+    /// Progress of a running action.
     Feedback {
-        /// Which start.
+        /// Ticket of its start.
         ticket: u64,
-        /// The part that is done, from 0 to 1; `None` if that is not known.
+        /// Completed part, from 0 to 1; `None` if it is unknown.
         completion: Option<Exact>,
-        /// What there is to say about it.
+        /// Note for people.
         note: String,
         /// The time.
         time: Exact,
     },
-    /// A fact is seen.
+    /// Observed fact.
     Fact {
         /// Its name: `(at rover depot)`.
         fact: String,
-        /// Whether it is true.
+        /// Its truth value.
         becomes: bool,
         /// The time.
         time: Exact,
     },
-    /// A fluent is seen.
+    /// Observed fluent.
     Value {
         /// Its name.
         fluent: String,
@@ -77,7 +77,7 @@ pub enum ObservationLine {
         /// The time.
         time: Exact,
     },
-    /// A lasting run is to reach this goal, too.
+    /// Request to add a goal.
     Goal {
         /// Its name.
         name: String,
@@ -92,45 +92,45 @@ pub enum ObservationLine {
         /// The time.
         time: Exact,
     },
-    /// A lasting run is to reach the goal of that name no more.
+    /// Request to abandon the goal of that name.
     Abandon {
         /// Its name.
         name: String,
         /// The time.
         time: Exact,
     },
-    /// A running action is to be cancelled.
+    /// Request to cancel a running action.
     CancelAction {
         /// The ticket of its start.
         ticket: u64,
         /// The time.
         time: Exact,
     },
-    /// A lasting run is to start nothing more.
+    /// Request to pause.
     Pause {
         /// The time.
         time: Exact,
     },
-    /// A lasting run is to go on after a pause.
+    /// Request to end a pause.
     Resume {
         /// The time.
         time: Exact,
     },
-    /// The plan that was made beside the run is there.
+    /// A background plan is complete.
     PlanMade {
         /// The time.
         time: Exact,
     },
-    /// The plan that was made ready beside the run is ready.
+    /// The preparation of a background plan is complete.
     PlanReady {
         /// The time.
         time: Exact,
     },
-    /// Something that cannot be understood.
+    /// Invalid message.
     Unintelligible {
         /// The message.
         said: String,
-        /// The mistake in it.
+        /// Its mistake.
         why: String,
         /// The time.
         time: Exact,
