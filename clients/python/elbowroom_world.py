@@ -91,7 +91,7 @@ class Action:
         return self._cancelled.is_set()
 
     def sleep(self, seconds: float) -> bool:
-        """Waits so many seconds of the world's time; ends early, with ``False``, when cancelled."""
+        """Waits for ``seconds`` of the world's time; returns ``False`` early when cancelled."""
         return not self._cancelled.wait(max(0.0, seconds) / self._world.speed)
 
     def feedback(self, completion: float | None = None, note: str = "") -> None:
@@ -113,7 +113,7 @@ class Action:
         self._end("failed", why=why, stamp=stamp)
 
     def was_cancelled(self) -> None:
-        """It has stopped, as it was told to."""
+        """The action has stopped as requested."""
         self._end("cancelled")
 
     def _end(self, outcome: str, **more: Any) -> None:
@@ -129,7 +129,7 @@ class Action:
 
 Does = Callable[[Action], Any]
 Stamp = tuple[str, float]
-"""A time by another clock, such as that of a robot's arm: its name, and what it showed."""
+"""A time of another clock, such as that of a robot's arm: its name and its reading."""
 
 
 class World:
@@ -177,7 +177,7 @@ class World:
         return self._register(names, "blocking", resumes)
 
     def starter(self, *names: str, resumes: bool = False) -> Callable[[Does], Does]:
-        """The function begins these actions and returns at once; the end is told later."""
+        """The function starts these actions and returns at once; their ends are reported later."""
         return self._register(names, "starter", resumes)
 
     def canceller(self, function: Does) -> Does:
@@ -291,7 +291,7 @@ class World:
         self._inbox.put(("end",))
 
     def _next(self, question: dict[str, Any] | None) -> tuple[Any, ...]:
-        """What comes next: a message, a report, or that time is up."""
+        """The next event: a message, a report, or the end of the wait."""
         if question is None:
             return self._inbox.get()
         left = max(0.0, (_number(question.get("until")) or 0.0) - self.now()) / self.speed
@@ -428,7 +428,7 @@ class World:
             self._call(self._canceller, action)
 
     def _take(self, report: dict[str, Any], at: float) -> None:
-        """Notes what is to be reported; each start and each end once, and in this order."""
+        """Queues a report; each start and each end is reported once, in this order."""
         report = dict(report, time=max(0.0, at))
         ticket, what, stamp = report.get("ticket"), report["type"], report.pop("stamp", None)
         if what == "clock" and self._version < 2:
@@ -459,7 +459,7 @@ class World:
         self._news.append(report)
 
     def _see(self, question: dict[str, Any]) -> None:
-        """Looks at what is asked for."""
+        """Answers a request for facts and numbers."""
         now = self.now()
         for ticket in question.get("tickets", []):
             if ticket in self._ended:
@@ -511,7 +511,7 @@ class World:
                 under_way.append(action)
                 self._launch(found, action)
             else:
-                action.failed("it was under way when the world was restarted")
+                action.failed("it was running when the world was restarted")
 
         if self._resumed is not None:
             self._resumed(under_way)
@@ -693,7 +693,7 @@ class Stepped(World):
 
 
 class _Ledger:
-    """What was begun and what has ended, line by line, on the disk before it is said."""
+    """Log of started and ended actions, one per line, on disk before each is reported."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self._path = os.fspath(path)

@@ -1,4 +1,4 @@
-"""What the library makes of what it is told. `python3 -m unittest discover -s clients/python`"""
+"""Tests of the library's messages. `python3 -m unittest discover -s clients/python`"""
 
 import io
 import json

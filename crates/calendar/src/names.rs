@@ -41,7 +41,7 @@ pub(crate) fn ground(text: &str, kind: Kind, problem: &Problem) -> Result<Vec<St
             parameters.len(),
             arguments.len()
         );
-        return Err((message, "`_` stands for any object".to_owned()));
+        return Err((message, "`_` means any object".to_owned()));
     }
     let mut all: Vec<Vec<ObjectId>> = vec![Vec::new()];
     for (argument, parameter) in arguments.iter().zip(parameters) {
@@ -135,7 +135,7 @@ fn objects(
         let message = format!("the problem has no object `{argument}`");
         return Err((
             message,
-            near.unwrap_or_else(|| "`_` stands for any object".to_owned()),
+            near.unwrap_or_else(|| "`_` means any object".to_owned()),
         ));
     };
     if !problem.has_type(object, &parameter.types) {

@@ -97,7 +97,7 @@ fn unknown_facts_are_refused() {
     insta::assert_snapshot!(fact("\"(opne bakery)\""), @"c.toml:8:8: error: the domain has no predicate `opne`; did you mean `open`?");
     insta::assert_snapshot!(fact("\"(open bakrey)\""), @"c.toml:8:8: error: the problem has no object `bakrey`; did you mean `bakery`?");
     insta::assert_snapshot!(fact("\"(open ann)\""), @"c.toml:8:8: error: `ann` has another type than `?shop`; give an object of type shop");
-    insta::assert_snapshot!(fact("\"(open)\""), @"c.toml:8:8: error: `open` takes 1 arguments, but 0 are given; `_` stands for any object");
+    insta::assert_snapshot!(fact("\"(open)\""), @"c.toml:8:8: error: `open` takes 1 arguments, but 0 are given; `_` means any object");
     insta::assert_snapshot!(fact("\"open\""), @"c.toml:8:8: error: `open` names no fact; write it like `(open bakery)` or `(open _)`");
     insta::assert_snapshot!(fact("\"(busy)\""), @"c.toml:8:8: error: `busy` is derived from other facts; give the windows of those");
     insta::assert_snapshot!(fact("\"(free ann)\""), @"c.toml:8:8: error: the problem itself sets (free ann) at the beginning; remove it from the problem's `:init`, or from the calendar");

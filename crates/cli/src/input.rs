@@ -99,7 +99,7 @@ pub(crate) fn time_triggered(
         AnyPlan::TimeTriggered(plan) => Ok(plan),
         AnyPlan::Stn(_) => Err(Failure::new(
             format!(
-                "{} is an STN plan file, which stands for many plans",
+                "{} is an STN plan file, which describes many plans",
                 path.display()
             ),
             advice,

@@ -62,7 +62,7 @@ pub enum RequestError {
     #[error(transparent)]
     Box(#[from] BoxTextError),
     /// The judge cannot tell whether the plan is valid: why.
-    #[error("cannot tell whether the plan is valid: {0}")]
+    #[error("it is undecided whether the plan is valid: {0}")]
     Undecided(String),
     /// It cannot be told how likely the durations of the plan stay inside a box.
     #[error(transparent)]

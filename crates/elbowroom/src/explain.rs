@@ -141,7 +141,7 @@ impl<'a> Explainer<'a> {
             Limit::Unbounded => None,
             Limit::AnyFinite => Some(ANY_FINITE.to_owned()),
             Limit::Range => Some(self.range(id, side)),
-            Limit::Undecided => Some("there are too many cases to tell apart".to_owned()),
+            Limit::Undecided => Some("there are too many cases to decide".to_owned()),
             Limit::Objection(objection) => Some(match objection {
                 Objection::NoSchedule(valuation) => seen.reason(self, id, valuation),
                 Objection::Broken(broken) => self.requirement(&broken.requirement),

@@ -75,7 +75,7 @@ pub enum ExportError {
     )]
     NoSchedule,
     /// The plan is beyond writing out.
-    #[error("this plan is beyond what can be written: {0}")]
+    #[error("this plan cannot be exported: {0}")]
     Refused(Refusal),
     /// A bound has to hold for values without limit.
     #[error(

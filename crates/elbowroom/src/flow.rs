@@ -60,7 +60,7 @@ pub enum FlowError {
     #[error(transparent)]
     Parametrize(#[from] ParametrizeError),
     /// The plan is beyond exact analysis.
-    #[error("this plan is beyond what can be analysed exactly: {0}")]
+    #[error("this plan cannot be analysed exactly: {0}")]
     Refused(#[from] Refusal),
 }
 

@@ -186,7 +186,8 @@ fn proposed(task: &Task, situation: &Situation, effort: &mut Effort<'_>) -> Resu
 
 /// Adds the reachable instances of actions, and returns the facts that they reach.
 fn reached(instances: &mut Instances, effort: &mut Effort<'_>) -> Result<Reached, String> {
-    let too_many = || "there are too many instances of actions to list what they reach".to_owned();
+    let too_many =
+        || "there are too many instances of actions to list the facts they reach".to_owned();
     let mut reached = Reached::new();
     let mut looks = 0;
     loop {

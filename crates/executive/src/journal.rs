@@ -99,7 +99,7 @@ impl JournalFile {
             return Err(Error::new(
                 format!("there is a journal {name} already"),
                 format!(
-                    "`{resume}` goes on with its run; if that is over, choose another file, or remove this one"
+                    "`{resume}` continues its run; if that is over, choose another file, or remove this one"
                 ),
             ));
         }
@@ -224,7 +224,7 @@ fn lock(path: &Path, file: &File) -> Result<(), Error> {
 
 fn locked(path: &Path) -> Error {
     Error::new(
-        format!("the run of {} is under way", path.display()),
+        format!("the run of {} has not ended", path.display()),
         "another program writes this journal; wait for its end, or end it",
     )
 }

@@ -164,10 +164,10 @@ impl<'a> RestartableWorld<'a> {
                 let why = match (knows, is_resumed) {
                     (true, _) => "the world knows nothing of it after the restart",
                     (false, true) => {
-                        "it was under way when the run was cut off, and the world cannot say what became of it"
+                        "it was running when the run was cut off, and the world does not know its outcome"
                     }
                     (false, false) => {
-                        "it was running when the world ended, and the world cannot say what became of it"
+                        "it was running when the world ended, and the world does not know its outcome"
                     }
                 };
                 news.push(failed(Ticket(ticket), &self.last, why));

@@ -96,7 +96,8 @@ impl InterruptedRun {
         if journal.text.is_empty() {
             let is_cut_off = !text.contains('\n');
             let (why, advice) = if is_cut_off {
-                let why = "it ends before its first record does, so that nothing was ever told to the world";
+                let why =
+                    "it ends within its first record, so that the world has received no request";
                 (why, "remove it, and begin the run again")
             } else {
                 ("its first record is damaged", DAMAGE_ADVICE)
@@ -121,7 +122,7 @@ impl InterruptedRun {
             }
             return Err(Error::new(
                 format!("the run of {name} is over: {}", report.verdict),
-                "there is nothing to go on with; `elbowroom report` shows what was done",
+                "there is nothing to continue; `elbowroom report` shows the run",
             ));
         }
         let spec = stored.header();

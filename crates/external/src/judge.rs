@@ -82,7 +82,7 @@ impl Judge<'_, '_> {
                 repaired: repaired.cloned(),
             }),
             Verdict::Invalid(violation) => Err(violation.to_string()),
-            Verdict::Undecided(why) => Err(format!("the judge cannot tell: {why}")),
+            Verdict::Undecided(why) => Err(format!("the validator cannot decide: {why}")),
         }
     }
 }

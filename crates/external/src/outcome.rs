@@ -142,7 +142,7 @@ impl fmt::Display for Outcome {
             Self::Unsolvable { says } => write!(f, "it says that there is no plan: {says}"),
             Self::NoneInTime => f.write_str("no plan within the time limit"),
             Self::Stopped => f.write_str("no plan before it was stopped"),
-            Self::GaveUp { says } => write!(f, "it gave up: {says}"),
+            Self::GaveUp { says } => write!(f, "it found no plan: {says}"),
             Self::Unsupported { says } => write!(f, "it does not take this problem: {says}"),
             Self::Crashed { signal, .. } => write!(f, "it crashed ({})", signal_name(*signal)),
             Self::OutOfMemory { peak: 0 } => f.write_str("it ran out of memory"),
@@ -175,7 +175,7 @@ pub(super) fn signal_name(signal: i32) -> String {
             (Signal::FPE, "SIGFPE"),
             (
                 Signal::KILL,
-                "SIGKILL, perhaps by the system for want of memory",
+                "SIGKILL, perhaps by the system for lack of memory",
             ),
             (Signal::SEGV, "SIGSEGV"),
             (Signal::PIPE, "SIGPIPE"),

@@ -89,7 +89,7 @@ pub fn fewest(miss: f64) -> usize {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "not negative; what is too large becomes the largest number"
+        reason = "not negative; larger values become the largest number"
     )]
     let fewest = (1.0 / miss - 1.0 - 1e-9).ceil().max(0.0) as usize;
     fewest

@@ -19,7 +19,7 @@ pub enum InstantiateError {
         found: usize,
     },
     /// An argument is not of the parameter's type.
-    #[error("`{object}` cannot stand for {variable} of `{action}`: it is not of type {expected}")]
+    #[error("`{object}` cannot be bound to {variable} of `{action}`: it is not of type {expected}")]
     ArgumentType {
         /// The action's name.
         action: String,

@@ -161,7 +161,7 @@ impl<'a> Reader<'a> {
                     let here = self.here();
                     return Err(self.wrong(
                         format!("expected the name of a member, found {here}"),
-                        "names stand in double quotes",
+                        "write names in double quotes",
                     ));
                 }
             }
@@ -235,7 +235,7 @@ impl<'a> Reader<'a> {
                 self.at = start;
                 Err(self.wrong(
                     format!("`{word}` is not a value"),
-                    "texts stand in double quotes",
+                    "write texts in double quotes",
                 ))
             }
         }

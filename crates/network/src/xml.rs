@@ -185,7 +185,7 @@ impl Reader<'_> {
         if element.name != name {
             return self.wrong(
                 format!("`</{name}>` stands where `</{}>` should", element.name),
-                "close elements in the order in which they nest",
+                "close the innermost element first",
             );
         }
         self.at = start + length + 1;
@@ -246,7 +246,7 @@ impl Reader<'_> {
         self.at += 1;
         self.skip_space();
         let Some(quote @ ('"' | '\'')) = self.rest().chars().next() else {
-            return self.wrong("this value stands in no quotes", "write `name=\"value\"`");
+            return self.wrong("this value has no quotes", "write `name=\"value\"`");
         };
         let start = self.at + 1;
         let Some(length) = self.text[start..].find(quote) else {
@@ -358,7 +358,7 @@ mod tests {
         );
         assert!(refused("<a>").contains("the element `a` is not closed"));
         assert!(refused("</a>").starts_with("text:1:1: error: `</a>` closes nothing"));
-        assert!(refused("<a b=c/>").starts_with("text:1:6: error: this value stands in no quotes"));
+        assert!(refused("<a b=c/>").starts_with("text:1:6: error: this value has no quotes"));
         assert!(refused("<a b/>").contains("neither an attribute"));
         assert!(refused("<a>&x;</a>").starts_with("text:1:4: error: this `&` begins no character"));
         assert!(refused("<!-- a").contains("this comment has no end"));

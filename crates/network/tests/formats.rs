@@ -299,7 +299,7 @@ fn mistakes_say_where_and_what_to_do() {
     f.stnu:15:1: error: this wait is for no contingent link that begins at the edge's target; `UC(C):-7` on an edge to A needs a contingent link from A to C
     f.stnu:11:1: error: this contingent edge has no counterpart; a contingent link is one edge there and one back
     f.stnu:12:1: error: this contingent edge has no counterpart; a contingent link is one edge there and one back
-    f.stnu:16:1: error: `</graphml>` stands where `</graph>` should; close elements in the order in which they nest
+    f.stnu:16:1: error: `</graphml>` stands where `</graph>` should; close the innermost element first
     f.plainstnu:12:1: error: there is no time point `Y`; list it with the others, or correct the name
     f.plainstnu:12:3: error: `a` is no number; write a decimal such as 12.5
     f.plainstnu:15:1: error: this is no contingent link; write `A 1 3 C`: C comes 1 to 3 after A

@@ -34,8 +34,8 @@ pub(crate) fn timed(results: &Results, trials: Trials) -> Document {
     let verdicts = |cell: &Cell| cell.verdicts.clone();
     sections.push(Section::Table(counts(results, "How runs ended", &verdicts)));
     let causes = |cell: &Cell| cell.causes.clone();
-    let mut causes = counts(results, "Why plans were given up", &causes);
-    "The number of plans, by cause. One run may give up several.".clone_into(&mut causes.note);
+    let mut causes = counts(results, "Why plans were abandoned", &causes);
+    "The number of plans, by cause. One run may abandon several.".clone_into(&mut causes.note);
     sections.push(Section::Table(causes));
     let (failures, more) = failures(results, trials);
     sections.extend(failures);

@@ -91,7 +91,7 @@ fn failures(results: &PerturbedResults, trials: Trials) -> (Option<Section>, Vec
         ("executor", false),
         ("why it failed", false),
         ("last step", false),
-        ("what came of it", false),
+        ("its outcome", false),
         ("trials", true),
         ("first", true),
     ];
@@ -154,14 +154,14 @@ pub(crate) fn course(course: &StoredCourse) -> Document {
         ("step", true),
         ("plan", true),
         ("action", false),
-        ("what came of it", false),
+        ("its outcome", false),
         ("became true", false),
         ("became false", false),
     ];
     let tables = [
         Table {
             heading: "Step by step".to_owned(),
-            note: "What was done, and which facts it changed; some may have changed by themselves."
+            note: "Executed actions and the facts they changed; some facts may have changed by themselves."
                 .to_owned(),
             columns: named(&columns),
             rows: steps,

@@ -148,7 +148,7 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
             sections.push(Section::Chart(chart(&timeline, &[], &mut texts)));
             sections.push(Section::Table(times(&timeline, "")));
             if let Some(repaired) = repaired {
-                let heading = "What was wrong with the planner's own times";
+                let heading = "Errors in the planner's own times";
                 sections.push(prose(heading, vec![repaired.clone()]));
             }
             good(&format!(
@@ -198,7 +198,7 @@ fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
     }
     paragraphs.extend(example.verdict.clone());
     paragraphs.extend(example.plays.iter().cloned());
-    let mut sections = vec![prose("What can go wrong", paragraphs)];
+    let mut sections = vec![prose("Possible failures", paragraphs)];
     if !example.schedule.is_empty() {
         let timeline = fixed(example.schedule.iter().map(|happening| {
             let (start, end) = (happening.start.clone(), happening.end.clone());
@@ -217,7 +217,7 @@ fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
         let row =
             |(name, value): (&String, &Exact)| vec![name.as_str().into(), nearest(&value.0).into()];
         sections.push(Section::Table(Table {
-            heading: "The values with which it fails".to_owned(),
+            heading: "Values for which it fails".to_owned(),
             columns: vec![("parameter".to_owned(), false), ("value".to_owned(), true)],
             rows: example.values.iter().map(row).collect(),
             ..Table::default()

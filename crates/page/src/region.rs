@@ -64,7 +64,7 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
             sections.extend(
                 timeline
                     .as_ref()
-                    .map(|it| Section::Table(times(it, "with which the plan works"))),
+                    .map(|it| Section::Table(times(it, "for which the plan works"))),
             );
             match (&pieces[..], missing) {
                 ([], _) => bad("The plan works with no values."),
@@ -207,7 +207,7 @@ fn rows(pieces: &[PieceAnswer], texts: &mut Texts) -> Table {
         columns.push(("list".to_owned(), true));
     }
     columns.push(("inequality".to_owned(), false));
-    columns.push(("what it comes from".to_owned(), false));
+    columns.push(("its source".to_owned(), false));
     Table {
         heading: "What the values satisfy".to_owned(),
         columns,

@@ -203,7 +203,7 @@ fn predictions(stored: &Stored, spec: &RunSpec, task: &Task) -> Option<Section> 
 /// What of the run is not on the page, as its record does not begin at the beginning.
 fn not_shown(stored: &Stored, left_out: usize) -> Option<String> {
     if stored.has_snapshot() {
-        let words = "what was before this segment of the journal, but for the last actions, and facts and numbers";
+        let words = "everything before this segment of the journal, except the last actions, facts and numbers";
         return Some(words.to_owned());
     }
     let words = || format!("the first {left_out} lines of the trace, and facts and numbers");
@@ -218,7 +218,7 @@ fn so_far(record: Record, is_paused: bool, now: &Rational) -> Verdict {
         Record::Growing { .. } if is_paused => {
             format!("The run is paused: nothing more is started. It is at {now}.")
         }
-        Record::Growing { .. } => format!("The run goes on; it is at {now}."),
+        Record::Growing { .. } => format!("The run continues; its time is {now}."),
     };
     Verdict {
         tone: Tone::Plain,
@@ -287,7 +287,10 @@ fn why(report: &ReportLine) -> Vec<Section> {
     };
     let mut sections = Vec::new();
     if !report.reasons.is_empty() {
-        sections.push(prose("Why plans were given up", sentences(&report.reasons)));
+        sections.push(prose(
+            "Why plans were abandoned",
+            sentences(&report.reasons),
+        ));
     }
     if !report.dead_end.is_empty() {
         sections.push(prose(

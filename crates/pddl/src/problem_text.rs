@@ -36,7 +36,7 @@ pub struct ProblemText {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum WriteProblemError {
     /// Not as many ends as running actions.
-    #[error("{running} actions are under way, but {ends} ends are given for them")]
+    #[error("{running} actions are running, but {ends} ends are given for them")]
     EndCount {
         /// The number of actions that are running.
         running: usize,

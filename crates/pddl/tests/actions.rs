@@ -267,6 +267,6 @@ fn preferences_of_actions_are_kept_beside_their_conditions() {
         "(preference p (preference q (lit)))",
     ] {
         let read = read_actions(&format!("(:action a :precondition {wrong})"));
-        assert!(mistakes(read).contains("a preference cannot stand here"));
+        assert!(mistakes(read).contains("a preference is not allowed here"));
     }
 }

@@ -140,7 +140,7 @@ fn a_goal_by_itself_has_no_preferences() {
     let (problem, _) = read_sections("(:init) (:goal (and))").expect("a problem");
     let read = |goal: &str| elbowroom_pddl::read_goal(&Source::new("goal", goal), &problem);
     assert!(read("(lit)").is_ok());
-    assert!(mistakes(read("(preference p (lit))")).contains("a preference cannot stand here"));
+    assert!(mistakes(read("(preference p (lit))")).contains("a preference is not allowed here"));
 }
 
 #[test]
@@ -159,13 +159,13 @@ fn constraints_that_make_no_sense_are_mistakes() {
     assert!(wrong("(within -1 (lit))").contains("a time below 0"));
     assert!(wrong("(allways (lit))").contains("does not say when it must hold"));
     let nested = wrong("(preference p (preference q (always (lit))))");
-    assert!(nested.contains("a preference cannot stand here"));
+    assert!(nested.contains("a preference is not allowed here"));
 }
 
 #[test]
 fn forms_that_belong_elsewhere_are_told_so() {
     let sections = "(:init) (:goal (and)) (:constraints (sometime (always (lit))))";
-    assert_snapshot!(mistakes(read_sections(sections)), @"problem.pddl:2:48: error: `(always …)` does not belong here; constraints on the course stand under `:constraints`, and do not nest");
-    assert_snapshot!(mistakes(read_actions("(:action a :precondition (within 3 (lit)))")), @"domain.pddl:6:27: error: `(within …)` does not belong here; constraints on the course stand under `:constraints`, and do not nest");
+    assert_snapshot!(mistakes(read_sections(sections)), @"problem.pddl:2:48: error: `(always …)` does not belong here; trajectory constraints belong under `:constraints`, and do not nest");
+    assert_snapshot!(mistakes(read_actions("(:action a :precondition (within 3 (lit)))")), @"domain.pddl:6:27: error: `(within …)` does not belong here; trajectory constraints belong under `:constraints`, and do not nest");
     assert_snapshot!(mistakes(read_actions("(:action a :effect (preference p (lit)))")), @"domain.pddl:6:21: error: `(preference …)` does not belong here; preferences stand among conditions, in goals and under `:constraints`");
 }

@@ -140,8 +140,8 @@ fn derived_predicates_cannot_be_set_nor_negate_themselves() {
     ));
     assert_snapshot!(found, @r"
     domain.pddl:8:29: error: `lit` is defined by rules, and cannot be set; change what its rules depend on
-    domain.pddl:6:11: error: `lit` depends on its own negation; a derived predicate may not be negated in what it is derived from
-    domain.pddl:7:20: error: `dark` depends on its own negation; a derived predicate may not be negated in what it is derived from
+    domain.pddl:6:11: error: `lit` depends on its own negation; a derived predicate may not be negated in its own definition
+    domain.pddl:7:20: error: `dark` depends on its own negation; a derived predicate may not be negated in its own definition
     ");
 }
 

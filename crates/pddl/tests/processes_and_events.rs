@@ -234,7 +234,7 @@ fn mistakes_in_processes_and_events_say_what_to_do() {
     assert_snapshot!(read("(:event)"), @"domain.pddl:6:2: error: an event without a name; expected `(:event name …)`");
     assert_snapshot!(read("(:event e :condition (lit) :effect (not (lit)))"), @"domain.pddl:6:11: error: unknown keyword `:condition` in event `e`; did you mean `:precondition`?");
     assert_snapshot!(read("(:event e :effect (lit)) (:event e :effect (lit))"), @"domain.pddl:6:34: error: an event `e` is declared already; give each its own name");
-    assert_snapshot!(read("(:constraint c)"), @"domain.pddl:6:14: error: a constraint `c` without a condition; expected `:condition` and what must hold in each state");
+    assert_snapshot!(read("(:constraint c)"), @"domain.pddl:6:14: error: a constraint `c` without a condition; expected `:condition` and a condition on each state");
 }
 
 #[test]
@@ -244,8 +244,8 @@ fn what_happens_by_itself_stands_in_no_plan() {
         "(:init (= (x) 0)) (:goal (and))",
     );
     let read = |plan: &str| mistakes(read_plan(&Source::new("plan", plan), &task));
-    assert_snapshot!(read("1: (e)"), @"plan:1:5: error: `e` is an event; events and processes happen by themselves, and do not stand in plans");
-    assert_snapshot!(read("1: (fill) [3]"), @"plan:1:5: error: `fill` is a process; events and processes happen by themselves, and do not stand in plans");
+    assert_snapshot!(read("1: (e)"), @"plan:1:5: error: `e` is an event; events and processes happen by themselves, and are no steps of plans");
+    assert_snapshot!(read("1: (fill) [3]"), @"plan:1:5: error: `fill` is a process; events and processes happen by themselves, and are no steps of plans");
 }
 
 /// `at` is a predicate of many domains.

@@ -119,11 +119,11 @@ impl Hub {
     pub fn begin(&mut self, action: Action, now: Duration) {
         let key = (lower(&action.name), lower_all(&action.arguments));
         if let Some(there) = self.deals.get(&key) {
-            let who = there.performer.as_deref().unwrap_or("a performer");
+            let performer = there.performer.as_deref().unwrap_or("a performer");
             let why = if there.is_cancelled {
-                format!("{who} has not confirmed that it has stopped the same action")
+                format!("{performer} has not confirmed that it has stopped the same action")
             } else {
-                format!("{who} is still busy with the same action")
+                format!("{performer} is still busy with the same action")
             };
             return self.tell(action.ticket, Told::Failed(why));
         }

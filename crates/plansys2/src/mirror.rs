@@ -229,7 +229,7 @@ impl Mirror {
                     Err(why) => {
                         self.reading = None;
                         self.remarks.push(format!(
-                            "the problem expert does not say what it has: {why}"
+                            "the problem expert does not report its contents: {why}"
                         ));
                         return;
                     }
@@ -249,7 +249,7 @@ impl Mirror {
     pub fn tick(&mut self, now: Duration) {
         if !self.is_there {
             if self.believed.is_some() && !std::mem::replace(&mut self.said.is_missing, true) {
-                let text = "no problem expert is there: what runs change is told to none";
+                let text = "there is no problem expert: changes by runs are not reported";
                 self.remarks.push(text.to_owned());
             }
             // Whoever comes back is asked anew; what it was asked for last may be lost.
@@ -334,7 +334,7 @@ impl Mirror {
     fn complain(&mut self) {
         if !std::mem::replace(&mut self.said.is_silent, true) {
             self.remarks.push(format!(
-                "the problem expert has not answered for {} s; it is asked again, and the run goes on",
+                "the problem expert has not answered for {} s; the request is repeated, and the run continues",
                 PATIENCE.as_secs()
             ));
         }

@@ -99,7 +99,7 @@ pub enum NotSmall {
         actions: usize,
     },
     /// Numbers, or effects that depend on what held throughout an action.
-    #[error("{what}, and worlds in which that happens are not tabulated")]
+    #[error("{what}, and such worlds are not tabulated")]
     Unsupported {
         /// The unsupported feature.
         what: String,

@@ -304,7 +304,7 @@ fn mistakes_are_reported_with_their_place_and_what_to_do() {
     for (text, expected) in [
         (
             "",
-            "text:1:1: error: the file does not say what it is; format = \"elbowroom-likelihoods\"
+            "text:1:1: error: the file does not state its format; format = \"elbowroom-likelihoods\"
 text:1:1: error: the version of the format is missing; version = 1",
         ),
         (

@@ -19,15 +19,15 @@
 #![allow(
     clippy::needless_pass_by_value,
     clippy::type_complexity,
-    reason = "what Python passes and gets is owned, and tuples are what it is given"
+    reason = "Python passes and receives owned values and tuples"
 )]
 #![allow(
     clippy::disallowed_methods,
-    reason = "a front door looks at the clock, as the command does"
+    reason = "an entry point reads the clock, as the command does"
 )]
 #![allow(
     clippy::struct_field_names,
-    reason = "a Python class has the name of what it wraps"
+    reason = "a Python class has the name of the wrapped type"
 )]
 
 mod campaign;

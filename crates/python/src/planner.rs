@@ -65,7 +65,7 @@ impl PyPlanner {
             Verdict::Valid(_) => Ok(PlanAnswer::Plan(plan)),
             Verdict::Invalid(wrong) => Err(format!("the planner's plan does not work: {wrong}")),
             Verdict::Undecided(why) => Err(format!(
-                "cannot tell whether the planner's plan works: {why}"
+                "it is undecided whether the planner's plan is valid: {why}"
             )),
         }
     }

@@ -233,7 +233,7 @@ pub(crate) fn escaped(text: &str) -> String {
     escaped
 }
 
-#[allow(clippy::cast_precision_loss, reason = "counts of what is drawn")]
+#[allow(clippy::cast_precision_loss, reason = "counts of drawn elements")]
 fn float(count: usize) -> f64 {
     count as f64
 }

@@ -134,7 +134,7 @@ impl Distribution {
                 "it must be that from <= mode <= to"
             }
             Self::Exponential { from, mean } if !finite(&[*from, *mean]) || *mean < 0.0 => {
-                "the mean of what is added must not be negative"
+                "the mean of the added delay must not be negative"
             }
             Self::Gamma { from, shape, scale }
                 if !finite(&[*from, *shape, *scale]) || *shape <= 0.0 || *scale <= 0.0 =>

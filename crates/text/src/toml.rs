@@ -100,7 +100,7 @@ fn in_words(message: &str) -> String {
         .iter()
         .find(|(rust, _)| expected.starts_with(rust) && (rust.len() > 1 || is_number))
         .map_or(expected, |(_, word)| word);
-    format!("{found} stands here, where {expected} belongs")
+    format!("found {found}, expected {expected}")
 }
 
 #[cfg(test)]
@@ -111,7 +111,7 @@ mod tests {
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]
-    #[allow(dead_code, reason = "what is read is not looked at")]
+    #[allow(dead_code, reason = "the parsed value is not used")]
     struct File {
         seed: u64,
         #[serde(default)]
@@ -148,14 +148,14 @@ mod tests {
 
     #[test]
     fn no_type_of_rust_is_named() {
-        insta::assert_snapshot!(wrong("seed = \"one\""), @r#"f:1:8: error: the text "one" stands here, where a whole number that is not negative belongs"#);
-        insta::assert_snapshot!(wrong("seed = 1.5"), @"f:1:8: error: the number `1.5` stands here, where a whole number that is not negative belongs");
-        insta::assert_snapshot!(wrong("seed = 1\nshare = \"half\""), @r#"f:2:9: error: the text "half" stands here, where a number belongs"#);
-        insta::assert_snapshot!(wrong("seed = 1\nnames = 3"), @"f:2:9: error: the number `3` stands here, where a list belongs");
-        insta::assert_snapshot!(wrong("seed = 1\nis_new = 3"), @"f:2:10: error: the number `3` stands here, where true or false belongs");
-        insta::assert_snapshot!(wrong("seed = 1\naction = 3"), @"f:2:10: error: the number `3` stands here, where a text in quotes belongs");
+        insta::assert_snapshot!(wrong("seed = \"one\""), @r#"f:1:8: error: found the text "one", expected a whole number that is not negative"#);
+        insta::assert_snapshot!(wrong("seed = 1.5"), @"f:1:8: error: found the number `1.5`, expected a whole number that is not negative");
+        insta::assert_snapshot!(wrong("seed = 1\nshare = \"half\""), @r#"f:2:9: error: found the text "half", expected a number"#);
+        insta::assert_snapshot!(wrong("seed = 1\nnames = 3"), @"f:2:9: error: found the number `3`, expected a list");
+        insta::assert_snapshot!(wrong("seed = 1\nis_new = 3"), @"f:2:10: error: found the number `3`, expected true or false");
+        insta::assert_snapshot!(wrong("seed = 1\naction = 3"), @"f:2:10: error: found the number `3`, expected a text in quotes");
         insta::assert_snapshot!(wrong("action = \"a\""), @"f:1:1: error: `seed` is missing; add `seed = …`");
-        insta::assert_snapshot!(wrong("seed = -1"), @"f:1:8: error: the number `-1` stands here, where a whole number that is not negative belongs");
+        insta::assert_snapshot!(wrong("seed = -1"), @"f:1:8: error: found the number `-1`, expected a whole number that is not negative");
     }
 
     #[test]

@@ -276,7 +276,7 @@ pub fn verify_answer_in_world(
     for (index, room) in answer.parameters.iter().enumerate() {
         let label = derived.labels.get(&index);
         let label = label.ok_or(Flaw::NoSuch("parameter", index))?;
-        let what = format!("{} stands for something else", room.name);
+        let what = format!("{} has another meaning", room.name);
         same(label.is_told(&room.told(), &earlier), &what)?;
         earlier.push(room.name.as_str());
     }

@@ -121,11 +121,11 @@ pub(crate) fn check(
     initials: BTreeMap<FluentId, usize>,
 ) -> Result<Derived, NotDerived> {
     let Some(sound) = &certificate.sound else {
-        let what = "the certificate does not tell why the box is inside the envelope";
+        let what = "the certificate does not prove that the box is inside the envelope";
         return Err(NotDerived::unknown(what));
     };
     if sound.control == Control::Assumed {
-        let what = "the certificate does not tell how the plan can be scheduled";
+        let what = "the certificate does not contain a schedule of the plan";
         return Err(NotDerived::unknown(what));
     }
     let given = match plan {

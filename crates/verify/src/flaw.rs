@@ -56,13 +56,15 @@ pub enum Flaw {
     #[error("it does not follow that variable {0} can have no more slack")]
     NotStopped(usize),
     /// It is said wrongly by how much inequalities are broken.
-    #[error("the inequalities at place {0} of the reasons are not broken by what is said")]
+    #[error(
+        "the inequalities at position {0} of the reasons are not violated by the stated values"
+    )]
     Over(usize),
     /// A variable is stopped never, or twice.
     #[error("variable {0} is to be stopped exactly once")]
     Stopped(usize),
     /// Ways are no tree.
-    #[error("way {0} is mentioned twice, or before it is told")]
+    #[error("path {0} is mentioned twice, or before its definition")]
     NoTree(usize),
     /// Cases are no tree.
     #[error("case {0} is reached never or twice")]
@@ -81,20 +83,20 @@ pub enum Flaw {
     NotThere(usize),
     /// A time is told for a point that the world decides on, or none for another.
     #[error(
-        "a time has to be told for exactly those points that the executor chooses, not so for point {0}"
+        "a time has to be given for exactly the points that the executor chooses, not so for point {0}"
     )]
     NotChosen(usize),
     /// A point may come before time zero, or time zero is not zero.
-    #[error("the times told for point {0} are not at 0 or later in all of the box")]
+    #[error("the times given for point {0} are not at 0 or later in all of the box")]
     Early(usize),
     /// Times do not satisfy a constraint.
-    #[error("the times told do not satisfy constraint {0} in all of the box")]
+    #[error("the given times do not satisfy constraint {0} in all of the box")]
     Unmet(usize),
     /// Schedules are no tree.
     #[error("schedule {0} is reached never or twice, or splits an interval that has no end")]
     Schedules(usize),
     /// Negative edges and waits form a circle.
-    #[error("what comes before point {0} comes after it, too")]
+    #[error("the predecessors of point {0} also come after it")]
     Circle(usize),
     /// What two edges say together is not said beside them.
     #[error("the network is not closed: an edge is missing beside two that meet at point {0}")]

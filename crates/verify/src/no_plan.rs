@@ -158,7 +158,7 @@ pub enum NoPlanFlaw {
     #[error("`{0}` and `{1}` are not alike")]
     NotAlike(String, String),
     /// The goal is not out of reach.
-    #[error("by what is listed, the goal could be reached")]
+    #[error("according to the listed facts, the goal could be reached")]
     GoalInReach,
     /// There are too many instances of actions.
     #[error("the problem has too many instances of actions to be checked")]

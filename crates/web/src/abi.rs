@@ -8,10 +8,7 @@
 //!
 //! A panic ends the instance, which is of no more use then: the host makes a new one.
 
-#![allow(
-    unsafe_code,
-    reason = "whoever calls from another language hands over addresses"
-)]
+#![allow(unsafe_code, reason = "callers in other languages pass addresses")]
 
 use std::time::Duration;
 

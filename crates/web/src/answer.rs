@@ -93,7 +93,7 @@ impl Read {
         match self.plan_by(text, rule)? {
             AnyPlan::TimeTriggered(plan) => Ok(plan),
             AnyPlan::Stn(_) => Err(Failure::new(format!(
-                "{} is an STN plan file, which stands for many plans; give a plan with fixed times",
+                "{} is an STN plan file, which describes many plans; give a plan with fixed times",
                 text.name
             ))),
         }

@@ -159,13 +159,13 @@ impl EnvelopeArgs {
         ];
         if let Some((flag, _)) = others.iter().find(|(_, given)| *given) {
             return Err(Failure::new(
-                format!("{flag} is about envelopes, and --repair is about what has to change"),
+                format!("{flag} belongs to envelopes, and --repair to changes of the plan"),
                 format!("leave out --repair, or {flag}"),
             ));
         }
         if !self.vary.is_empty() {
             return Err(Failure::new(
-                "--vary says what may deviate, not what may be changed",
+                "--vary selects durations that may deviate, not parts that may be changed",
                 "use --change, which is written in the same way",
             ));
         }

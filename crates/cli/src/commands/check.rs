@@ -80,9 +80,10 @@ fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
         settings: Settings::default(),
     };
     let answer = check(&request).map_err(|error| match error {
-        RequestError::Undecided(why) => {
-            Failure::new(format!("cannot tell whether {name} is valid: {why}"), "")
-        }
+        RequestError::Undecided(why) => Failure::new(
+            format!("it is undecided whether {name} is valid: {why}"),
+            "",
+        ),
         error => Failure::new(error, ""),
     })?;
     let is_invalid = matches!(

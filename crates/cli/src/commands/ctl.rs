@@ -291,7 +291,7 @@ impl Client<'_> {
         }
         Err(Failure::new(
             format!("the executive at {} has gone away", self.arguments.to),
-            "if it has a journal, `elbowroom serve --resume` goes on with it",
+            "if it has a journal, `elbowroom serve --resume` continues it",
         ))
     }
 }
@@ -366,7 +366,7 @@ fn state(state: &State) -> String {
         if let Some(needed) = &running.needed {
             let _ = write!(
                 text,
-                "; if it goes on, a new plan is needed at {}",
+                "; if it continues, a new plan is needed at {}",
                 nearest(&needed.0)
             );
         }

@@ -343,7 +343,7 @@ fn remarks(text: &mut String, action: &ActionLearnt, look: Look) {
     let drifted = |drift: &DriftAnswer, what: &str| {
         let since = drift.since?;
         Some(format!(
-            "{}: {} {what} drifted, noticed at number {since} of them. What was learnt mixes before and after.",
+            "{}: {} {what} drifted, noticed at number {since} of them. The learnt model mixes values before and after.",
             styled(HINT, "drift"),
             action.action
         ))

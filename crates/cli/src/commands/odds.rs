@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
     let answer = odds(&request, &mut watch).map_err(|error| {
         Failure::new(
             error,
-            "docs/probability.md says what is calculated, and for which plans",
+            "docs/probability.md says for which plans probabilities are calculated",
         )
     })?;
     let title = format!("{}: the orders of its plan", answer.problem);

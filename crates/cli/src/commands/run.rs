@@ -226,7 +226,7 @@ pub(super) fn conclude(
     };
     Err(Failure::new(
         format!("the journal cannot be written ({why}), so the run was ended in order"),
-        format!("make room on the disk; `{resume}` goes on from what the journal has"),
+        format!("free some disk space; `{resume}` continues from the journal"),
     ))
 }
 

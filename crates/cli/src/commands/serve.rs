@@ -159,7 +159,7 @@ fn await_problem(
 fn refusal(status: u16, failure: &Failure) -> ApiError {
     let help = failure
         .advice()
-        .unwrap_or("look at what the executive says");
+        .unwrap_or("read the messages of the executive");
     ApiError::new(status, failure.sentence(), help)
 }
 
@@ -211,7 +211,7 @@ fn check(arguments: &ServeArgs) -> Result<(), Failure> {
         if is_given {
             return Err(Failure::new(
                 format!("{option} belongs to `elbowroom run`"),
-                "an executive listens at --http, and its journal is gone on with by --resume",
+                "an executive listens at --http, and --resume continues its journal",
             ));
         }
     }
@@ -219,7 +219,7 @@ fn check(arguments: &ServeArgs) -> Result<(), Failure> {
     let sized = arguments.journal_size.is_some() || arguments.journal_segments.is_some();
     if sized && !has_journal {
         return Err(Failure::new(
-            "there is no journal that could be begun anew",
+            "there is no journal that could be rotated",
             "give --journal FILE, or leave out --journal-size and --journal-segments",
         ));
     }
@@ -251,7 +251,7 @@ fn open(
 fn announce(arguments: &ServeArgs, router: &ApiRouter) {
     let with_token = match &arguments.run.token {
         Some(_) => "",
-        None => "; to be looked at only, as there is no --token",
+        None => "; read-only, as there is no --token",
     };
     let own = router.address();
     output::tell(&format!("listening at http://{own}/{with_token}"));
@@ -283,7 +283,7 @@ impl ResumeHost for Server<'_> {
         if !spec.is_lasting {
             return Err(Error::new(
                 "this is the journal of a run that ends with its goal",
-                "go on with `elbowroom run --resume`",
+                "continue with `elbowroom run --resume`",
             ));
         }
         let router = open(self.arguments, interrupt, &spec.domain)?;

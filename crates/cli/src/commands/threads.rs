@@ -10,7 +10,7 @@ pub(super) fn of(jobs: Option<usize>, usual: usize, is_embedded: bool) -> Result
     if jobs.is_some() && !is_embedded {
         return Err(Failure::new(
             "--jobs says how many threads the embedded planner uses; another one has its own settings",
-            "leave out --jobs, or write what the planner is to be told into its command line",
+            "leave out --jobs, or write the planner's own option into its command line",
         ));
     }
     Ok(match jobs.unwrap_or(usual) {

@@ -144,7 +144,7 @@ fn play(player: &mut Player, task: &Task, actions: &[(String, Rational)]) -> Res
         player.findings.look_at(Check::HearsBeliefs);
         let heard = beliefs(player, task);
         if heard.is_err() || player.findings.faults() > faults {
-            let why = "something went wrong once it was told what is believed: `believed` needs no answer";
+            let why = "it failed after a message `believed`, which needs no answer";
             player.findings.wrong(Check::HearsBeliefs, why);
         }
         heard?;
@@ -289,7 +289,7 @@ fn pass(
         idle = if player.now > before { 0 } else { idle + 1 };
         if idle > MOST_IDLE {
             let why = format!(
-                "its clock stands still at {}: {MOST_IDLE} answers brought no progress",
+                "its clock does not advance beyond {}: {MOST_IDLE} answers brought no progress",
                 before.to_f64()
             );
             player.findings.wrong(Check::KeepsTime, why);
@@ -311,7 +311,7 @@ fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
                 name => escape_control(name),
             };
             let can = if greeting.can.is_empty() {
-                "nothing of what is optional".to_owned()
+                "no optional part".to_owned()
             } else {
                 escape_control(&greeting.can.join(", "))
             };

@@ -274,8 +274,8 @@ pub fn plan(
 pub fn unread(planner: &str, halt: Halt, elapsed: Duration) -> PlanOutcome {
     let stop = PlanStop::from(halt);
     let ended = match halt {
-        Halt::TimeLimit => "gave up at the time limit",
-        Halt::MemoryLimit => "gave up at the memory limit",
+        Halt::TimeLimit => "stopped at the time limit",
+        Halt::MemoryLimit => "stopped at the memory limit",
         Halt::Cancelled => "stopped",
     };
     let reason = format!(
@@ -442,9 +442,9 @@ fn none_found(
     let evaluated = counts.evaluated;
     let ended = match stop {
         PlanStop::Cancelled => format!("stopped after {evaluated} states"),
-        PlanStop::TimeLimit => format!("gave up at the time limit, after {evaluated} states"),
+        PlanStop::TimeLimit => format!("stopped at the time limit, after {evaluated} states"),
         PlanStop::MemoryLimit => format!(
-            "gave up at the memory limit of {} MB, after {evaluated} states",
+            "stopped at the memory limit of {} MB, after {evaluated} states",
             memory >> 20
         ),
         _ => return exhausted(counts, without_self_overlap),

@@ -242,7 +242,7 @@ fn stopped(halt: Option<Halt>, bound: Rational) -> RepairFinding {
             Some(Halt::TimeLimit) => "the time limit was reached".to_owned(),
             Some(Halt::MemoryLimit) => "the memory limit was reached".to_owned(),
             Some(Halt::Cancelled) => "it was cancelled".to_owned(),
-            None => "there are too many cases to tell apart".to_owned(),
+            None => "there are too many cases to decide".to_owned(),
         },
         bound,
     }
@@ -402,7 +402,7 @@ impl Subject {
                     _ => "the judge does not accept the plan".to_owned(),
                 };
                 RepairFinding::Impossible {
-                    because: vec![format!("{why}; repairs do not heed this")],
+                    because: vec![format!("{why}; repairs do not respect this")],
                     orders,
                 }
             }

@@ -306,7 +306,7 @@ impl<'a> Execution<'a> {
 
     /// Returns the run, to be driven step by step by an event loop, and the workers that answer its requests for
     /// plans.
-    #[must_use = "a run does nothing until it is asked what is next"]
+    #[must_use = "a run does nothing until `next` is called"]
     pub fn run(self) -> (Run<'a>, Box<dyn Workers + 'a>) {
         let rehearsal = self.rehearsal.clone();
         let executor = match self.executor {

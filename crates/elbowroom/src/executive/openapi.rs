@@ -69,17 +69,17 @@ pub const METHODS: &[Method] = &[
     ),
     get(
         "/v1/plan",
-        "The plan, and what became of its actions",
+        "The plan, with the states of its actions",
         Answer::Json(PlanNow::schema),
     ),
     get(
         "/v1/guarantee",
-        "What is still guaranteed, and how far each quantity may deviate",
+        "The remaining guarantee, and how far each quantity may deviate",
         Answer::Json(GuaranteeNow::schema),
     ),
     get(
         "/v1/next",
-        "What is next, and why",
+        "The next action and its reason",
         Answer::Json(NextNow::schema),
     ),
     get(
@@ -147,14 +147,14 @@ pub const METHODS: &[Method] = &[
     change(
         "POST",
         "/v1/pause",
-        "Nothing more is started; what is under way goes on",
+        "Nothing more is started; running actions continue",
         None,
     ),
     change("POST", "/v1/resume", "The end of a pause", None),
     change(
         "POST",
         "/v1/stop",
-        "The executive ends: what is under way is cancelled",
+        "The executive ends: running actions are cancelled",
         None,
     ),
 ];

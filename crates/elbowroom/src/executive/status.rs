@@ -208,7 +208,7 @@ impl Status {
 }
 
 /// Why a run rests whose record does not say.
-const BEFORE: &str = "why stands in an earlier segment of the journal";
+const BEFORE: &str = "the reason is in an earlier segment of the journal";
 /// Why a plan is made at the beginning, and where a run that was over goes on.
 const NO_PLAN: &str = "there is no plan yet";
 /// Why a run rests that was asked for nothing.
@@ -561,7 +561,7 @@ fn in_words(verdict: &Verdict) -> &'static str {
         Verdict::Unsolvable => "no plan reaches the goals from here",
         Verdict::NoPlan { .. } => "no plan was found",
         Verdict::PlannerFailed { .. } => "the planner failed",
-        Verdict::ReplanLimit => "too many plans were given up",
+        Verdict::ReplanLimit => "too many plans were abandoned",
         other => other.name(),
     }
 }

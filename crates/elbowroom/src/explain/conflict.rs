@@ -235,7 +235,7 @@ impl Explainer<'_> {
             let is_apart = constraints(Side::Lower).any(keeps_apart);
             return Some(if is_apart {
                 format!(
-                    "what must be apart has to fit into {}",
+                    "steps that must be apart have to fit into {}",
                     actions.join(" and ")
                 )
             } else {

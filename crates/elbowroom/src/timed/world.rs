@@ -56,7 +56,7 @@ impl TimedWorld {
     ) -> Result<Self, NotTabulated> {
         if let Some(feature) = task.only_judged() {
             return Err(NotTabulated::new(format!(
-                "it does not heed {feature}, which the problem has"
+                "it does not support {feature}, which the problem has"
             )));
         }
         if !model.reports.is_perfect() {

@@ -306,7 +306,7 @@ fn a_plan_that_is_outdated_when_it_comes_is_made_again() {
             "0: start (fetch r book)",
             "2: plan",
             "8: the plan is there",
-            "8: plan, because what has happened while the plan was made",
+            "8: plan, because events during planning",
             "10: start (fetch r cup)",
             "14: the plan is there",
             "rest: goal-reached key",

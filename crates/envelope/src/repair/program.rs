@@ -290,7 +290,7 @@ impl<'a> Program<'a> {
         self.simplex.assert_lower(self.gained, gain.clone(), tag);
         self.simplex
             .maximize(&self.earliness)
-            .expect("what was just reached can be kept");
+            .expect("the optimum just found is feasible");
         let model = self.simplex.model();
         let times = self.times.iter().enumerate().map(|(index, variable)| {
             if index == 0 {

@@ -122,11 +122,11 @@ impl fmt::Display for About {
             Self::SeenAtTheEnd => "what the world looks like at the end",
             Self::AnyObservation => "something is observed",
             Self::GoalSettled => "the last timed initial that the goal depends on",
-            Self::EndOfRunning => "what is under way has ended",
-            Self::StartOfOrdered => "what was told to start has started",
-            Self::EndOfCancelled => "what was told to stop has stopped",
+            Self::EndOfRunning => "the running actions have ended",
+            Self::StartOfOrdered => "the requested actions have started",
+            Self::EndOfCancelled => "the cancelled actions have stopped",
             Self::NextStart => "the order's next start",
-            Self::NextHappening => "what is next in the order has happened",
+            Self::NextHappening => "the next step of the order has happened",
             Self::BestOfAll(probability) => {
                 return write!(
                     f,

@@ -45,7 +45,7 @@ pub enum Next {
 /// The run has not asked for that: [`Run::observe`] answers [`Next::Wait`], and [`Run::see`]
 /// answers [`Next::Look`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the run has not asked for {what}; ask `Run::next` what it needs first")]
+#[error("the run has not asked for {what}; call `Run::next` first")]
 pub struct NotAsked {
     what: &'static str,
 }
@@ -107,7 +107,7 @@ impl Run<'_> {
     /// answered.
     #[expect(
         clippy::should_implement_trait,
-        reason = "a run is no iterator: what comes next depends on the answers"
+        reason = "a run is no iterator: the next request depends on the answers"
     )]
     pub fn next(&mut self) -> Next {
         loop {

@@ -19,7 +19,7 @@ const IN_THE_FUTURE: &str = "its time is in the future; taken as now";
 const BEFORE_THE_COMMAND: &str = "its time is before the command; taken as then";
 const BEFORE_THE_START: &str = "its time is before its start; taken as then";
 const WITHOUT_A_START: &str = "its start was not reported";
-const WITH_THE_COMMAND: &str = "its start was not reported; taken as when it was told to";
+const WITH_THE_COMMAND: &str = "its start was not reported; taken as the time of the request";
 
 /// Returns `true` if a remark on a report means that the report was counted, with another time or with a start. A report
 /// with another remark was ignored.
@@ -225,7 +225,9 @@ impl Run<'_> {
                 return Some("it had ended already");
             }
             self.contradict(ticket);
-            return Some("it had ended otherwise; what it wrote is unknown now");
+            return Some(
+                "it had ended otherwise; the facts and numbers it changes are unknown now",
+            );
         }
         let is_refused = entry.started.is_none() && *ending != Ending::Succeeded;
         let was_silent = entry.started.is_none() && !is_refused;

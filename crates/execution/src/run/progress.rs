@@ -71,7 +71,7 @@ impl Progress {
             .unintelligible
             .as_ref()
             .map_or_else(String::new, |(said, why)| {
-                format!("; what it said last could not be understood: `{said}`: {why}")
+                format!("; its last message could not be parsed: `{said}`: {why}")
             });
         Err(format!(
             "its clock stands still: {most} answers have brought it from {} to {} only; when \
@@ -110,7 +110,7 @@ mod tests {
         progress.note_unintelligible("hello", "not JSON");
         let why = (0..=MOST_ANSWERS)
             .find_map(|_| progress.note(&Rational::ZERO, 0).err())
-            .expect("the clock stands still");
+            .expect("the clock does not advance");
         assert!(why.ends_with("understood: `hello`: not JSON"), "{why}");
     }
 

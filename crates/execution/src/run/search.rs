@@ -552,7 +552,7 @@ impl Run<'_> {
         if first.cause == Cause::MoreSlack {
             return Ok(());
         }
-        let about = "what has happened while the plan was made".to_owned();
+        let about = "events during planning".to_owned();
         let reason = Reason::new(Cause::Surprise).about(About::Said(about));
         let reason = if self.is_to_turn() { first } else { &reason };
         self.lost.outdated += 1;

@@ -92,7 +92,7 @@ impl ApiRouter {
             ));
         }
         let full = || {
-            let help = "wait until it has taken some in; `elbowroom ctl state` says what it does";
+            let help = "wait until it has processed some; `elbowroom ctl state` shows its state";
             ApiError::new(503, "too many requests wait for the executive", help)
         };
         let number = self.queue().submit(requests).ok_or_else(full)?;
@@ -202,7 +202,8 @@ impl ApiRouter {
 /// Returns the error for requests while the journal cannot be written.
 fn journal_failed() -> ApiError {
     let error = "the journal cannot be written, so this is not kept, and the executive ends";
-    let help = "make room on the disk, go on with `elbowroom serve --resume`, and ask again";
+    let help =
+        "free some disk space, continue with `elbowroom serve --resume`, and repeat the request";
     ApiError::new(503, error, help)
 }
 
@@ -225,7 +226,7 @@ fn check_further(problem: &Problem, task: &Task, state: &State) -> Result<(), Ap
     if !state.running.is_empty() {
         return Err(ApiError::new(
             409,
-            "actions are under way, and what they do is no part of this problem",
+            "actions are running, and their effects are no part of this problem",
             "pause, wait until they have ended, and give it again; or give goals and facts",
         ));
     }

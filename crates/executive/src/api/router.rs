@@ -263,7 +263,7 @@ impl ApiRouter {
                 self.allow(request)?;
                 self.change("POST", &format!("/v1{path}"), b"")?;
                 let words = match path {
-                    "/pause" => "Nothing more is started; what is under way goes on.\n",
+                    "/pause" => "Nothing more is started; running actions continue.\n",
                     _ => "It goes on.\n",
                 };
                 respond(stream, 202, TEXT, words)
@@ -319,7 +319,7 @@ impl ApiRouter {
         match (&self.control, request.header("authorization")) {
             (None, _) => Err(ApiError::new(
                 403,
-                "this executive can only be looked at",
+                "this executive is read-only",
                 "start it with --token FILE",
             )),
             (Some(control), Some(given)) if control.accepts(given) => Ok(()),
@@ -415,7 +415,7 @@ fn is_path(path: &str, pattern: &str) -> bool {
 
 /// Returns the error for a path without this method.
 fn no_such(path: &str, method_name: &str) -> ApiError {
-    let help = "GET /v1/openapi.json lists what can be asked";
+    let help = "GET /v1/openapi.json lists all requests";
     match methods(path).next() {
         Some(verb) => {
             let error = format!("{path} is not for {method_name}, but for {verb}");

@@ -56,7 +56,7 @@ impl JournalFile {
         if let Err(error) = &replaced {
             let _ = fs::remove_file(new);
             self.warnings.warn(&format!(
-                "the journal {} goes on growing, as no new segment can be begun: {}",
+                "the journal {} keeps growing, as no new segment can be started: {}",
                 self.path.display(),
                 plain(error)
             ));

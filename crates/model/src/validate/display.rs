@@ -87,7 +87,7 @@ impl fmt::Display for Mistake {
             Self::TooEarly(earliest) => write!(f, "starts before time {}", decimal(earliest)),
             Self::Abandoned(action) => write!(
                 f,
-                "the plan must begin by going on with {action}, which is running"
+                "the plan must continue {action}, which is running, from its beginning"
             ),
             Self::Elapsed {
                 duration,

@@ -76,7 +76,9 @@ impl Simplex {
                 } else {
                     &variable.lower
                 };
-                let bound = bound.as_ref().expect("what has no bound could still move");
+                let bound = bound
+                    .as_ref()
+                    .expect("a variable without bounds could still move");
                 (bound.tag, factor.abs())
             })
             .collect();

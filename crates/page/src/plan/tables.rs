@@ -106,7 +106,7 @@ pub(crate) fn quantities(quantities: &[Quantity]) -> Table {
         ]
     };
     Table {
-        heading: "What is left open".to_owned(),
+        heading: "Open questions".to_owned(),
         columns: columns(&[("parameter", false), ("quantity", false), ("nominal", true)]),
         rows: quantities.iter().map(row).collect(),
         ..Table::default()

@@ -33,8 +33,8 @@ impl Log {
             Line::Plan(plan) => {
                 let count = plan.steps.len();
                 let what = match bars.plan_count() {
-                    1 => format!("the first plan is taken up: {count} actions"),
-                    number => format!("plan {number} is taken up: {count} actions"),
+                    1 => format!("the first plan is adopted: {count} actions"),
+                    number => format!("plan {number} is adopted: {count} actions"),
                 };
                 self.add(&plan.now.0, "plan", what, String::new(), String::new());
             }
@@ -101,7 +101,7 @@ impl Log {
                 self.add(&rest.now.0, "rest", what, String::new(), why);
             }
             Line::Interrupted(line) => {
-                let what = "somebody asked the run to end".to_owned();
+                let what = "an operator asked the run to end".to_owned();
                 self.add(&line.now.0, "end", what, String::new(), String::new());
             }
             Line::WorldFailed(line) => {
@@ -204,7 +204,7 @@ fn decision(decision: &DecisionLine, bars: &Bars) -> String {
             names if names.is_empty() => "cancel".to_owned(),
             names => format!("cancel {}", names.join(", ")),
         },
-        DecisionLine::Replan => "give up the plan".to_owned(),
+        DecisionLine::Replan => "abandon the plan".to_owned(),
         DecisionLine::GoalReached => "the goal is reached".to_owned(),
     }
 }
@@ -267,7 +267,7 @@ fn observation<'a>(observation: &'a ObservationLine, bars: &Bars) -> (&'a Ration
             format!("asked to cancel the action of ticket {ticket}"),
         ),
         ObservationLine::Pause { time } => (&time.0, "asked to pause".to_owned()),
-        ObservationLine::Resume { time } => (&time.0, "asked to go on".to_owned()),
+        ObservationLine::Resume { time } => (&time.0, "asked to continue".to_owned()),
         ObservationLine::PlanMade { time } => (&time.0, "the plan is there".to_owned()),
         ObservationLine::PlanReady { time } => (&time.0, "the plan is ready".to_owned()),
         ObservationLine::Unintelligible { said, why, time } => {

@@ -55,7 +55,7 @@ function liveView(update) {
     button.disabled = answer?.ok ? what === "stop" || what === "cancel" : false;
   }
   const button = (words, title, onclick) => element("button", { type: "button", title, onclick }, words);
-  const pause = token && button("pause", "Nothing more is started; what is under way goes on", () => ask(data.is_paused ? "resume" : "pause", pause));
+  const pause = token && button("pause", "Nothing more is started; running actions continue", () => ask(data.is_paused ? "resume" : "pause", pause));
   const cancel = token && button("cancel", "Nothing more is started, and the goal is given up; what is under way ends by itself", () => ask("cancel", cancel));
   const stop = token && button("stop the run", "What is under way is cancelled, and the run ends", () => ask("stop", stop));
   const follow = (newer) => {

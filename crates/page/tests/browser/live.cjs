@@ -123,7 +123,7 @@ test("a paused run starts nothing, and goes on when it is told to; its trace rep
   await close(tab);
 });
 
-test("a run whose goal is given up starts nothing more, and is over when what is under way has ended", async () => {
+test("a run whose goal is given up starts nothing more, and is over when the running actions have ended", async () => {
   const { address, over } = served(4, "--token", file("token"), "--trace", file("cancelled.jsonl"));
   const tab = await watched(await address, `#token=${TOKEN}`);
   await tab.waitForFunction(() => document.querySelectorAll("section tbody tr").length > 2);

@@ -100,7 +100,7 @@ impl Reader {
                     section.content[0].span,
                     format!("a constraint `{name}` without a condition"),
                 )
-                .advise("expected `:condition` and what must hold in each state");
+                .advise("expected `:condition` and a condition on each state");
             return;
         };
         let condition = without_preferences(&mut scope, |scope| self.condition(node, scope));

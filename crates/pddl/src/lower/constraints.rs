@@ -35,7 +35,7 @@ pub(super) fn belongs_elsewhere(name: &str) -> Option<&'static str> {
         return Some("preferences stand among conditions, in goals and under `:constraints`");
     }
     let is_modal = MODALS.iter().any(|(modal, _)| *modal == name);
-    is_modal.then_some("constraints on the course stand under `:constraints`, and do not nest")
+    is_modal.then_some("trajectory constraints belong under `:constraints`, and do not nest")
 }
 
 /// A preference found in a condition.
@@ -219,8 +219,8 @@ impl Reader {
     ) -> Option<(PreferenceId, &'t Node<'s>)> {
         if scope.without_preferences > 0 {
             self.report
-                .error(node.span, "a preference cannot stand here")
-                .advise("preferences stand under `and` and `forall` only");
+                .error(node.span, "a preference is not allowed here")
+                .advise("preferences are allowed under `and` and `forall` only");
             return None;
         }
         let (name, part) = match node.form()?.1 {

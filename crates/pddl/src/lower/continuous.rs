@@ -106,7 +106,7 @@ impl Reader {
             _ => {
                 self.report
                     .error(node.span, format!("unexpected `{}`", node.quote()))
-                    .advise("`#t` may stand in sums, products and dividends only");
+                    .advise("`#t` is allowed in sums, products and dividends only");
                 None
             }
         }

@@ -92,7 +92,7 @@ impl Reader {
                     self.rule_spans[rule],
                     format!("`{name}` depends on its own negation"),
                 )
-                .advise("a derived predicate may not be negated in what it is derived from");
+                .advise("a derived predicate may not be negated in its own definition");
         }
     }
 }

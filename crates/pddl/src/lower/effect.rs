@@ -176,7 +176,7 @@ impl Reader {
                     self.report
                         .error(
                             node.span,
-                            format!("`{}` is no change that goes on", node.quote()),
+                            format!("`{}` is no continuous change", node.quote()),
                         )
                         .advise("effects of a process are `(increase (f) (* #t rate))`");
                 }

@@ -158,7 +158,7 @@ impl Reader {
             .unsupported(
                 Feature::ObjectFluents,
                 node.span,
-                format!("the value of `{}` cannot stand here", node.quote()),
+                format!("the value of `{}` is not allowed here", node.quote()),
             )
             .advise("add a parameter `?x` and the condition `(= (f …) ?x)`, and write `?x` here");
     }

@@ -175,7 +175,7 @@ impl<'a> StepReader<'a> {
                 let kind = if is_event { "an event" } else { "a process" };
                 self.report
                     .error(span(&word.range), format!("`{}` is {kind}", word.text))
-                    .advise("events and processes happen by themselves, and do not stand in plans");
+                    .advise("events and processes happen by themselves, and are no steps of plans");
                 return None;
             }
             self.report

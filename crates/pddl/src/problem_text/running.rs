@@ -166,7 +166,7 @@ fn changes_at(
                 let name = || task.fluent_name(*fluent);
                 let by = value
                     .evaluate(&mut leaf)
-                    .ok_or_else(|| format!("what it does to {} at its end is unknown", name()))?;
+                    .ok_or_else(|| format!("its effect on {} at its end is unknown", name()))?;
                 let old = values.get(fluent).cloned();
                 let new = updated(*operator, old, &by)
                     .ok_or_else(|| format!("{} has no value that it could change", name()))?;

@@ -28,7 +28,7 @@ pub enum WriteError {
         names: Vec<String>,
     },
     /// A label or a parameter's name would not be read back as one name.
-    #[error("`{name}` cannot stand in an STN plan file: choose a name without spaces and marks")]
+    #[error("`{name}` is not allowed in an STN plan file: choose a name without spaces and marks")]
     Name {
         /// The label or name.
         name: String,

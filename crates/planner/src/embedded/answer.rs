@@ -202,9 +202,7 @@ pub enum Proof {
         deadline: String,
     },
     /// All orders of happenings were tried.
-    #[error(
-        "no plan exists: every order in which things can happen was tried, {states} states in all"
-    )]
+    #[error("no plan exists: every order of happenings was tried, {states} states in all")]
     Exhausted {
         /// The number of states.
         states: u64,

@@ -154,7 +154,7 @@ fn explained(
         })
         .collect();
     let goal = if goals.is_empty() {
-        "the end of an action under way".to_owned()
+        "the end of a running action".to_owned()
     } else {
         goals.join(" and ")
     };

@@ -10,7 +10,7 @@ use super::tuning::Tuning;
 
 /// A small task from its initial state on.
 pub(crate) fn compiled(task: &Task) -> Compiled {
-    compiled_with(task, &Tuning::default()).expect("a small task, of which nothing is refused")
+    compiled_with(task, &Tuning::default()).expect("a small task without unsupported features")
 }
 
 /// The same with other constants; `None` if something of it is refused.

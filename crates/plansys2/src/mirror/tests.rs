@@ -312,7 +312,7 @@ fn that_there_is_none_is_said_once_and_who_comes_later_is_told_then() {
     }
     assert_eq!(
         mirror.remarks(),
-        ["no problem expert is there: what runs change is told to none"]
+        ["there is no problem expert: changes by runs are not reported"]
     );
     let mut expert = Expert::with(&["at r a"], &[]);
     mirror.found(true);

@@ -93,7 +93,7 @@ impl Reader<'_> {
             ),
             None => self.mistakes.mistake(
                 0..0,
-                "the file does not say what it is",
+                "the file does not state its format",
                 format!("format = \"{FORMAT}\""),
             ),
         }

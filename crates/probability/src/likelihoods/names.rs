@@ -62,7 +62,7 @@ pub(super) fn arguments<'a>(
                 .collect();
             return Err((
                 format!(
-                    "`{name}` cannot stand for {} of `{of}`: it is not of type {}",
+                    "`{name}` cannot be bound to {} of `{of}`: it is not of type {}",
                     parameter.name,
                     types.join(" or ")
                 ),

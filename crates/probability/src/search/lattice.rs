@@ -78,7 +78,7 @@ pub enum TooLarge {
     #[error("the lattice of orders has more than {0} nodes")]
     Nodes(usize),
     /// Too many ways through them.
-    #[error("there are more than {0} beginnings of orders to look at")]
+    #[error("there are more than {0} prefixes of orders to examine")]
     Sequences(usize),
     /// A condition couples too many facts.
     #[error(transparent)]

@@ -124,7 +124,7 @@ class NoPlan:
 
 
 class Violation(NamedTuple):
-    """What is wrong with a plan: the first thing that goes wrong."""
+    """The first violation in a plan."""
 
     time: Fraction
     """When."""
@@ -173,7 +173,7 @@ class Verdict(Table):
 
     @property
     def violation(self) -> Violation | None:
-        """What is wrong, if something is."""
+        """The violation, if there is one."""
         found = self.document.get("violation")
         return Violation(**found) if found else None
 
@@ -322,7 +322,7 @@ class Envelope(Table):
 
     @property
     def guarantee(self) -> str:
-        """What is promised inside it: ``"weak"``, ``"dynamic"`` or ``"strong"``."""
+        """The guarantee inside it: ``"weak"``, ``"dynamic"`` or ``"strong"``."""
         return str(self.document["settings"]["guarantee"])
 
     @property
@@ -336,7 +336,7 @@ class Envelope(Table):
 
     @property
     def counterexample(self) -> dict[str, Any] | None:
-        """What can go wrong, with values and a schedule; ``docs/formats/envelope-json.md``."""
+        """Possible failures, with values and a schedule; ``docs/formats/envelope-json.md``."""
         found: dict[str, Any] | None = self.document.get("counterexample")
         return found
 
@@ -417,7 +417,7 @@ class Execution(NamedTuple):
 
 
 class Run(Table):
-    """What came of executing a plan; true in conditions if the goal was reached."""
+    """Outcome of executing a plan; true in conditions if the goal was reached."""
 
     def __init__(self, document: dict[str, Any], trace: str | None) -> None:
         self.document: dict[str, Any] = document

@@ -9,7 +9,7 @@ MOST_STILL = 100
 """Answers in a row without observations and without time passing, before the clock counts as stopped."""
 
 TOLERANCE = Fraction(1)
-"""Seconds by which an answer may be later than any request allows."""
+"""Largest delay of an answer in seconds."""
 
 MOST_MESSAGES = 10
 """Messages of each kind."""

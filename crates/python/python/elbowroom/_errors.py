@@ -1,4 +1,4 @@
-"""What can go wrong. Every exception says what to do."""
+"""Exceptions. Every exception says what to do."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ class Diagnostic(NamedTuple):
     """One finding about a text: a domain, a problem, a plan, a world file."""
 
     severity: str
-    """``"error"``, or ``"warning"`` where the text is used all the same."""
+    """``"error"``, or ``"warning"`` where the text is used nevertheless."""
     message: str
-    """What is wrong, in lower case."""
+    """The error, in lower case."""
     advice: str | None
-    """What was expected, or what to do."""
+    """The expected input, or a remedy."""
     file: str
-    """The name of the text: its path, or what it is."""
+    """The name of the text: its path, or its kind."""
     line: int
     """The line, from 1."""
     column: int
@@ -69,7 +69,7 @@ class UnsupportedError(ElbowroomError):
 
 
 class UndecidedError(ElbowroomError):
-    """The judge cannot tell whether the plan is valid."""
+    """The validator cannot decide whether the plan is valid."""
 
 
 class PlannerError(ElbowroomError):
@@ -117,7 +117,7 @@ class BugError(ElbowroomError, RuntimeError):
 
 
 class InterruptedWarning(UserWarning):
-    """Ctrl-C has ended a search or a run early; what was found until then is the answer."""
+    """Ctrl-C has ended a search or a run early; the answer is the best one until then."""
 
 
 class ClockWarning(UserWarning):
@@ -129,4 +129,4 @@ class ExecutiveWarning(UserWarning):
 
 
 class DamagedWarning(UserWarning):
-    """A part of a campaign that was kept is no longer what was written; it is made again."""
+    """A stored part of a campaign has changed on disk; it is computed again."""

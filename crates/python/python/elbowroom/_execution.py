@@ -33,7 +33,7 @@ class Wait(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What is true of these is to be said, by :meth:`Stepped.see`; nothing if that is unknown."""
+    """The run asks for these facts, to be answered by :meth:`Stepped.see`; empty if unknown."""
 
     facts: list[str]
     fluents: list[str]
@@ -81,7 +81,7 @@ class Stepped:
         return Fraction(self._native.now())
 
     def next_command(self) -> Next:
-        """What is needed next. Making a plan, which can take long, happens in here."""
+        """The next request of the run. Planning, which can take long, happens in this call."""
         kind, *rest = self._native.next()
         if kind == "start":
             now, ticket, name, duration = rest

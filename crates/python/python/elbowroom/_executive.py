@@ -24,7 +24,7 @@ from ._texts import Text, named_text, seconds
 from ._world import Action, AsyncWorld, World
 
 ACCEPT_TIME = 2.0
-"""Seconds for the run to process a request. Later it processes the request all the same."""
+"""Seconds for the run to process a request. It also processes the request later."""
 
 JOURNAL_SIZE = 10_000_000
 """Length from which a journal is rotated by default, in bytes."""

@@ -1,4 +1,4 @@
-"""Exact numbers: fractions, and infinity for what has no limit."""
+"""Exact numbers: fractions, and infinity for missing limits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any, TypeAlias
 
 Number: TypeAlias = int | float | str | Fraction | Decimal
-"""What is taken as a number: a float means the decimal that it is written as, 0.1 one tenth."""
+"""Accepted numbers: a float means the decimal that it is written as, 0.1 one tenth."""
 
 Exact: TypeAlias = Fraction | float
 """A fraction, or ``math.inf`` or ``-math.inf``. A float is never anything else."""

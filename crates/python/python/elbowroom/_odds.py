@@ -25,7 +25,7 @@ class Loss(NamedTuple):
     since: str | None
     """The happening that last had an effect on it; ``None``: the initial state."""
     action: str | None
-    """With ``"throughout"``: the action under way that needs the condition."""
+    """With ``"throughout"``: the running action that needs the condition."""
     mass: float
     """The share."""
 
@@ -73,7 +73,7 @@ class FactShare(NamedTuple):
 
 
 class Sampled(NamedTuple):
-    """What came of executing the plan in samples of a world."""
+    """Outcome of executing the plan in samples of a world."""
 
     executor: str
     """By whom."""
@@ -148,7 +148,7 @@ class Odds(Table):
 
     @property
     def actions(self) -> list[ActionShare]:
-        """The part of each action, in the order in which they begin."""
+        """The part of each action, in order of their starts."""
         return [ActionShare(**it) for it in self._order.get("actions", [])]
 
     @property
@@ -167,7 +167,7 @@ class Odds(Table):
 
     @property
     def executed(self) -> list[Sampled]:
-        """What came of executing the plan in samples of the world, if one was given."""
+        """Outcome of executing the plan in samples of the world, if one was given."""
         return [
             Sampled(
                 it["executor"],

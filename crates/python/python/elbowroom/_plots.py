@@ -18,7 +18,7 @@ _COLOURS = {"succeeded": _BAR, "failed": "#c0504d", "cancelled": "#999999", None
 
 
 def axes(ax: Axes | None, rows: int) -> Axes:
-    """Those given, or new ones with room for so many rows."""
+    """The given axes, or new ones with ``rows`` rows."""
     if ax is not None:
         return ax
     try:

@@ -1,4 +1,4 @@
-"""Problems, and what can be asked about them."""
+"""Problems and the questions about them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Problem(Executable):
         self._native = native
         self._epsilon = epsilon
         self.warnings: list[Diagnostic] = list(found)
-        """What was noticed while reading, though it could be read."""
+        """Warnings from reading the files."""
 
     @property
     def domain_name(self) -> str:

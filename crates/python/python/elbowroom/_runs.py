@@ -76,7 +76,7 @@ def world_lifecycle(
 
 
 def description(world: object) -> str:
-    """The description of a world in Python in a specification. What it does is its own; nothing is known of it."""
+    """The description of a world in Python in a specification. Its behaviour is unknown."""
     return f"python {type(world).__qualname__}"
 
 
@@ -263,5 +263,5 @@ class RunRequest:
         elif self._handle is not None and self._handle.is_requested:
             is_interrupted = False
         if is_interrupted:
-            said.insert(0, "ended by Ctrl-C; this is what was found until then")
+            said.insert(0, "ended by Ctrl-C; this is the best answer until then")
         return run, "; ".join(said) or None

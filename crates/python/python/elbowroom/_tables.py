@@ -91,7 +91,7 @@ def html_table(heads: Sequence[str], rows: Sequence[Sequence[str]], caption: str
 
 
 class Table:
-    """What can be shown as rows: a list of named tuples, and data frames."""
+    """Tables: a list of named tuples, and data frames."""
 
     def rows(self) -> list[Any]:
         """The rows, as named tuples with exact fractions."""

@@ -84,4 +84,4 @@ def warn(is_interrupted: bool, has_result: bool) -> None:
         return
     if not has_result:
         raise KeyboardInterrupt
-    warnings.warn("ended by Ctrl-C; this is what was found until then", InterruptedWarning, 3)
+    warnings.warn("ended by Ctrl-C; this is the best answer until then", InterruptedWarning, 3)

@@ -10,7 +10,7 @@ from ._answers import Step
 from ._up_translate import Translation
 
 _MOST_MOVES = 200
-"""How often a step is moved before that is given up."""
+"""Largest number of moves of one step."""
 
 
 def overlaps(translated: Translation, steps: Sequence[Step]) -> bool:

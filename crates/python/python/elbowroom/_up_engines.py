@@ -261,7 +261,7 @@ class ElbowroomPlanner(
         elif found.is_proved:
             outcome = status.UNSOLVABLE_INCOMPLETELY
             reason = (
-                "no plan found: none exists in which what interferes is at least 0.001 apart, but the problem "
+                "no plan found: none exists with interfering actions at least 0.001 apart, but the problem "
                 "has no epsilon, so that one with shorter times between may exist"
             )
         message = LogMessage(LogLevel.INFO, reason)
@@ -414,12 +414,12 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
 
 
 def _on_time(translated: Translation, step: Step) -> Step:
-    """A step, at its time if it stands for timed effects."""
+    """A step, at its time if it represents timed effects."""
     return step._replace(start=translated.timed_actions.get(step.action, step.start))
 
 
 def _left(timeout: float | None, begun: float) -> float | None:
-    """What is left of a time limit after the translation, which counts, too."""
+    """The remaining time limit after the translation, which counts as well."""
     return None if timeout is None else min(max(timeout - (time.monotonic() - begun), 0.001), _LONGEST)
 
 

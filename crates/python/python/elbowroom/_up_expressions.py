@@ -35,7 +35,7 @@ class Expressions:
         self._simplify = problem.environment.simplifier.simplify
 
     def simplify(self, expression: FNode) -> FNode:
-        """The expression without what is always so."""
+        """The expression without its static parts."""
         # The simplifier drops quantified variables that do not occur, as if each type had objects.
         return self._simplify(self._without_empty.walk(expression))
 
@@ -169,7 +169,7 @@ class Expressions:
 
 
 class _WithoutEmptyTypes(IdentityDagWalker):  # type: ignore[misc, unused-ignore]
-    """Replaces quantifiers over types without objects by what they say then."""
+    """Replaces quantifiers over types without objects by their constant values."""
 
     def __init__(self, say: Expressions) -> None:
         IdentityDagWalker.__init__(self, say._problem.environment)

@@ -61,12 +61,12 @@ class Translation:
             self._say.name("object", it): it for it in problem.all_objects
         }
         self.timed_actions = self._timed.times()
-        """The actions that stand for timed effects, as in plans of ours, each with its time."""
+        """The actions that represent timed effects, as in Elbowroom's plans, each with its time."""
         self.problem: Problem = read(self.domain_text, self.problem_text, epsilon=self._timed.epsilon)
 
     @property
     def rules(self) -> str:
-        """The rules of unified-planning by which plans are judged: see :meth:`elbowroom.Problem.check`."""
+        """The rules of unified-planning for valid plans: see :meth:`elbowroom.Problem.check`."""
         return "unified-planning-with-epsilon" if self.original.epsilon else "unified-planning"
 
     @property

@@ -1,4 +1,4 @@
-"""Worlds in Python: what is told to do things, and reports what happens."""
+"""Worlds in Python, which start actions and report their outcome."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ._numbers import Number, exact, text
 
 
 class Action(NamedTuple):
-    """An action that a world is told to start."""
+    """An action that a world has to start."""
 
     ticket: int
     """The number of the start; reports refer to it."""
@@ -105,7 +105,7 @@ class World:
     """
 
     def start(self, action: Action) -> None:
-        """Starts an action. Returns at once; what comes of it is reported by :meth:`wait`."""
+        """Starts an action. Returns at once; :meth:`wait` reports its outcome."""
         raise NotImplementedError("a world needs a method start(action)")
 
     def cancel(self, action: Action) -> None:
@@ -120,7 +120,7 @@ class World:
         raise NotImplementedError("a world needs a method wait(until)")
 
     def look(self, facts: Sequence[str], fluents: Sequence[str]) -> Sequence[Observation]:
-        """What is true of these now; nothing, if the world cannot look."""
+        """The current values of these facts; empty if the world cannot observe them."""
         return ()
 
     def resume(

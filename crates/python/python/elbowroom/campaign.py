@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Cell(NamedTuple):
-    """How often one executor reached the goal in one column, and what it took."""
+    """Successes and costs of one executor in one column."""
 
     row: str
     """The executor; for worlds without time, with its case."""
@@ -104,7 +104,7 @@ def _again(name: str, text: str, files: dict[str, str]) -> Experiment:
 
 
 class Comparison(Table):
-    """What came of an experiment."""
+    """Outcome of an experiment."""
 
     def __init__(self, experiment: Experiment, results: str) -> None:
         self.results: str = results
@@ -307,7 +307,7 @@ def _sum_of(path: Path) -> Path:
 
 
 def _damage(path: Path) -> str | None:
-    """What is wrong with the bytes of a part; nothing is known of one that came without a sum."""
+    """The error in the bytes of a part; ``None`` for parts without a checksum."""
     found = path.read_bytes()
     beside = _sum_of(path)
     if beside.exists():

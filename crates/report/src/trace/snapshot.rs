@@ -248,7 +248,7 @@ impl SnapshotLine {
         };
         let action = |ticket: Ticket| starts::action_of(&starts, ticket).cloned();
         if let Some(unknown) = parts.running.keys().find(|it| action(**it).is_none()) {
-            return Err(format!("{unknown} is under way, and was not started"));
+            return Err(format!("{unknown} is running, and was not started"));
         }
         let refused = self.refused.iter();
         Ok(Stand {
@@ -310,7 +310,7 @@ fn doubts<T: Ord>(
 }
 
 fn out_of_order(name: &str) -> String {
-    format!("`{name}` stands at another place in the problem")
+    format!("`{name}` has another position in the problem")
 }
 
 fn narrow(index: usize) -> u32 {

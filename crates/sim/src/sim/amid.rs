@@ -74,7 +74,7 @@ impl<'a> SimWorld<'a> {
             outcome: None,
             is_broken: false,
         };
-        let key = format!("{name} under way since {}", underway.start);
+        let key = format!("{name} running since {}", underway.start);
         let failing = self.model.failing(name);
         let mut coming = None;
         for draw in 0..DRAWS {

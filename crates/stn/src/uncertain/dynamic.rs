@@ -456,7 +456,7 @@ impl<'a, W: Weight> Search<'a, W> {
 
     fn first_of(&self, node: NodeId) -> usize {
         let first = self.frames.iter().position(|frame| frame.node == node);
-        first.expect("a node under way has a frame")
+        first.expect("an active node has a frame")
     }
 
     /// The cycle that closes there, step by step.

@@ -59,7 +59,7 @@ pub(super) fn check(
         let is_initial = initials.any(|own| *own == index);
         let is_time = reader.quantities.contains_key(&index);
         if is_initial && is_time {
-            let what = format!("{}, which stands for several quantities", parameter.name);
+            let what = format!("{}, which denotes several quantities", parameter.name);
             return Err(NotDerived::Unknown(what));
         }
         if !is_initial && !is_time {
@@ -244,7 +244,7 @@ impl Reader<'_> {
             action,
         };
         if self.quantities.insert(parameter, quantity).is_some() {
-            let what = format!("{}, which stands for several quantities", own.name);
+            let what = format!("{}, which denotes several quantities", own.name);
             return Err(NotDerived::Unknown(what));
         }
         Ok(())

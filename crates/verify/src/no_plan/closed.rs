@@ -105,7 +105,7 @@ impl<'a> Closure<'a> {
         let mut names = BTreeMap::new();
         for (number, process) in processes.iter().enumerate() {
             if names.insert(process.title(), number).is_some() {
-                return Err(NoPlanFlaw::Unknown("an action that is under way twice"));
+                return Err(NoPlanFlaw::Unknown("an action that is running twice"));
             }
         }
         let mut closure = Self {
@@ -354,9 +354,7 @@ impl<'a> Closure<'a> {
             Change::Add(fact) | Change::Delete(fact) => self.facts.contains(fact),
         });
         if open.len() > MOST_OPEN {
-            return Err(NoPlanFlaw::Unknown(
-                "so many effects of which it is open whether they come about",
-            ));
+            return Err(NoPlanFlaw::Unknown("too many effects that are undecided"));
         }
         let subsets = (0..1_usize << open.len()).map(|subset| {
             let mut own = after.clone();

@@ -224,7 +224,7 @@ fn volume(measure: &Measure, boxes: &[BoxAnswer], look: Look, text: &mut String)
     }
     if !measure.unbounded.is_empty() {
         say(&format!(
-            "Nothing bounds {}: what is beyond --cap times the nominal value does not count.",
+            "Nothing bounds {}: values beyond --cap times the nominal value are not counted.",
             measure.unbounded.join(", ")
         ));
     }

@@ -394,7 +394,7 @@ fn ended(
                 .to_owned()
         }
         Stop::Undecided => {
-            "Some wider boxes have too many cases to tell apart; the intervals could be wider"
+            "Some wider boxes have too many cases to decide; the intervals could be wider"
                 .to_owned()
         }
         Stop::Cancelled => {

@@ -77,7 +77,7 @@ pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String
     written.map_err(|error| {
         let advice = match error {
             PrismError::NotTabulated(_) | PrismError::Unsupported(_) | PrismError::NotSmall(_) => {
-                "docs/second-witness.md says of which problems there are processes"
+                "docs/second-witness.md lists the problems that have processes"
             }
             _ => "",
         };

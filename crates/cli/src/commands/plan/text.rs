@@ -137,12 +137,12 @@ pub(super) fn failure(failure: PlannerFailure) -> Failure {
     match failure.outcome {
         Outcome::Crashed { excerpt, .. } => {
             let help = "this is a fault of that planner; try another one";
-            with_excerpt(in_words, "what it printed last", &excerpt, help)
+            with_excerpt(in_words, "its last output", &excerpt, help)
         }
         Outcome::NotUnderstood { excerpt, .. } => {
             let help = "if this is a complaint about the command line or the domain, see \
                         docs/planners.md for what this planner wants";
-            with_excerpt(in_words, "what it printed last", &excerpt, help)
+            with_excerpt(in_words, "its last output", &excerpt, help)
         }
         Outcome::Refused { plan, .. } => {
             let help = "this plan is the planner's, and is not printed as an answer; \

@@ -43,7 +43,7 @@ impl ProgressLine {
             }
             let what = match (is_planning, names.is_empty()) {
                 (true, _) => "planning".to_owned(),
-                (false, true) => "nothing is under way".to_owned(),
+                (false, true) => "no action is running".to_owned(),
                 (false, false) => names.join(", "),
             };
             let time = number::nearest(now);

@@ -84,7 +84,7 @@ impl ResumeHost for StandaloneHost<'_> {
         if spec.is_lasting {
             return Err(Error::new(
                 "this is the journal of an executive that takes requests",
-                "go on with `elbowroom serve --resume`",
+                "continue with `elbowroom serve --resume`",
             ));
         }
         if spec.is_attended && self.arguments.token.is_none() {
@@ -105,7 +105,7 @@ fn achieved(path: &Path, report: &Value, arguments: &RunArgs, output: &mut Outpu
     } else {
         let name = path.display();
         output::print(&format!(
-            "done: the run of {name} has reached its goal before; `elbowroom report {name}` shows what was done\n"
+            "done: the run of {name} has already reached its goal; `elbowroom report {name}` shows its actions\n"
         ))?;
     }
     Ok(Exit::Yes)

@@ -47,13 +47,13 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
                     wrapped(advice, width, 2)
                 ),
                 None => format!(
-                    "{}: no plan to go on with at {time}:\n{why}\n",
+                    "{}: no plan to continue with at {time}:\n{why}\n",
                     styled(BAD, "failed")
                 ),
             }
         }
         Verdict::ReplanLimit => format!(
-            "{}: given up at {time}, after {replans}; --max-replans allows no more\n",
+            "{}: stopped at {time}, after {replans}; --max-replans allows no more\n",
             styled(HINT, "limit")
         ),
         Verdict::TimeLimit => {
@@ -98,7 +98,7 @@ pub(super) fn human(answer: &RunAnswer, report: &Report, ends: Ends) -> String {
     }
     for (heading, reasons) in [
         ("Why no plan reaches the goal", &report.dead_end),
-        ("Why the plan was given up", &report.reasons),
+        ("Why the plan was abandoned", &report.reasons),
     ] {
         // What worlds and other programs say is in there. Nothing is said twice.
         let reasons = reasons

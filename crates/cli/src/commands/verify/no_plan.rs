@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &VerifyArgs, source: &Source, output: &mut Output) 
                     String::new()
                 } else {
                     let apart = nearest(&epsilon);
-                    format!(" in which interfering happenings are at least {apart} apart")
+                    format!(" with interfering happenings at least {apart} apart")
                 };
                 format!("{problem} has no plan{apart}: {}", why(&certificate))
             }
@@ -131,7 +131,7 @@ fn files(arguments: &VerifyArgs, certificate: &NoPlan) -> Result<ProblemArgs, Fa
     }
     let [domain, problem] = &certificate.files[..] else {
         return Err(Failure::new(
-            "the answer does not say from which files its problem was read",
+            "the answer does not name the files of its problem",
             "give them: `elbowroom verify ANSWER.json DOMAIN PROBLEM`",
         ));
     };

@@ -74,7 +74,7 @@ fn asked(player: &mut Player, killed: &Rational, duration: &Rational) -> Result<
             )
         } else {
             format!(
-                "start {OVER} was over, and it does not answer `ended` when it is asked about it again"
+                "start {OVER} was over, and it does not answer `ended` when asked about it again"
             )
         };
         player.findings.wrong(Check::Resumes, why);
@@ -82,7 +82,7 @@ fn asked(player: &mut Player, killed: &Rational, duration: &Rational) -> Result<
     for ticket in [UNDER_WAY, UNTOLD] {
         if !player.has_begun(ticket) && !player.is_unknown(ticket) {
             let why = format!(
-                "asked what became of start {ticket}, it answers neither `started` nor `ended` nor `unknown`"
+                "asked for the outcome of start {ticket}, it answers neither `started` nor `ended` nor `unknown`"
             );
             player.findings.wrong(Check::Resumes, why);
         }
@@ -108,7 +108,7 @@ fn asked(player: &mut Player, killed: &Rational, duration: &Rational) -> Result<
     let began = player.started(UNDER_WAY).cloned();
     if let Some(began) = began.filter(|began| began > killed) {
         let why = format!(
-            "what was under way at {} began again at {}; what has begun must not be begun twice",
+            "an action that was running at {} started again at {}; no action may start twice",
             killed.to_f64(),
             began.to_f64()
         );
@@ -117,7 +117,7 @@ fn asked(player: &mut Player, killed: &Rational, duration: &Rational) -> Result<
     if player.has_begun(UNTOLD) {
         let name = excerpt(player.name_of(UNTOLD));
         let why =
-            format!("it was never told start {UNTOLD}, and reports that {name} was begun for it");
+            format!("it never received start {UNTOLD}, and reports that {name} was started for it");
         player.findings.wrong(Check::Resumes, why);
     }
     Ok(())

@@ -26,7 +26,7 @@ pub(super) enum Check {
 impl Check {
     /// All of them, in the order in which they are shown, with a word and a sentence for each.
     pub(super) const ALL: [(Self, &str, &str); 16] = [
-        (Self::Lives, "lives", "it lives until it is told to stop"),
+        (Self::Lives, "lives", "it runs until it receives `stop`"),
         (
             Self::Speaks,
             "speaks",
@@ -40,19 +40,19 @@ impl Check {
         (
             Self::KeepsTime,
             "keeps-time",
-            "time goes on, never back, and not beyond what was asked for",
+            "time advances, never back, and not beyond the requested time",
         ),
         (
             Self::Starts,
             "starts",
-            "what was told to start is reported as started, or as failed",
+            "each requested start is reported as started or as failed",
         ),
         (
             Self::StartsBeforeItEnds,
             "starts-before-it-ends",
             "`started` comes before `ended`, and with an earlier or equal time",
         ),
-        (Self::Ends, "ends", "what has started also ends"),
+        (Self::Ends, "ends", "each started action also ends"),
         (Self::EndsOnce, "ends-once", "each action ends once"),
         (
             Self::ReportsInTime,
@@ -77,17 +77,17 @@ impl Check {
         (
             Self::IgnoresTheUnknown,
             "ignores-the-unknown",
-            "what it does not know (a message, a cancel of what has ended) does not disturb it",
+            "unknown messages and late cancels do not disturb it",
         ),
         (
             Self::HearsBeliefs,
             "hears-beliefs",
-            "it is told what is believed, and goes on",
+            "it accepts `believed` and continues",
         ),
         (
             Self::Resumes,
             "resumes",
-            "killed and started again, it knows what became of what was under way",
+            "killed and started again, it knows the state of the actions that were running",
         ),
         (Self::Stops, "stops", "it ends within a second after `stop`"),
     ];

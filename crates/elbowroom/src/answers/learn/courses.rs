@@ -134,7 +134,7 @@ impl Course {
         let problem = self.task.problem();
         let model = WorldModel::read(world.clone(), problem).map_err(|mistakes| {
             RequestError::Unsupported(format!(
-                "the world that was expected does not go with the problem of a log: {mistakes}"
+                "the expected world does not fit the problem of a log: {mistakes}"
             ))
         })?;
         let rates = model.hazardous(problem).into_iter();

@@ -43,7 +43,7 @@ pub enum SpecError {
     Likelihoods(Diagnostics),
     /// The problem has a part that executors do not heed.
     #[error(
-        "plans cannot be carried out here: executors do not heed {0} yet, which the domain has"
+        "plans cannot be executed here: executors do not support {0} yet, which the domain has"
     )]
     Unheeded(&'static str),
     /// The time-outs name an action that the problem does not have.

@@ -175,7 +175,9 @@ impl Process<'_> {
         let goal = self.holds(&self.world.goal);
         let _ = writeln!(text, "formula goal = {goal};");
         if self.bound == Bound::Upper {
-            text.push_str("// After the last cell: whoever may still get there, does.\n");
+            text.push_str(
+                "// After the last cell: goals that can still be reached count as reached.\n",
+            );
             let _ = writeln!(
                 text,
                 "formula goal_in_hope = {};",
@@ -316,7 +318,9 @@ impl Process<'_> {
 
     /// After the last cell: what could come about if nothing were ever made false.
     fn hopes(&self, text: &mut String) {
-        text.push_str("  // What could still come about if nothing were made false any more.\n");
+        text.push_str(
+            "  // Facts that could still become true if no fact became false any more.\n",
+        );
         let mut hope = |guard: Formula, adds: Facts| {
             if adds != 0 && guard != Formula::FALSE {
                 let guard = Formula::all([Formula::atom("phase=2"), guard]);

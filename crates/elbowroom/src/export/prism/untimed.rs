@@ -248,7 +248,7 @@ impl<'p> Process<'p> {
         } else {
             under_way.join(" + ")
         };
-        let _ = writeln!(text, "// How many actions are under way.");
+        let _ = writeln!(text, "// Number of running actions.");
         let _ = writeln!(text, "formula under_way = {under_way};");
         let _ = writeln!(
             text,
@@ -310,7 +310,7 @@ impl<'p> Process<'p> {
             let _ = writeln!(text, "  rounds : [0..{steps}] init {steps};");
         }
         if begin > 0 {
-            text.push_str("  // What is uncertain at the beginning.\n");
+            text.push_str("  // Facts that are uncertain initially.\n");
             let _ = writeln!(text, "  [begin] phase={begin} -> (phase'=0);");
         }
         for (index, happening) in happenings.iter().enumerate() {
@@ -416,7 +416,7 @@ impl<'p> Process<'p> {
     /// What comes of a step once facts have changed.
     fn afterwards(&self, phases: &Phases, text: &mut String) {
         if let Some(settle) = phases.settle {
-            text.push_str("  // What runs without what it needs throughout breaks off.\n");
+            text.push_str("  // Actions whose conditions over all are violated fail.\n");
             let kept = self.durative().map(|action| {
                 let name = &self.names[action];
                 let body = self.actions[action].1.durative();

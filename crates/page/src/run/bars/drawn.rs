@@ -26,7 +26,7 @@ impl Bars {
     pub(in crate::run) fn events(&self) -> impl Iterator<Item = Mark> + '_ {
         self.given_up.iter().map(|(time, words)| Mark {
             at: time.to_f64(),
-            name: format!("plan given up: {words}"),
+            name: format!("plan abandoned: {words}"),
             is_event: true,
         })
     }

@@ -23,7 +23,7 @@ pub(super) const GUARDED: Obstacle = Obstacle::Feature(
 pub(super) const MOVING: Obstacle = Obstacle::Feature(
     "trajectory constraints on numbers that change continuously, at given times, or in many ways",
 );
-const TOO_MANY: Obstacle = Obstacle::Feature("so many trajectory constraints");
+const TOO_MANY: Obstacle = Obstacle::Feature("too many trajectory constraints");
 
 /// A clause, and what comes of a happening that makes it false.
 #[derive(Clone, Debug)]

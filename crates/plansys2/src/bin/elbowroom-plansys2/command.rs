@@ -55,7 +55,7 @@ pub(super) fn plan(
         Some(0) => steps_of(&said.out).ok_or_else(|| format!("{elbowroom} has not printed a plan")),
         Some(1) => Err("no plan reaches the goal".to_owned()),
         _ => Err(format!(
-            "the planner gave up ({}): {}",
+            "the planner found no plan ({}): {}",
             said.status,
             said.errors.trim()
         )),

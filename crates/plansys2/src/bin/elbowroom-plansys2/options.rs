@@ -118,7 +118,7 @@ pub(super) struct NetworkOptions {
         long,
         global = true,
         value_name = "HOW",
-        help = "Whether what a run changes is told to PlanSys2's problem expert, and what others change there to the run [default: follow for `serve`, else ignore]"
+        help = "Whether changes by a run are reported to PlanSys2's problem expert, and changes by others there to the run [default: follow for `serve`, else ignore]"
     )]
     problem_expert: Option<ProblemExpert>,
 }
@@ -278,7 +278,7 @@ mod tests {
         let both = ["elbowroom-plansys2", "--needs", "move", "serve"];
         assert!(
             Options::try_parse_from(both).is_err(),
-            "it waits for nobody"
+            "nothing waits for it"
         );
     }
 }

@@ -211,8 +211,8 @@ impl SituatedLine {
     fn running(&self, starts: &[KnownStart]) -> Result<RunningAction, String> {
         let ticket = Ticket(self.ticket);
         let action = action_of(starts, ticket);
-        let action = action
-            .ok_or_else(|| format!("the plan goes on with {ticket}, which was not started"))?;
+        let action =
+            action.ok_or_else(|| format!("the plan continues {ticket}, which was not started"))?;
         let guards = Guards {
             at_end: self.end_effects.clone(),
             continuous: self.continuous.clone(),

@@ -178,9 +178,7 @@ impl Reader<'_> {
                     }
                     None => return wrong(format!("there is no object `{word}`")),
                     Some(object) if !self.problem.has_type(object, &parameter.types) => {
-                        return wrong(format!(
-                            "`{name}` does not go with `{word}`: its type is another"
-                        ));
+                        return wrong(format!("`{name}` does not fit `{word}`: its type differs"));
                     }
                     Some(_) => Word::Object(word.clone()),
                 }

@@ -63,7 +63,7 @@ impl Structure<'_> {
             if !matches!(self.atoms[atom], Atom::Literal(_))
                 && names.insert(self.name(atom), atom).is_some()
             {
-                return Err(NoPlanFlaw::Unknown("an action that is under way twice"));
+                return Err(NoPlanFlaw::Unknown("an action that is running twice"));
             }
         }
         let atom = |name: &String| {

@@ -21,12 +21,12 @@ impl Process<'_> {
         };
         let _ = writeln!(
             text,
-            "module act_{name} // {}\n  // 0: not under way; n: since n-1 cells.\n  {since} : [0..{}] init 0;",
+            "module act_{name} // {}\n  // 0: not running; n: for n-1 cells.\n  {since} : [0..{}] init 0;",
             bare(&world_act.name),
             cells + 1
         );
         text.push_str(match self.bound {
-            Bound::Lower => "  // What it does in this cell: 1 ends well, 2 badly.\n",
+            Bound::Lower => "  // Its outcome in this cell: 1 success, 2 failure.\n",
             Bound::Upper => {
                 "  // 1 ends well, 2 badly, in this cell or the next; 3 and 4 in this one.\n"
             }

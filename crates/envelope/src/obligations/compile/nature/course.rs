@@ -359,11 +359,11 @@ fn course_of(event: &GroundEvent, happens: bool) -> String {
     if happens {
         format!("the event {name} must happen as planned")
     } else {
-        format!("the event {name} must not happen before what comes next")
+        format!("the event {name} must not happen before the next happening")
     }
 }
 
 fn turn_of(process: &str, is_at_work: bool) -> String {
     let is = if is_at_work { "at work" } else { "at rest" };
-    format!("the process {process} must be {is} until what comes next")
+    format!("the process {process} must be {is} until the next happening")
 }
