@@ -1,4 +1,4 @@
-//! Plans with constraints, as the checker of certificates reads them: [`given_plan`].
+//! Plans with constraints, in the form of the checker of certificates: [`given_plan`].
 
 use elbowroom_num::End;
 use elbowroom_plan::{Bound, ParametrizedPlan, Reason};

@@ -93,11 +93,11 @@ pub fn no_plan_certificate_within(
     }
 }
 
-/// Returns times before which these conditions do not hold, whatever happens from the situation; `None` for a condition
-/// that never holds. The verifier has accepted them.
+/// Returns times before which these conditions do not hold, whatever happens from the situation;
+/// `None` for a condition that never holds. The verifier has accepted them.
 ///
 /// # Errors
-/// The reason for which they are not known, in words.
+/// The reason why they are not known, in words.
 pub fn earliest_times(
     task: &Task,
     situation: &Situation,

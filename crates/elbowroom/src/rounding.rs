@@ -1,13 +1,13 @@
-//! The rule about rounded plans: which differences between a printed plan and a valid one count as
-//! rounding.
+//! The rule about rounded plans: the differences between a printed plan and a valid one that count
+//! as rounding.
 //!
 //! Planners round or truncate the numbers that they print, and the validator tolerates no
 //! difference. So a printed plan is read as a valid plan whose times and durations differ from the
 //! printed numbers by at most one unit of the last printed digit, and by at most 0.001; or by at
-//! most the tolerance that the user gives. Happenings that interfere keep their
-//! printed order. Without such a plan, the numbers of the text are taken as they are, and the
-//! verdict is the validator's. Every command that reads a plan reads it by this rule;
-//! `docs/formats/plan.md` states it for users.
+//! most the tolerance that the user gives. Happenings that interfere keep their printed order.
+//! Without such a plan, the numbers of the text are taken as they are, and the verdict is the
+//! validator's. Every command that reads a plan reads it by this rule; `docs/formats/plan.md`
+//! states it for users.
 
 use elbowroom_envelope::{RepairLimits, RepairRun, repair};
 use elbowroom_model::problem::Comparison;
@@ -396,7 +396,7 @@ fn within(from: NodeId, to: NodeId, window: &Interval) -> Constraint {
     }
 }
 
-/// The plan with the times of a schedule of its network.
+/// Returns the plan with the times of a schedule of its network.
 fn at_times(
     plan: &TimeTriggeredPlan,
     network: &StnPlan,
@@ -414,7 +414,7 @@ fn at_times(
     plan
 }
 
-/// The number between two limits that is nearest to a value.
+/// Returns the number between two limits that is nearest to a value.
 fn clamped(value: &Rational, least: Option<&Rational>, most: Option<&Rational>) -> Rational {
     let value = least.map_or(value, |least| value.max(least));
     most.map_or(value, |most| value.min(most)).clone()

@@ -1,4 +1,4 @@
-//! What every document begins with.
+//! The version of documents.
 
 use serde::{Deserialize, Serialize};
 

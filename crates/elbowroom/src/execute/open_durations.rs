@@ -20,7 +20,7 @@ fn open_durations(plan: &StnPlan) -> BTreeSet<InstanceId> {
         };
         let action = &plan.instance(id).action;
         let body = action.durative()?;
-        // What reads the planned duration holds for that duration alone.
+        // The conditions and effects hold for the planned duration only.
         let reads_planned = action.with_planned_duration(&Rational::ONE).is_some();
         let is_open = constraint.lower != constraint.upper && !body.is_under_way && !reads_planned;
         is_open.then_some(id)

@@ -1,4 +1,4 @@
-//! The parts of an answer, from what the search and the explainer found.
+//! Conversion of the results of the search and the explainer into the parts of an answer.
 
 use elbowroom_envelope::Widening;
 use elbowroom_num::{Interval, Rational};
@@ -21,7 +21,7 @@ impl From<Halt> for Stop {
     fn from(halt: Halt) -> Self {
         match halt {
             Halt::TimeLimit => Self::TimeLimit,
-            // Only searches for plans have a limit of memory.
+            // Only searches for plans have a memory limit.
             Halt::MemoryLimit | Halt::Cancelled => Self::Cancelled,
         }
     }
@@ -141,7 +141,7 @@ impl Subject<'_> {
         .collect()
     }
 
-    /// The same with what limits it.
+    /// The parameters, each with its interval and its limits.
     pub(super) fn rooms(
         &self,
         envelope: &DecoupledEnvelope,
@@ -157,7 +157,7 @@ impl Subject<'_> {
             .collect()
     }
 
-    /// The example of an explanation.
+    /// The counterexample of an explanation.
     pub(super) fn counterexample(&self, explanation: &Explanation) -> Counterexample {
         let names = self.plan.parameters.iter().map(|p| p.name.clone());
         let values = explanation.valuation.iter().cloned().map(Exact);
