@@ -11,9 +11,9 @@
 //! |---|---|---|
 //! | is there a plan? | [`PlanRequest`] | [`PlanAnswer`] |
 //! | is a plan valid? | [`CheckRequest`] | [`CheckAnswer`] |
-//! | which orderings and times does it need? | [`StnRequest`] | [`StnAnswer`] |
-//! | how far may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
-//! | with which values does it work? | [`EnvelopeRequest`] | [`RegionAnswer`] |
+//! | which orderings and bounds are necessary? | [`StnRequest`] | [`StnAnswer`] |
+//! | how much may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
+//! | for what values does it work? | [`EnvelopeRequest`] | [`RegionAnswer`] |
 //! | which least change makes it work? | [`RepairRequest`] | [`RepairAnswer`] |
 //! | how does its execution end? | [`RunRequest`] | [`RunAnswer`] |
 //! | which world do the logs suggest? | [`LearnRequest`] | [`LearnAnswer`] |
@@ -54,11 +54,11 @@ use crate::flow::FlowError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RequestError {
-    /// The plan has no order, nothing like that can be left open, or the plan is beyond exact
-    /// analysis.
+    /// The plan has no order, the requested quantities cannot be left open, or the plan is beyond
+    /// exact analysis.
     #[error(transparent)]
     Flow(#[from] FlowError),
-    /// The box asked about is not one of this plan.
+    /// The given box is not one of this plan.
     #[error(transparent)]
     Box(#[from] BoxTextError),
     /// The validator cannot decide on the plan, for this reason.
@@ -70,7 +70,7 @@ pub enum RequestError {
     /// The time-outs name an action that the problem does not have.
     #[error("{0}")]
     Timeout(String),
-    /// Something in the problem, which this names, is not supported.
+    /// The problem has this unsupported feature.
     #[error("{0}")]
     Unsupported(String),
 }

@@ -29,17 +29,17 @@ pub enum BoxTextError {
         |near| format!("did you mean `{near}`?"),
     ))]
     Unknown {
-        /// The name given.
+        /// The name.
         name: String,
         /// The known names.
         known: String,
         /// The most similar name, if there is one.
         nearest: Option<String>,
     },
-    /// Several parameters could be meant.
+    /// The name is ambiguous.
     #[error("`{name}` could mean {}: write which", choices.join(", "))]
     Ambiguous {
-        /// The name given.
+        /// The name.
         name: String,
         /// The names of those parameters.
         choices: Vec<String>,

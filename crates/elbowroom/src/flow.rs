@@ -26,7 +26,7 @@ pub struct Settings {
     pub guarantee: Guarantee,
     /// The rule that sets the time-out of each action.
     pub timeout: TimeoutRule,
-    /// Parameters of the search for the box.
+    /// Settings of the search for the box.
     pub search: Search,
     /// World whose distributions of durations
     /// [`Objective::Probability`](elbowroom_envelope::Objective::Probability) uses.
@@ -34,7 +34,8 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// All durations that the domain fixes, the dynamic guarantee, and the default search.
+    /// Returns settings with all durations open that the domain fixes, the dynamic guarantee, and
+    /// the default search.
     fn default() -> Self {
         Self {
             vary: Vec::new(),

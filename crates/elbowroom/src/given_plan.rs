@@ -4,7 +4,7 @@ use elbowroom_num::End;
 use elbowroom_plan::{Bound, ParametrizedPlan, Reason};
 use elbowroom_verify::{Exact, GivenConstraint, GivenInstance, GivenParameter, GivenPlan, Limit};
 
-/// Returns the instances, the constraints and the parameters of an STN plan file, as written there. The
+/// Returns the instances, the constraints and the parameters of an STN plan file, as written. The
 /// checker derives everything else from them.
 pub fn given_plan(plan: &ParametrizedPlan) -> GivenPlan {
     let limit = |bound: &Bound| match bound {

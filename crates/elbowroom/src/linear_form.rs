@@ -1,5 +1,5 @@
-//! The conditions on the schedules of a plan, as linear inequalities without universally quantified
-//! moments. Pages and other programs use them to check values.
+//! The conditions on the schedules of a plan as linear inequalities, with over-all conditions
+//! expanded. Pages and other programs use them to check values.
 
 use std::collections::BTreeMap;
 

@@ -35,8 +35,8 @@ const MOST_PROGRAMS: usize = 60;
 /// The rule about rounded plans, with its settings.
 #[derive(Clone, Debug, Default)]
 pub struct RoundingRule {
-    /// The difference allowed to each number. Without it, one unit of the last printed digit, at
-    /// most 0.001. With 0, plans are taken exactly as printed.
+    /// The allowed difference of each number. Without it, one unit of the last printed digit, at
+    /// most 0.001. If 0, plans are used exactly as printed.
     pub tolerance: Option<Rational>,
     /// The rules of the validator.
     pub settings: Settings,
@@ -153,8 +153,8 @@ impl RoundingRule {
             Verdict::Undecided(_) => return None,
             Verdict::Invalid(_) => {}
         }
-        // The durations of the domain mostly restore the order that the plan had before rounding. They do
-        // not if an action starts exactly at the end of another one.
+        // The durations of the domain usually restore the order that the plan had before rounding,
+        // unless an action starts exactly at the end of another one.
         let orders = [
             plan.clone(),
             printed.clone(),
@@ -255,7 +255,7 @@ struct StepWindow {
 }
 
 impl StepWindow {
-    /// Returns `true` if the numbers are those of the text and no others.
+    /// Returns `true` if the numbers are exactly those of the text.
     fn is_exact(&self) -> bool {
         let is_point = |interval: &Interval| interval.lower == interval.upper;
         is_point(&self.start) && self.duration.as_ref().is_none_or(is_point)
@@ -420,7 +420,8 @@ fn clamped(value: &Rational, least: Option<&Rational>, most: Option<&Rational>) 
     most.map_or(value, |most| value.min(most)).clone()
 }
 
-/// Returns the warning that an action overlaps itself, in the numbers as printed and as they are taken.
+/// Returns the warning that an action overlaps itself, in the printed numbers and in those that are
+/// used.
 fn self_overlap(
     source: &Source,
     printed: &PrintedPlan,

@@ -15,7 +15,7 @@ pub use goals::GoalReached;
 
 use super::{Exact, RequestError, Version, ViolationAnswer, exact};
 
-/// Asks whether a plan is valid, or, without a plan, what a problem consists of.
+/// Requests the validation of a plan, or, without a plan, a summary of a problem.
 #[derive(Clone, Debug)]
 pub struct CheckRequest<'a> {
     /// The problem.
@@ -38,10 +38,10 @@ pub enum CheckAnswer {
     Problem(ProblemRead),
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CheckFormat {
-    /// The only one.
+    /// The name `elbowroom-check`.
     #[default]
     #[serde(rename = "elbowroom-check")]
     Check,
@@ -50,9 +50,9 @@ pub enum CheckFormat {
 /// The validator's report on a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanChecked {
-    /// Always the same.
+    /// Format of the document.
     pub format: CheckFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The name of the plan, as the request gives it.
     pub plan: String,
@@ -145,11 +145,11 @@ pub struct MarginAnswer {
 /// A summary of a problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProblemRead {
-    /// Always the same.
+    /// Format of the document.
     pub format: CheckFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
-    /// Always the same.
+    /// The result.
     pub answer: Readable,
     /// The domain's name.
     pub domain: String,
@@ -157,11 +157,11 @@ pub struct ProblemRead {
     pub problem: String,
 }
 
-/// The only answer about a problem that has been read.
+/// The result for a problem without a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Readable {
-    /// It can be read.
+    /// The problem is readable.
     #[default]
     Readable,
 }
@@ -256,7 +256,7 @@ fn margin(margin: &Margin) -> MarginAnswer {
     }
 }
 
-/// The fluents that the plan's actions change.
+/// Returns the fluents that the plan's actions change.
 fn changed(task: &Task, plan: &TimeTriggeredPlan) -> BTreeSet<FluentId> {
     let steps = plan.steps.iter();
     steps

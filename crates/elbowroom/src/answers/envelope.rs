@@ -48,7 +48,7 @@ pub(crate) use timeouts::{PlannedBeyond, unknown_action};
 pub(crate) use told::quantities;
 pub use worth::{Relax, Worth};
 
-/// Asks for the envelope of a plan, or whether a box lies inside it.
+/// Requests the envelope of a plan, or checks whether a box lies inside it.
 #[derive(Clone, Debug)]
 pub struct EnvelopeRequest {
     /// The problem.
@@ -66,8 +66,8 @@ pub struct EnvelopeRequest {
     /// ([`elbowroom_envelope::enforced`]).
     pub enforce: bool,
     /// The rule that sets the time-out of each action. The plan works as long as each quantity
-    /// stays inside its interval *and* each action ends before its time-out; a box to ask about must not
-    /// reach beyond.
+    /// stays inside its interval *and* each action ends before its time-out. A box to check must
+    /// not exceed the time-outs.
     pub timeout: TimeoutRule,
     /// A box to check, in the syntax of [`parse_box`]: `d0=[5,30] d1=[10,20]`. Without one, the
     /// request searches for a large box inside the envelope.
@@ -104,14 +104,14 @@ pub fn objective_of(
     }
 }
 
-/// Parameters of the search for an envelope.
+/// Settings of the search for an envelope.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Search {
     /// The algorithm; by default the one that [`method_for`](Self::method_for) returns.
     pub method: Option<Method>,
-    /// The search ends when all steps are below this; positive.
+    /// Step size below which the search ends; positive.
     pub precision: Rational,
-    /// If there is one, the precision of each parameter is this share of its nominal value instead.
+    /// Alternative to `precision`: the precision of each parameter as a share of its nominal value.
     pub relative: Option<Rational>,
     /// Change of step sizes after a success.
     pub growth: Growth,
@@ -124,8 +124,9 @@ pub struct Search {
 }
 
 impl Default for Search {
-    /// The box with the greatest least slack, found by a search that begins with IRR: precision a hundredth of
-    /// each nominal value, doubling steps, no sharpening and no limit.
+    /// Returns the settings of the search for the box with the greatest least slack. The search
+    /// begins with IRR: precision a hundredth of each nominal value, doubling steps, no sharpening
+    /// and no limit.
     fn default() -> Self {
         let settings = elbowroom_envelope::Settings::default();
         Self {
@@ -141,7 +142,7 @@ impl Default for Search {
 }
 
 impl Search {
-    /// The search for the largest box by this objective.
+    /// Returns the settings of the search for the largest box by this objective.
     pub fn best(objective: Objective) -> Self {
         let mut search = Self {
             method: Some(Method::Best),
@@ -151,7 +152,7 @@ impl Search {
         search
     }
 
-    /// IRR, the algorithm of paper 1.
+    /// Returns the settings of IRR, the algorithm of paper 1.
     pub fn irr() -> Self {
         Self {
             method: Some(Method::Irr),
@@ -159,7 +160,7 @@ impl Search {
         }
     }
 
-    /// The same with this precision for all parameters, in the unit of the plan.
+    /// Sets this precision for all parameters, in the unit of the plan.
     #[must_use]
     pub fn with_precision(mut self, precision: Rational) -> Self {
         self.precision = precision;
@@ -167,9 +168,9 @@ impl Search {
         self
     }
 
-    /// The method for the plans of a problem. If none is asked for, it is IRR where the search is to have a
-    /// precision, steps that do not double, or sharpened ends, which only IRR has, and for problems with
-    /// processes or events, for whose boxes nothing can be proved; otherwise the largest box is searched for.
+    /// Returns the method for the plans of a problem. The default is the largest box. It is IRR if
+    /// the settings have a precision, steps that do not double, or sharpened ends, which only IRR
+    /// supports, and for problems with processes or events, for whose boxes nothing can be proved.
     pub fn method_for(&self, task: &Task) -> Method {
         if let Some(method) = self.method {
             return method;
@@ -186,7 +187,7 @@ impl Search {
         }
     }
 
-    /// The settings of IRR.
+    /// Returns the settings of IRR.
     pub fn settings(&self) -> elbowroom_envelope::Settings {
         elbowroom_envelope::Settings {
             precision: self.precision.clone(),
@@ -212,7 +213,8 @@ pub struct EnvelopeOutcome {
 }
 
 impl EnvelopeRequest {
-    /// The envelope of a plan, all durations open that the domain fixes, with the default search.
+    /// Requests the envelope of a plan with the default search. All durations are open that the
+    /// domain fixes.
     pub fn new(task: &Arc<Task>, plan: impl Into<AnyPlan>) -> Self {
         Self {
             task: Arc::clone(task),

@@ -59,7 +59,7 @@ pub struct Log {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// It is a trace, and damaged.
+    /// A damaged trace.
     #[error("{name}: {error}")]
     Trace {
         /// The name of the log.
@@ -67,7 +67,7 @@ pub enum LogError {
         /// The error in it.
         error: TraceError,
     },
-    /// It is a table with mistakes.
+    /// A table with errors.
     #[error(transparent)]
     Table(#[from] Diagnostics),
 }
@@ -106,9 +106,9 @@ impl Log {
 /// The result of learning from logs: `docs/formats/learn-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LearnAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: LearnFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The names of the logs, oldest first.
     pub logs: Vec<String>,
@@ -127,15 +127,15 @@ pub struct LearnAnswer {
     /// logs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timeouts: Option<String>,
-    /// Intervals for the next run, if they were asked for.
+    /// Intervals for the next run, if requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inside: Option<ConformalBox>,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LearnFormat {
-    /// The only one.
+    /// The name `elbowroom-learn`.
     #[default]
     #[serde(rename = "elbowroom-learn")]
     Learn,
@@ -160,7 +160,7 @@ pub struct ActionLearnt {
     pub drift: Option<DriftAnswer>,
     /// Change of the failure rate from log to log.
     pub failure_drift: DriftAnswer,
-    /// Predictions of the believed world, or of the world file that was expected; `None` without one.
+    /// Predictions of the believed world, or of the expected world file; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prediction: Option<PredictionAnswer>,
 }

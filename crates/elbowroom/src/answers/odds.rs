@@ -51,7 +51,7 @@ pub struct OddsRequest<'a> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OddsSettings {
-    /// The state after an effect that fails.
+    /// The state after a failed effect.
     pub semantics: OddsSemantics,
     /// `true` if the answer is about the best order instead of that of the plan's times.
     pub takes_best_order: bool,
@@ -72,7 +72,7 @@ pub struct OddsSettings {
 }
 
 impl Default for OddsSettings {
-    /// As in paper 2; 1000 samples with `live` and `adaptable`.
+    /// Returns the settings of paper 2, with 1000 samples for `live` and `adaptable`.
     fn default() -> Self {
         let executors = ["live", "adaptable"].iter().map(|name| name.parse());
         Self {
@@ -88,7 +88,7 @@ impl Default for OddsSettings {
     }
 }
 
-/// The state after an effect that fails: [`Semantics`].
+/// The state after a failed effect: [`Semantics`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OddsSemantics {
@@ -111,35 +111,35 @@ impl From<OddsSemantics> for Semantics {
 /// The success probability of a plan: `docs/formats/odds-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OddsAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: OddsFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The domain's name.
     pub domain: String,
     /// The problem's name.
     pub problem: String,
-    /// The state after an effect that fails.
+    /// The state after a failed effect.
     pub semantics: OddsSemantics,
     /// The answer itself.
     #[serde(flatten)]
     pub finding: OddsFinding,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum OddsFormat {
-    /// The only one.
+    /// The name `elbowroom-odds`.
     #[default]
     #[serde(rename = "elbowroom-odds")]
     Odds,
 }
 
-/// The odds, or why there are none.
+/// The success probability, or the reason why it is missing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer")]
 pub enum OddsFinding {
-    /// The odds.
+    /// The analysis.
     #[serde(rename = "odds")]
     Odds(Box<Odds>),
     /// No order of the plan can succeed.
@@ -162,10 +162,10 @@ pub enum OddsFinding {
     },
 }
 
-/// The odds of a plan.
+/// The analysis of a plan's success probability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Odds {
-    /// The order that they are about.
+    /// The analysed order.
     pub order: OrderAnswer,
     /// The gain of another order, of retrying, and of another plan.
     pub gains: GainsAnswer,
@@ -275,7 +275,7 @@ fn finding(
     })))
 }
 
-/// The answer for a valid plan whose happenings do not work as an order.
+/// Returns the answer for a valid plan whose happenings do not work as an order.
 fn fails_in_order() -> OddsFinding {
     let reason = "not supported: the happenings of this plan do not reach the goal as an order, although the plan is valid";
     OddsFinding::None {

@@ -51,12 +51,12 @@ pub struct PlanOutcome {
     pub plan: Option<TimeTriggeredPlan>,
 }
 
-/// A plan, or why there is none: `docs/formats/plan-json.md`.
+/// A plan, or the reason why there is none: `docs/formats/plan-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: PlanFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The domain's name.
     pub domain: String,
@@ -82,10 +82,10 @@ pub struct PlanAnswer {
     pub statistics: PlanStatistics,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PlanFormat {
-    /// The only one.
+    /// The name `elbowroom-plan`.
     #[default]
     #[serde(rename = "elbowroom-plan")]
     Plan,
@@ -127,7 +127,7 @@ pub enum PlanFinding {
         /// The reason for the missing certificate, if the planner claims that no plan exists.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         uncertified: Option<String>,
-        /// `true` if all plans were tried without self-overlap; left out elsewhere.
+        /// `true` if all plans without self-overlap were searched; left out otherwise.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         without_self_overlap: bool,
     },

@@ -34,16 +34,16 @@ pub struct RegionOutcome {
     pub answer: RegionAnswer,
     /// The plan with its open quantities; `None` if the validator rejects it.
     pub plan: Option<ParametrizedPlan>,
-    /// The region; `None` if there is no answer, or another one.
+    /// The region; `None` if the answer has none.
     pub region: Option<elbowroom_envelope::Region>,
 }
 
 /// All values of its parameters for which a plan works: `docs/formats/region-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegionAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: RegionFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The domain's name.
     pub domain: String,
@@ -59,10 +59,10 @@ pub struct RegionAnswer {
     pub finding: RegionFinding,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RegionFormat {
-    /// The only one.
+    /// The name `elbowroom-region`.
     #[default]
     #[serde(rename = "elbowroom-region")]
     Region,
@@ -77,7 +77,7 @@ pub enum RegionFinding {
     Region {
         /// The parameters.
         parameters: Vec<Quantity>,
-        /// The pieces; no two have values in common. Empty if the plan works with no values.
+        /// The pieces, which are disjoint. Empty if the plan works for no values.
         pieces: Vec<PieceAnswer>,
         /// The reason why this is only a part of the region: a limit, or lack of time. `None` if it
         /// is the whole region.
@@ -111,7 +111,7 @@ pub enum RegionFinding {
     },
 }
 
-/// Values that satisfy some inequalities; none of these follows from the others.
+/// The values that satisfy some inequalities, without redundant ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PieceAnswer {
     /// The inequalities.
@@ -121,7 +121,7 @@ pub struct PieceAnswer {
 /// `Σ factor · parameter <= bound`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RowAnswer {
-    /// The inequality for people: `dur_0 + dur_3 <= 4893/100`.
+    /// The inequality for users: `dur_0 + dur_3 <= 4893/100`.
     pub text: String,
     /// The nonzero factors of parameters, by name.
     pub factors: IndexMap<String, Exact>,

@@ -42,7 +42,7 @@ pub struct RepairRequest {
     pub change: Vec<VarySpec>,
     /// Exceptions from `change`: quantities that may not change.
     pub keep: Vec<VarySpec>,
-    /// The guarantee that the repaired plan is to have at its nominal values.
+    /// The required guarantee of the repaired plan at its nominal values.
     pub guarantee: Guarantee,
 }
 
@@ -73,9 +73,9 @@ pub struct RepairOutcome {
 /// The cheapest change that makes a plan work: `docs/formats/repair-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RepairAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: RepairFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The domain's name.
     pub domain: String,
@@ -93,10 +93,10 @@ pub struct RepairAnswer {
     pub finding: RepairFinding,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RepairFormat {
-    /// The only one.
+    /// The name `elbowroom-repair`.
     #[default]
     #[serde(rename = "elbowroom-repair")]
     Repair,

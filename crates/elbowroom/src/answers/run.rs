@@ -62,16 +62,16 @@ pub struct RunAnswer {
     /// none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub invalid: Vec<String>,
-    /// Always the same.
+    /// Format of the document.
     pub format: RunFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RunFormat {
-    /// The only one.
+    /// The name `elbowroom-run`.
     #[default]
     #[serde(rename = "elbowroom-run")]
     Run,
@@ -226,7 +226,7 @@ pub fn run(
 /// Executes a plan in the world that the specification describes.
 ///
 /// # Errors
-/// When there is no such world: the specification names a process or contradicts itself, or its
+/// When there is no such world: the specification names a process or contradicts itself, or the
 /// world file cannot be read.
 pub fn simulate(
     request: RunRequest<'_>,

@@ -33,25 +33,25 @@ pub struct StnOutcome {
 /// A plan as a network: `docs/formats/stn-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StnAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: StnFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The answer itself.
     #[serde(flatten)]
     pub finding: StnFinding,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum StnFormat {
-    /// The only one.
+    /// The name `elbowroom-stn`.
     #[default]
     #[serde(rename = "elbowroom-stn")]
     Stn,
 }
 
-/// The result of the relaxation.
+/// The result of the deordering.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "lowercase")]
 pub enum StnFinding {

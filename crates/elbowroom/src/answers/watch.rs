@@ -14,9 +14,9 @@ use super::RunProgress;
 /// Receives progress events of a request, and decides when it has to end.
 ///
 /// The library reads no clock. A caller that wants a time limit or measured times implements
-/// [`elapsed`](Self::elapsed).
+/// [`elapsed`](Watcher::elapsed).
 pub trait Watcher {
-    /// The time since some fixed moment; only differences matter.
+    /// Returns the time since a fixed moment. Only differences are used.
     fn elapsed(&mut self) -> Duration {
         Duration::ZERO
     }
@@ -61,9 +61,9 @@ pub enum Event<'a> {
 /// Progress of the search for an envelope.
 #[derive(Clone, Debug)]
 pub struct EnvelopeProgress<'a> {
-    /// The plan whose parameters the box is about.
+    /// The plan with the parameters of the box.
     pub plan: &'a Arc<ParametrizedPlan>,
-    /// The box so far. The plan is guaranteed to work in all of it.
+    /// The box so far. The plan is guaranteed to work inside it.
     pub envelope: &'a DecoupledEnvelope,
     /// Number of widenings.
     pub widenings: usize,

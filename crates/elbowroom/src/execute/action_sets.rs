@@ -155,7 +155,7 @@ fn fallbacks(
     found.into_keys().take(MOST_FALLBACKS).collect()
 }
 
-/// The names of a plan's actions.
+/// Returns the names of a plan's actions.
 fn names(plan: &TimeTriggeredPlan) -> Vec<String> {
     let steps = plan.steps.iter();
     steps.map(|step| step.action.name.clone()).collect()

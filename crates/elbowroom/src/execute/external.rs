@@ -76,7 +76,7 @@ impl External<'_> {
                 remark = self_overlap(&found.plan);
                 PlanAnswer::Plan(found.plan)
             }
-            // "No plan exists" is its claim, not a proof.
+            // A claim that no plan exists is not a proof.
             Outcome::NotStarted { ref help, .. } => PlanAnswer::Failed {
                 why: format!("{name}: {}; {help}", report.outcome),
             },

@@ -99,7 +99,7 @@ pub enum Value {
         /// Number of samples.
         samples: u64,
     },
-    /// The probability that all its actions succeed and the goal holds after them.
+    /// The exact probability that all its actions succeed and the goal holds after them.
     Exact(f64),
 }
 

@@ -46,7 +46,7 @@ pub struct Likeliest<'a> {
     pub model: WorldModel,
     /// The planner.
     pub planner: Embedded<'a>,
-    /// The planning time, as it passes in the world.
+    /// The planning time in the world's seconds.
     pub planning_time: Rational,
     quantiles: BTreeMap<(String, Rational, u64), Rational>,
 }
@@ -263,7 +263,7 @@ impl<'a> Likeliest<'a> {
     }
 }
 
-/// The remaining part of a plan.
+/// The remaining plan.
 struct Rest {
     /// The plan with past times fixed, and no future time before now.
     plan: StnPlan,

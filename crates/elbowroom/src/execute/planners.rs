@@ -56,8 +56,8 @@ impl Planner for Embedded<'_> {
 }
 
 impl Default for Embedded<'_> {
-    /// 20,000 states, 2,000 of them for a better plan than the first; about a second for a certificate; no
-    /// clock.
+    /// Returns a planner with 20,000 states, 2,000 of them for a better plan than the first, and
+    /// about a second for a certificate, without a clock.
     fn default() -> Self {
         Self {
             settings: embedded::Settings::default(),
@@ -139,8 +139,8 @@ pub(crate) fn without_plan(
 /// The default limit on the work for one plan, in seconds of one processor.
 pub const PLANNING_BUDGET: i64 = 2;
 
-/// The units of [`elbowroom_num::work`] of a planning budget in seconds of one processor: about one for each
-/// nanosecond.
+/// Converts a planning budget in seconds of one processor to units of [`elbowroom_num::work`]:
+/// about one per nanosecond.
 pub fn planning_work(seconds: &Rational) -> u64 {
     let time = Duration::try_from_secs_f64(seconds.to_f64());
     time.map_or(u64::MAX, |time| {

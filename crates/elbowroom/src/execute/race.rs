@@ -32,7 +32,7 @@ impl Tally {
     fn may_be_ahead(&self, other: &Self, margin: u64) -> bool {
         let (own, theirs) = differences(&self.results, &other.results);
         let least = self.samples().min(other.samples()) / margin;
-        // The required lead exceeds the observed one significantly if `missing` is large.
+        // Tests whether the gap to the required lead is significant.
         let missing = (least + theirs).saturating_sub(own);
         missing.pow(2) <= BEHIND.pow(2) * (own + theirs + 1)
     }

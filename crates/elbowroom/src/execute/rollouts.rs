@@ -42,7 +42,7 @@ pub struct Rollouts {
     pub is_ready: bool,
 }
 
-/// The states that a search for a plan in a sample may examine.
+/// Maximum number of states of a search for a plan in a sample.
 const MOST_STATES: u64 = 20_000;
 
 /// Settings of replanning in rollouts.

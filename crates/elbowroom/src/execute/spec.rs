@@ -50,7 +50,7 @@ pub struct RunSpec {
     /// planned.
     #[serde(deserialize_with = "required")]
     pub world: Option<String>,
-    /// The command line of the process that is the world.
+    /// The command line of the process that simulates or controls the world.
     #[serde(deserialize_with = "required")]
     pub world_process: Option<String>,
     /// The world file that the executor believes (`docs/formats/world.md`): distributions of durations, failures and
@@ -133,10 +133,10 @@ pub struct RunSpec {
     /// Objective of envelopes; left out if they are IRR's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub objective: Option<Objective>,
-    /// The treatment of running actions when a new plan is made.
+    /// The treatment of running actions in replanning.
     #[serde(with = "as_text")]
     pub running: RunningRule,
-    /// The planning time, as it passes in the world.
+    /// The planning time in the world's seconds.
     #[serde(with = "as_text")]
     pub planning_time: PlanningTime,
     /// `true` if plans are made in the background of the run ([`RunSettings::plans_aside`]); left

@@ -37,7 +37,7 @@ pub struct Validated<'a, R> {
 
 type Listener<'a> = Box<dyn FnMut(&Invalid) + Send + 'a>;
 
-/// The validator's findings in a run so far; shared by clones.
+/// The validator's findings in a run so far, shared between clones.
 #[derive(Clone)]
 pub struct Findings(Arc<Mutex<Validation<'static>>>);
 

@@ -139,12 +139,12 @@ documents! {
         pub facts: Vec<String>,
         /// The believed values of numbers.
         pub numbers: Vec<NumberNow>,
-        /// Facts and numbers that are in doubt. Until they are known, such a fact counts as false, such a number keeps its
-        /// value, and a goal that reads them is not reached.
+        /// Facts and numbers in doubt. Until their values are known, such a fact counts as false,
+        /// such a number keeps its value, and a goal that reads them is not reached.
         pub in_doubt: Vec<InDoubt>,
     }
 
-    /// A fact or a number that is in doubt.
+    /// A fact or a number in doubt.
     pub struct InDoubt {
         /// The fact or the number.
         pub name: String,
@@ -292,7 +292,7 @@ documents! {
         pub until: Option<Exact>,
         /// The reason, in words.
         pub why: Option<String>,
-        /// The next action of the plan that has not been started.
+        /// The next action of the plan to start.
         pub step: Option<StepNow>,
     }
 
@@ -359,7 +359,7 @@ documents! {
         /// The event that the request waits for, in words, if it has not been accepted yet.
         [optional serde(default, skip_serializing_if = "Option::is_none")]
         pub until: Option<String>,
-        /// The name of the goal that the request is about.
+        /// The name of the goal in the request.
         [optional serde(default, skip_serializing_if = "Option::is_none")]
         pub name: Option<String>,
     }

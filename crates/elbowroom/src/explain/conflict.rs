@@ -10,9 +10,9 @@ use elbowroom_plan::{
 
 use super::Explainer;
 
-/// Constraints that contradict each other, in words.
+/// Constraints that contradict each other, with a description.
 pub(super) struct Conflict {
-    /// The conflict: which durations have to fit into which bound.
+    /// Description of the conflict: the durations that exceed a bound.
     pub(super) reason: String,
     /// Excess of the durations over the bound.
     pub(super) excess: Rational,
@@ -253,7 +253,7 @@ impl Explainer<'_> {
 enum Room {
     /// The duration of an action that contains the chain.
     Action(String),
-    /// Anything else: a deadline, a bound.
+    /// Another upper bound, such as a deadline.
     Limit(String),
 }
 

@@ -1,4 +1,4 @@
-//! Timed initials in words: deadlines, and others.
+//! Descriptions of timed initials, such as deadlines.
 
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::{Change, Condition, FactId};

@@ -1,4 +1,4 @@
-//! The box check and the region as SMT-LIB 2.
+//! The box check and the region in SMT-LIB 2.
 
 use std::fmt::Write as _;
 

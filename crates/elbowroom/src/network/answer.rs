@@ -136,7 +136,7 @@ pub struct LinkDuration {
 /// The time of a time point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Time {
-    /// The point.
+    /// The time point.
     pub point: String,
     /// The time.
     pub time: Number,

@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::simulate::{Durations, SimulationError};
 
-/// Number of steps into which the width of a distribution is divided. Drawn values are multiples of
-/// a step.
+/// Minimum number of decimal units in the width of a distribution. Drawn values are multiples of the
+/// unit.
 const STEPS: i64 = 1000;
 
 /// Source of random durations for runs.
@@ -185,8 +185,8 @@ fn fine(width: &Rational) -> Rational {
 }
 
 impl Group {
-    /// Computes the Cholesky decomposition. If the matrix is not positive semidefinite, the
-    /// remaining variables are treated as independent.
+    /// Computes the Cholesky decomposition. If the matrix is not positive semidefinite, negative
+    /// diagonal entries count as 0, and correlations with them are dropped.
     #[allow(
         clippy::needless_range_loop,
         reason = "rows and columns of two matrices at once"

@@ -176,7 +176,8 @@ fn widened(node: &Node, timed: usize, last: Option<&Rational>) -> Zone {
         if own.most.is_some() {
             continue;
         }
-        // Without a greatest duration, it only counts whether the least one has passed.
+        // Without a maximum duration, the zone only records whether the minimum duration has
+        // passed.
         let start = FIRST_START + place;
         let has_passed = zone.get(start, NOW).is_some_and(|most| -most >= own.least);
         for time in ZERO..size {

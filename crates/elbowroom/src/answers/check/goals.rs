@@ -14,7 +14,7 @@ use crate::answers::exact;
 /// A part of the goal, and the time at which the plan reaches it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GoalReached {
-    /// The condition, as PDDL writes it.
+    /// The condition, in PDDL.
     pub goal: String,
     /// The first time at which it holds; 0 if it holds initially.
     #[serde(with = "exact")]

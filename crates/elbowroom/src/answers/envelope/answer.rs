@@ -14,9 +14,9 @@ use crate::execute::as_text;
 /// A robustness envelope, or the reason why there is none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnvelopeAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: EnvelopeFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The domain's name.
     pub domain: String,
@@ -31,10 +31,10 @@ pub struct EnvelopeAnswer {
     pub finding: EnvelopeFinding,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum EnvelopeFormat {
-    /// The only one.
+    /// The name `elbowroom-envelope`.
     #[default]
     #[serde(rename = "elbowroom-envelope")]
     Envelope,
@@ -49,11 +49,10 @@ pub struct EnvelopeSettings {
     pub guarantee: Guarantee,
     /// Change of step sizes after a success.
     pub growth: Growth,
-    /// The search ends when all steps are below this.
+    /// Step size below which the search ended.
     #[serde(with = "exact")]
     pub precision: Rational,
-    /// If there is one, the precision of each parameter was this share of its nominal value
-    /// instead.
+    /// Alternative to `precision`: the precision of each parameter as a share of its nominal value.
     #[serde(
         with = "exact::option",
         default,
@@ -81,7 +80,7 @@ fn off() -> TimeoutRule {
 pub enum EnvelopeFinding {
     /// There is an envelope.
     Envelope {
-        /// The parameters, and how far each may deviate.
+        /// The parameters, with their intervals and limits.
         parameters: Vec<Room>,
         /// Durations that the domain leaves to the executor, and that do not vary.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -97,13 +96,13 @@ pub enum EnvelopeFinding {
         /// Deviations of all quantities at once, if they are known.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         balance: Option<Balance>,
-        /// The objective of the box, if the largest one was asked for.
+        /// The objective of the box, if the largest one was requested.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         best: Option<Best>,
         /// Counts of the plan's conditions, by what enforces them.
         #[serde(default)]
         conditions: Conditions,
-        /// The worth of knowing values in advance, if there is any.
+        /// The gain of knowing values in advance, if there is any.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         foresight: Option<Foresight>,
         /// The times of each action, as planned and anywhere in the envelope.
@@ -118,7 +117,7 @@ pub enum EnvelopeFinding {
     },
     /// The plan fails even if everything goes as planned.
     Fails(Failing),
-    /// The box asked about lies inside the envelope.
+    /// The given box lies inside the envelope.
     Inside {
         /// The parameters and their intervals.
         parameters: Vec<Range>,
@@ -158,14 +157,14 @@ pub enum Failing {
 /// A quantity that is left open.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quantity {
-    /// Unique in its plan.
+    /// The parameter's name, unique in the plan.
     pub name: String,
-    /// In plain words: `duration of (drive rover depot shelf)`.
+    /// The quantity in words: `duration of (drive rover depot shelf)`.
     pub quantity: String,
     /// Kind of the quantity.
     pub kind: QuantityKind,
-    /// The action whose duration or number it is: `(drive rover depot shelf)`; `None` if it belongs
-    /// to no single action.
+    /// The action that the duration or number belongs to: `(drive rover depot shelf)`; `None` if
+    /// there is no single action.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub action: Option<String>,
     /// The value in the original plan.

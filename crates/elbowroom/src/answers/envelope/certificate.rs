@@ -1,4 +1,4 @@
-//! The proof that a box is inside the envelope and the largest there, in the form that
+//! The proof that a box is inside the envelope and no other box there is larger, in the form that
 //! `elbowroom-verify` checks.
 
 mod inside;
@@ -81,7 +81,7 @@ pub(super) fn certificate(
         })
     });
     let certificate = Certificate {
-        // Filled in with the sums.
+        // Filled in later, with the sums.
         proves: String::new(),
         assumes: Vec::new(),
         guarantee: match guarantee {

@@ -113,7 +113,7 @@ fn unknown(
     Ok(unknown)
 }
 
-/// The sum of the widths of all intervals.
+/// Returns the sum of the widths of all intervals.
 fn width(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Rational {
     let cap = Rational::from(CAP);
     let widths = plan.parameters.iter().zip(envelope.intervals());

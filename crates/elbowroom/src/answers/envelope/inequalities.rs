@@ -108,7 +108,7 @@ fn requirement(task: &Task, plan: &ParametrizedPlan, obligation: &Obligation) ->
     }
 }
 
-/// A bound, in words where it is more than an ordering.
+/// Converts a bound to a row, with a description unless it is a mere ordering.
 fn network_row(explainer: &Explainer<'_>, bound: &NetworkBound) -> NetworkRow {
     let constraint = |index: usize| &explainer.plan.plan.constraints[index];
     NetworkRow {
@@ -120,7 +120,7 @@ fn network_row(explainer: &Explainer<'_>, bound: &NetworkBound) -> NetworkRow {
     }
 }
 
-/// `expression <= 0`, or `< 0`.
+/// Formats `expression <= 0`, or `< 0`.
 fn row(inequality: &Inequality) -> String {
     let Inequality {
         expression,

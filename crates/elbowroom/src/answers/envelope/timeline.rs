@@ -74,7 +74,8 @@ pub struct TimedFacts {
 }
 
 impl Timeline {
-    /// The times of a plan, in a box around its planned values; `None` if it has no schedule there.
+    /// Computes the times of a plan, in a box around its planned values; `None` if it has no
+    /// schedule there.
     pub fn of(task: &Task, plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Self> {
         let zero = network_node(NodeId::ZERO);
         let nominal = as_told(plan, plan.plan.network(&plan.nominal()))?;
@@ -131,8 +132,8 @@ impl Timeline {
     }
 }
 
-/// The declared types of the objects that these actions mention; of an object with several types,
-/// the first.
+/// Returns the declared types of the objects that these actions mention; for an object with several
+/// types, the first.
 pub fn types<'a>(
     task: &Task,
     actions: impl IntoIterator<Item = &'a str>,
@@ -179,7 +180,7 @@ impl Times<'_> {
     }
 }
 
-/// The changes of a group of timed initials, in words.
+/// Describes the changes of a group of timed initials.
 pub fn changes(task: &Task, timed: usize) -> Vec<String> {
     let words = |change: &Change| match change {
         Change::Add(fact) => format!("{} becomes true", task.fact_name(*fact)),

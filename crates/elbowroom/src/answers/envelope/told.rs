@@ -41,7 +41,7 @@ impl From<ParameterKind> for QuantityKind {
 }
 
 impl Range {
-    /// The interval.
+    /// Returns the interval.
     pub fn interval(&self) -> Interval {
         Interval {
             lower: self.lower.clone(),
@@ -84,7 +84,7 @@ impl Makespans {
     }
 }
 
-/// The parameters of a plan.
+/// Returns the parameters of a plan.
 pub(crate) fn quantities(explainer: &Explainer<'_>) -> Vec<Quantity> {
     let parameters = explainer.plan.parameters.iter().enumerate();
     parameters
@@ -105,12 +105,12 @@ pub(crate) fn quantities(explainer: &Explainer<'_>) -> Vec<Quantity> {
 }
 
 impl Subject<'_> {
-    /// The parameters.
+    /// Returns the parameters.
     pub(super) fn quantities(&self) -> Vec<Quantity> {
         quantities(&self.explainer)
     }
 
-    /// The parameters, each with its interval in a box.
+    /// Returns the parameters, each with its interval in a box.
     pub(super) fn ranges(&self, envelope: &DecoupledEnvelope) -> Vec<Range> {
         let quantities = self.quantities().into_iter().zip(envelope.intervals());
         let timeouts = timeouts(self.plan, &self.request.timeout);
@@ -125,7 +125,7 @@ impl Subject<'_> {
             .collect()
     }
 
-    /// The durations that the executor chooses.
+    /// Returns the durations that the executor chooses.
     pub(super) fn chosen(&self) -> Vec<Chosen> {
         let told = self.plan.told.iter();
         told.map(|(id, duration)| {

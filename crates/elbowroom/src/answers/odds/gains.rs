@@ -25,7 +25,7 @@ pub struct GainsAnswer {
 /// The best order of a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BestOrderAnswer {
-    /// P(A ∩ G).
+    /// The success probability P(A ∩ G).
     pub probability: f64,
     /// `true` if no order is better.
     pub is_proven: bool,
@@ -86,7 +86,7 @@ impl GainsAnswer {
     }
 }
 
-/// The best order of the plan that the embedded planner makes.
+/// Returns the best order of the plan that the embedded planner makes.
 fn of_planners_plan(
     subject: &Subject<'_>,
     watcher: &mut dyn Watcher,

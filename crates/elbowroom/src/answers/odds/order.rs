@@ -19,9 +19,9 @@ pub struct OrderAnswer {
     /// `true` if it is proven that no order of the plan is better; `None` if no other order was
     /// examined.
     pub is_proven: Option<bool>,
-    /// P(A): that all happenings succeed.
+    /// P(A): the probability that all happenings succeed.
     pub actions_probability: f64,
-    /// P(A ∩ G): that all happenings succeed and the goal holds after them.
+    /// P(A ∩ G): the probability that all happenings succeed and the goal holds after them.
     pub probability: f64,
     /// Number of conditions on numbers that were assumed to hold, because the numbers depend on the
     /// times of happenings.
@@ -50,7 +50,7 @@ pub struct HappeningAnswer {
     pub kind: String,
     /// The action; `None` for timed initials.
     pub action: Option<String>,
-    /// In words.
+    /// The happening in words.
     pub what: String,
     /// `true` if it happens at the same time as the happening before it, because they depend on
     /// each other.
@@ -74,14 +74,14 @@ pub struct HappeningAnswer {
 /// A layer: the facts that must hold between two happenings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LayerAnswer {
-    /// Facts that must be true, facts that must be false as `(not …)`, other conditions as PDDL
-    /// writes them.
+    /// Facts that must be true, facts that must be false as `(not …)`, and other conditions, in
+    /// PDDL.
     pub conditions: Vec<String>,
     /// The running actions.
     pub running: Vec<String>,
 }
 
-/// A share of all worlds that is lost at one place.
+/// The share of all worlds that is lost at a happening.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LossAnswer {
     /// The position of the happening in the order, from 0; `None` before the first.
@@ -121,14 +121,14 @@ pub enum LossReason {
         action: String,
         /// The condition.
         condition: String,
-        /// See [`Condition`](Self::Condition).
+        /// As in `Condition`.
         since: Option<String>,
     },
     /// A condition of the goal does not hold.
     Goal {
         /// The condition.
         condition: String,
-        /// See [`Condition`](Self::Condition).
+        /// As in `Condition`.
         since: Option<String>,
     },
 }

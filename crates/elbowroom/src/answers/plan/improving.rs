@@ -57,12 +57,12 @@ enum News {
     Ended(Box<Result<PlanOutcome, RequestError>>),
 }
 
-/// A search in a thread of its own, and an iterator of the plans that it finds.
+/// A search in its own thread, as an iterator over the plans that it finds.
 ///
 /// The search continues between calls. Dropping this value requests its end at the next step.
 #[derive(Debug)]
 pub struct ImprovingPlans {
-    /// The caller's task. The search numbers facts in a table of its own.
+    /// The caller's task. The search numbers facts in its own table.
     task: Arc<Task>,
     news: Receiver<News>,
     is_to_stop: Arc<AtomicBool>,
@@ -137,7 +137,7 @@ impl ImprovingPlans {
                 NextPlan::Ended
             }
             Err(RecvTimeoutError::Timeout) => NextPlan::Later,
-            // A thread that is gone without an answer has panicked.
+            // A thread that ends without an answer has panicked.
             Err(RecvTimeoutError::Disconnected) => match self.thread.take().map(JoinHandle::join) {
                 Some(Err(panic)) => resume_unwind(panic),
                 _ => panic!("the search has panicked"),

@@ -284,7 +284,7 @@ impl PlanAim<'_> {
     }
 }
 
-/// The value of the problem's metric, if it has one.
+/// Returns the value of the problem's metric, if it has one.
 fn metric(task: &Task, plan: &TimeTriggeredPlan) -> Option<Rational> {
     match flow::judge(task, plan) {
         elbowroom_model::validate::Verdict::Valid(report) => report.metric(task),

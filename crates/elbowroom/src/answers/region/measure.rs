@@ -1,4 +1,4 @@
-//! The volume of the region, and the share of it that boxes have.
+//! The volume of the region, and the boxes' shares of it.
 
 use std::ops::ControlFlow;
 
@@ -50,7 +50,7 @@ pub struct Share {
     pub interval: Option<[f64; 2]>,
 }
 
-/// A volume: exact, or a logarithm with its variance.
+/// A volume: exact, or an estimated logarithm with its variance.
 #[derive(Clone, Debug, PartialEq)]
 enum Size {
     Exact(Rational),
@@ -151,7 +151,7 @@ fn size_of_component(
 }
 
 impl Size {
-    /// The natural logarithm.
+    /// Returns the natural logarithm.
     fn logarithm(&self) -> f64 {
         match self {
             Self::Exact(volume) => logarithm(volume),
@@ -211,7 +211,7 @@ fn sum(pieces: &[Size]) -> Size {
     }
 }
 
-/// The natural logarithm of a number that may be too large or too small for a float.
+/// Returns the natural logarithm of a number that may be too large or too small for a float.
 fn logarithm(value: &Rational) -> f64 {
     if !value.is_positive() {
         return f64::NEG_INFINITY;

@@ -1,4 +1,4 @@
-//! Two parameters of a region as a picture.
+//! Pictures of two parameters of a region.
 
 use std::ops::ControlFlow;
 
@@ -13,7 +13,7 @@ use crate::box_text::{self, BoxTextError};
 /// Selection of a picture of a region.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plane {
-    /// Two parameters, from left to right and upwards, named as in boxes
+    /// The horizontal and the vertical parameter, named as in boxes
     /// ([`parse_box`](crate::box_text::parse_box)).
     pub axes: [String; 2],
     /// Values of the other parameters.
@@ -123,7 +123,7 @@ fn box_name(name: &str) -> String {
     }
 }
 
-/// `dur_0: (drive rover depot shelf)`.
+/// Returns the label of a parameter: `dur_0: (drive rover depot shelf)`.
 fn label(plan: &ParametrizedPlan, id: ParameterId) -> String {
     let parameter = plan.parameter(id);
     match parameter.kind {
@@ -172,7 +172,7 @@ fn window(
             stretch(&corner[own]);
         }
     }
-    // Durations begin at zero.
+    // The axis does not exceed the parameter's range: durations begin at zero.
     let range = &plan.parameter(id).range;
     if let Some(least) = range.lower.value()
         && from < *least
@@ -183,7 +183,7 @@ fn window(
     [from - &margin, to + &margin]
 }
 
-/// The last part of a path.
+/// Returns the last part of a path.
 fn short_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }

@@ -13,10 +13,10 @@ use rand_chacha::rand_core::{RngCore, SeedableRng};
 
 /// Number of walks.
 const WALKS: u32 = 16;
-/// Steps of a walk in each body, for each coordinate.
+/// Number of steps of a walk in each body, per coordinate.
 const STEPS: usize = 120;
 
-/// A logarithm of a volume, and its variance.
+/// An estimated logarithm of a volume, and its variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate {
     pub(super) logarithm: f64,
@@ -160,7 +160,7 @@ impl Walk {
         inside / steps
     }
 
-    /// Uniform in `[0, 1)`.
+    /// Returns a uniform random number in `[0, 1)`.
     #[allow(clippy::cast_precision_loss, reason = "53 bits fit exactly")]
     fn unit(&mut self) -> f64 {
         (self.random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64

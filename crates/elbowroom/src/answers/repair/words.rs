@@ -1,4 +1,4 @@
-//! A repair in words.
+//! Descriptions of repairs in words.
 
 use elbowroom_envelope::obligations::Requirement;
 use elbowroom_envelope::{Hindrance, Repair};
@@ -140,7 +140,7 @@ impl Subject {
         (!sides.is_empty()).then(|| sides.join(", "))
     }
 
-    /// A bound of a constraint, in words.
+    /// Describes a bound of a constraint.
     pub(super) fn bound_words(&self, from: NodeId, to: NodeId, side: Side) -> String {
         let words = |node: NodeId| self.plan.plan.node_words(&self.task, node);
         let extreme = match side {

@@ -49,7 +49,7 @@ pub enum SpecError {
     /// The time-outs name an action that the problem does not have.
     #[error("{0}")]
     Timeout(String),
-    /// The executor compares plans in the world that a world file describes, and there is none.
+    /// The executor compares plans in the world of a world file, but there is none.
     #[error("`{0}` must know how the world behaves")]
     NeedsWorld(ExecutorSpec),
     /// The executor compares plans of the embedded planner, but another planner is given.
@@ -100,7 +100,7 @@ pub enum SpoilerError {
     /// There is no plan.
     #[error("there is no plan to spoil")]
     NoPlan,
-    /// The plan does not work.
+    /// The plan cannot be prepared.
     #[error(transparent)]
     Unprepared(#[from] PrepareError),
     /// The box is not one of this plan.
@@ -416,7 +416,7 @@ impl RunSpec {
         let envelopes = self.envelopes_in(model.as_ref());
         let model = model.filter(|_| self.executor.asks_odds());
         let is_embedded = matches!(self.whom()?, Whom::Embedded);
-        // A table of moves is made for one goal.
+        // A table of moves has a fixed goal.
         let has_table = self.executor.asks_outlook() && !self.is_lasting;
         let tabulated = model.as_ref().filter(|_| has_table);
         let tabulated = tabulated.map(|model| self.outlook(task, model, is_embedded));

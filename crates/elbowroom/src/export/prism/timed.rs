@@ -76,7 +76,7 @@ pub fn timed(
     checked(process.text(&problem.name, &problem.domain))
 }
 
-/// A world on a grid, with names.
+/// A world on a grid, with names for its parts.
 struct Process<'p> {
     world: &'p TimedWorld,
     chances: &'p Chances,

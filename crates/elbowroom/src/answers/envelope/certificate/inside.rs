@@ -82,7 +82,7 @@ fn numbers_of_way(way: &Way) -> usize {
     3 * way.differences.len() + inequalities.sum::<usize>() + sums.sum::<usize>()
 }
 
-/// The ends of the box that are infinite.
+/// Returns the infinite ends of the box.
 fn endless(envelope: &DecoupledEnvelope) -> Vec<Endless> {
     let intervals = envelope.intervals().iter().enumerate();
     let ends = intervals.flat_map(|(parameter, interval)| {

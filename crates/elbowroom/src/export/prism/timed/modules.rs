@@ -58,7 +58,7 @@ impl Process<'_> {
         text.push_str("endmodule\n\n");
     }
 
-    /// Writes the draw of its end in the present cell, by elapsed time.
+    /// Writes the random draw of its end in the present cell, by elapsed time.
     fn draws(&self, act: usize, label: &str, guard: &str, text: &mut String) {
         let since = format!("a_{}", self.acts[act]);
         let ends = format!("o_{}", self.acts[act]);
