@@ -1,22 +1,22 @@
-//! Questions about plans and their answers: a request goes in, an answer comes out.
+//! Requests about plans and their answers.
 //!
-//! An answer is plain data. It can be stored, sent and read again with `serde`, and its JSON is the
-//! document that `docs/formats` describes and that the command line prints. The front doors (the
-//! command, other languages, reports) differ only in how they show it.
+//! An answer is plain data. It can be serialized with `serde`; its JSON is the document that
+//! `docs/formats` describes and that the command line prints. The front ends (the command, other
+//! languages, reports) differ only in how they show it.
 //!
-//! A request that can take long is given a [`Watcher`], which hears how far the work has come and
-//! can end it. What was found by then is the answer; for an envelope, it is sound at any moment.
+//! A request that can take long is given a [`Watcher`], which receives progress events and can end
+//! the work early. The result found so far is the answer; for an envelope, it is sound at any time.
 //!
 //! | question | request | answer |
 //! |---|---|---|
 //! | is there a plan? | [`PlanRequest`] | [`PlanAnswer`] |
 //! | is a plan valid? | [`CheckRequest`] | [`CheckAnswer`] |
-//! | which orderings and times does it need? | [`StnRequest`] | [`StnAnswer`] |
-//! | how far may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
-//! | with which values does it work? | [`EnvelopeRequest`] | [`RegionAnswer`] |
-//! | what is the least that has to change for it to work? | [`RepairRequest`] | [`RepairAnswer`] |
-//! | what comes of executing a plan? | [`RunRequest`] | [`RunAnswer`] |
-//! | what do logs say about the world? | [`LearnRequest`] | [`LearnAnswer`] |
+//! | which orderings and bounds are necessary? | [`StnRequest`] | [`StnAnswer`] |
+//! | how much may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
+//! | for what values does it work? | [`EnvelopeRequest`] | [`RegionAnswer`] |
+//! | which least change makes it work? | [`RepairRequest`] | [`RepairAnswer`] |
+//! | how does its execution end? | [`RunRequest`] | [`RunAnswer`] |
+//! | which world do the logs suggest? | [`LearnRequest`] | [`LearnAnswer`] |
 //! | how likely is a plan to succeed? | [`OddsRequest`] | [`OddsAnswer`] |
 
 pub mod check;
@@ -50,27 +50,27 @@ use crate::box_text::BoxTextError;
 use crate::chances::ChanceError;
 use crate::flow::FlowError;
 
-/// Why there is no answer: the request cannot be understood, or is beyond what can be analysed.
+/// A reason for a missing answer: the request cannot be understood, or exceeds the analysis.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RequestError {
-    /// The plan has no order, nothing like that can be left open, or the plan is beyond exact
-    /// analysis.
+    /// The plan has no order, the requested quantities cannot be left open, or the plan is beyond
+    /// exact analysis.
     #[error(transparent)]
     Flow(#[from] FlowError),
-    /// The box asked about is not one of this plan.
+    /// The given box is not one of this plan.
     #[error(transparent)]
     Box(#[from] BoxTextError),
-    /// The judge cannot tell whether the plan is valid: why.
+    /// The validator cannot decide on the plan, for this reason.
     #[error("it is undecided whether the plan is valid: {0}")]
     Undecided(String),
-    /// It cannot be told how likely the durations of the plan stay inside a box.
+    /// The probability that the durations of the plan stay inside a box is unknown.
     #[error(transparent)]
     Chance(#[from] ChanceError),
     /// The time-outs name an action that the problem does not have.
     #[error("{0}")]
     Timeout(String),
-    /// Something in the problem, which this names, is not supported.
+    /// The problem has this unsupported feature.
     #[error("{0}")]
     Unsupported(String),
 }

@@ -4,23 +4,23 @@ use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{DecoupledEnvelope, Parameter, ParameterId, ParameterKind, ParametrizedPlan};
 use elbowroom_text::nearest;
 
-/// The name that stands for every parameter.
+/// The name for every parameter.
 const ALL: &str = "all";
 
-/// Up to this number of parameters, all are listed where a name is unknown; otherwise only a
-/// similar one is suggested.
+/// Largest number of parameters that are all listed if a name is unknown. For more parameters, only
+/// a similar name is suggested.
 const MOST_LISTED: usize = 12;
 
-/// A text is not a box of this plan's parameters.
+/// Errors of a text that is not a box of this plan's parameters.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BoxTextError {
-    /// Something else than a name with an interval.
+    /// An item is not a name with an interval.
     #[error(
         "`{text}` is not an interval: write NAME=[LOWER,UPPER], NAME=VALUE or NAME=±10%, such as \
          dur_0=[1/2,7.5], dur_0=[0,inf] or all=±10%"
     )]
     Syntax {
-        /// The text that was found.
+        /// The text of the item.
         text: String,
     },
     /// No parameter has that name.
@@ -29,17 +29,17 @@ pub enum BoxTextError {
         |near| format!("did you mean `{near}`?"),
     ))]
     Unknown {
-        /// The name given.
+        /// The name.
         name: String,
-        /// The names there are.
+        /// The known names.
         known: String,
-        /// The one that was probably meant.
+        /// The most similar name, if there is one.
         nearest: Option<String>,
     },
-    /// Several parameters could be meant.
+    /// The name is ambiguous.
     #[error("`{name}` could mean {}: write which", choices.join(", "))]
     Ambiguous {
-        /// The name given.
+        /// The name.
         name: String,
         /// The names of those parameters.
         choices: Vec<String>,
@@ -61,14 +61,14 @@ pub enum BoxTextError {
 /// Reads a box: intervals for some of the parameters, separated by spaces. The other parameters
 /// keep their nominal value.
 ///
-/// A parameter is written as its name (`dur_0`), and a duration also as its action,
-/// `(drive rover depot shelf)`, or the action's label (`n0`); `all` is every parameter that is not
-/// named itself. After `=` stands an interval `[5,12]`, one value `12`, or a deviation from the
-/// nominal value, `±10%` or `±2` (`+-` will do for `±`), which ends where the parameter's natural
-/// range does.
+/// A parameter is written as its name (`dur_0`), and a duration also as its action, `(drive rover
+/// depot shelf)`, or the action's label (`n0`). The name `all` applies to every parameter that is
+/// not named itself. The name is followed by `=` and an interval `[5,12]`, one value `12`, or a
+/// deviation from the nominal value, `±10%` or `±2` (`+-` also works for `±`), which is cut to the
+/// parameter's natural range.
 ///
 /// # Errors
-/// When the text is not of that form, or names what is not a parameter of the plan.
+/// When the text is not of that form, or names a parameter that the plan does not have.
 pub fn parse_box(text: &str, plan: &ParametrizedPlan) -> Result<DecoupledEnvelope, BoxTextError> {
     let mut given: Vec<Option<Interval>> = vec![None; plan.parameters.len()];
     let mut of_all = None;
@@ -108,7 +108,7 @@ pub fn parse_box(text: &str, plan: &ParametrizedPlan) -> Result<DecoupledEnvelop
     Ok(envelope)
 }
 
-/// Writes a box as [`parse_box`] reads it, exactly.
+/// Writes a box in the syntax of [`parse_box`], exactly.
 pub fn write_box(envelope: &DecoupledEnvelope, plan: &ParametrizedPlan) -> String {
     let items: Vec<String> = plan
         .parameters
@@ -129,7 +129,7 @@ pub fn write_box(envelope: &DecoupledEnvelope, plan: &ParametrizedPlan) -> Strin
     items.join(" ")
 }
 
-/// Names with what stands after their `=`.
+/// Splits the text into names and the texts after their `=`.
 fn items(text: &str) -> Result<Vec<(String, String)>, BoxTextError> {
     let is_between = |c: char| c.is_whitespace() || matches!(c, ',' | ';');
     let wrong = |text: &str| BoxTextError::Syntax {
@@ -161,9 +161,9 @@ fn items(text: &str) -> Result<Vec<(String, String)>, BoxTextError> {
 /// The value or interval after the `=`.
 enum Value {
     Interval(Interval),
-    /// So far from the nominal value, in both directions.
+    /// The largest distance from the nominal value, in both directions.
     Deviation(Rational),
-    /// The same as a share of it.
+    /// The same as a share of the nominal value.
     Share(Rational),
 }
 
@@ -199,7 +199,7 @@ fn parse_value(text: &str) -> Option<Value> {
 }
 
 impl Value {
-    /// The values of the parameter that are meant.
+    /// Returns the values of the parameter that this describes.
     fn around(&self, parameter: &Parameter) -> Interval {
         let nominal = &parameter.nominal;
         let reach = match self {
@@ -219,7 +219,7 @@ impl Value {
     }
 }
 
-/// The parameter of that name, or the duration of that action.
+/// Returns the parameter with that name, or the duration of that action.
 pub(crate) fn find(name: &str, plan: &ParametrizedPlan) -> Result<ParameterId, BoxTextError> {
     if let Some(id) = plan.find(name) {
         return Ok(id);
@@ -244,7 +244,8 @@ pub(crate) fn find(name: &str, plan: &ParametrizedPlan) -> Result<ParameterId, B
     match found[..] {
         [id] => Ok(id),
         [] => {
-            // Names of parameters are alike, and a few of them are told as well as one of them.
+            // Names of parameters are similar, so a short list of them helps more than a single
+            // suggestion.
             let names = plan.parameters.iter().map(|parameter| &*parameter.name);
             let names = names.filter(|_| plan.parameters.len() > MOST_LISTED);
             let actions = durations.iter().map(|(_, action, _)| *action);

@@ -1,45 +1,45 @@
-//! How the durations of a plan are distributed in a world, for the box in which they most likely stay.
+//! Distributions of the durations of a plan in a world, for the box with the greatest probability.
 
 use elbowroom_num::Rational;
 use elbowroom_num::chance::{Chance, Density};
 use elbowroom_plan::{ParameterKind, ParametrizedPlan};
 use elbowroom_sim::{Distribution, Rule, WorldModel};
 
-/// Why it cannot be said how likely the durations of a plan stay inside a box.
+/// Reasons why the probability that durations stay inside a box is unknown.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChanceError {
-    /// Nothing is known of the world.
+    /// There is no world file.
     #[error(
         "the objective `probability` needs a world file, which says how long actions take; give one, or \
          choose another objective"
     )]
     NoWorld,
-    /// Something that varies is no duration.
+    /// A parameter is no duration.
     #[error(
         "the objective `probability` is about durations, and {0} is none; leave it out of what may \
          deviate, or choose another objective"
     )]
     NoDuration(String),
-    /// The distribution of a duration is beyond what boxes can be proved to be the best for.
+    /// No best box can be proved for the distribution of this duration.
     #[error(
         "the objective `probability` cannot be told for a gamma distribution, which the world has for the \
          duration of {0}; use a normal or lognormal one, measured `values`, or another objective"
     )]
     Gamma(String),
-    /// A number of a distribution is none.
+    /// A parameter of a distribution is not a finite number.
     #[error("the world file has a number for the duration of {0} that is not finite")]
     NoNumber(String),
 }
 
-/// How each parameter of a plan is distributed in a world; `None` for one that always is as planned.
+/// Returns the distribution of each parameter of a plan in a world; `None` for a parameter that is
+/// always as planned.
 ///
-/// Durations are counted as a simulation rounds and cuts them. Whatever else a world does (delays,
-/// failures, events) is not counted.
+/// Durations are rounded and truncated as in a simulation. Other random effects of the world
+/// (delays, failures, events) are ignored.
 ///
 /// # Errors
-/// When a parameter is no duration, or its distribution is none that boxes can be proved to be the best
-/// for.
+/// When a parameter is no duration, or no best box can be proved for its distribution.
 pub fn chances(
     plan: &ParametrizedPlan,
     world: &WorldModel,
@@ -54,10 +54,11 @@ pub fn chances(
     chances.collect()
 }
 
-/// Returns the distribution of the duration of an action in a world; `None` if it is always the planned one.
+/// Returns the distribution of the duration of an action in a world; `None` if it is always the
+/// planned one.
 ///
 /// # Errors
-/// When it is none that boxes can be proved to be the best for.
+/// When no best box can be proved for the distribution.
 pub fn chance(
     action: &str,
     planned: &Rational,
@@ -75,7 +76,8 @@ pub fn chance(
         .map(Some)
 }
 
-/// How a duration is distributed by a rule; `None` if a number of it is not finite.
+/// Returns the distribution of a duration by a rule; `None` if a parameter of the rule is not
+/// finite.
 fn distributed(rule: &Rule, planned: &Rational, resolution: &Rational) -> Option<Chance> {
     let exact = Rational::from_f64_as_written;
     let scale = if rule.is_relative {
@@ -83,7 +85,7 @@ fn distributed(rule: &Rule, planned: &Rational, resolution: &Rational) -> Option
     } else {
         Rational::ONE
     };
-    // An action that is planned to take time takes some.
+    // The duration is positive if the planned one is.
     let floor = planned.min(resolution).clone();
     let cut = |value: Option<f64>| value.map_or(Some(None), |own| Some(Some(exact(own)? * &scale)));
     let (minimum, maximum) = (cut(rule.minimum)?, cut(rule.maximum)?);

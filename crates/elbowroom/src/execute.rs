@@ -1,8 +1,7 @@
-//! Executing plans: the ports of [`execution`](crate::execution), with everything that is there
-//! behind them.
+//! Execution of plans: implementations of the ports of [`execution`](crate::execution).
 //!
-//! [`execute()`] is one call for a plan in one's own world. [`Execution`] puts a run together from
-//! whoever decides, plans, prepares and records.
+//! [`execute()`] executes a plan in a world of the caller with one call. [`Execution`] builds a run
+//! from an executor, a planner, a preparer and a recorder.
 
 mod action_sets;
 mod analyst;

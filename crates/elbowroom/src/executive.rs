@@ -1,9 +1,9 @@
-//! What a lasting run tells those who ask, and takes from those who want something else: the
-//! documents of `elbowroom serve`, `docs/serve.md`.
+//! Interface of an executive to its clients: the documents of `elbowroom serve`, `docs/serve.md`.
 //!
-//! - [`documents`]: questions and answers as types.
-//! - [`Status`]: follows a run by its record, and answers at any moment without asking it.
-//! - [`openapi`]: the interface as an `OpenAPI` document, made from those types.
+//! - [`documents`]: requests and responses as types.
+//! - [`Status`]: follows a run by its record, and answers requests at any time without accessing
+//!   the run.
+//! - [`openapi`]: the interface as an `OpenAPI` document, generated from those types.
 
 pub mod documents;
 mod openapi;

@@ -1,4 +1,4 @@
-//! What the library finds out about a plan, in words.
+//! Descriptions of results about a plan in words.
 
 mod conflict;
 mod control;
@@ -19,58 +19,59 @@ use elbowroom_plan::{
 };
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 
-/// The reason given for an end that nothing limits, although it is finite.
+/// The reason for a finite end without a limit.
 pub const ANY_FINITE: &str = "every greater finite deviation is inside as well, but no times \
     fixed in advance suit all of them";
 
-/// Says in words what was found out about one plan.
+/// Describes results about one plan in words.
 #[derive(Clone, Copy, Debug)]
 pub struct Explainer<'a> {
     pub(crate) task: &'a Task,
     pub(crate) plan: &'a ParametrizedPlan,
 }
 
-/// Why a plan does not work somewhere.
+/// An explanation of a failure of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Explanation {
-    /// What goes wrong, without the numbers of the example: several boxes that fail for one
-    /// reason have the same text here.
+    /// The reason, without the numbers of the example: several boxes that fail for one reason have
+    /// the same text.
     pub reason: String,
-    /// By how much, where that is one number.
+    /// Size of the violation, if it is a single number.
     pub shortfall: Option<Shortfall>,
-    /// Values of the parameters at which it goes wrong.
+    /// Values of the parameters in an example of the failure.
     pub valuation: Valuation,
-    /// A time for each node at which it goes wrong; `None` if there is no schedule at all.
+    /// Times of the nodes in the example; `None` if there is no schedule at all.
     pub schedule: Option<Schedule>,
-    /// The judge's verdict on that schedule.
+    /// The validator's verdict on that schedule.
     pub verdict: Option<String>,
-    /// Where there is a schedule for all values, but none that can be found in time: how the world
-    /// beats an executor that starts everything early, and one that starts everything late.
+    /// If there is a schedule for all values, but no executor can find it in time: strategies of
+    /// the world against an executor that starts everything as early as possible, and against one
+    /// that starts everything as late as possible.
     pub plays: Vec<String>,
 }
 
 impl Explanation {
-    /// Whether only the course of processes and events is known to become another one, with which
-    /// the plan may work as well.
+    /// Returns `true` if the only known problem is that processes and events take another course.
+    /// The plan may also work with it.
     pub(crate) fn may_be_harmless(&self, task: &Task) -> bool {
         let is_accepted = self.schedule.is_some() && self.verdict.is_none();
         is_accepted && !task.autonomous().is_empty()
     }
 }
 
-/// By how much something fails.
+/// Size of a violation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Shortfall {
-    /// Something can happen so much too late.
+    /// A happening can be late by this time.
     Time(Rational),
-    /// Something can happen as late as one likes.
+    /// A happening can be late by any time.
     Boundless,
-    /// A comparison fails by so much.
+    /// A comparison fails by this amount.
     Amount(Rational),
 }
 
 impl Shortfall {
-    /// The number; `None` if there is no limit.
+    /// Returns the number; `None` if there is no limit.
     pub fn value(&self) -> Option<&Rational> {
         match self {
             Self::Time(value) | Self::Amount(value) => Some(value),
@@ -80,12 +81,12 @@ impl Shortfall {
 }
 
 impl<'a> Explainer<'a> {
-    /// Explains what concerns this plan.
+    /// Creates an explainer for this plan.
     pub fn new(task: &'a Task, plan: &'a ParametrizedPlan) -> Self {
         Self { task, plan }
     }
 
-    /// Why a box is not inside the envelope, with an example.
+    /// Explains why a box is not inside the envelope, with an example.
     pub fn objection(
         &self,
         oracle: &Oracle,
@@ -109,7 +110,8 @@ impl<'a> Explainer<'a> {
         }
     }
 
-    /// Why the plan has no schedule at these values. If it has one, the explanation is empty.
+    /// Explains why the plan has no schedule at these values. The explanation is empty if it has
+    /// one.
     pub fn no_schedule(&self, valuation: &Valuation) -> Explanation {
         let conflict = conflict::find(self, valuation);
         Explanation {
@@ -124,13 +126,13 @@ impl<'a> Explainer<'a> {
         }
     }
 
-    /// The reason why an end of a parameter's interval cannot move further; `None` if there is
-    /// none.
+    /// Returns the reason why an end of a parameter's interval cannot move further; `None` if there
+    /// is none.
     pub fn limit(&self, id: ParameterId, side: Side, limit: &Limit) -> Option<String> {
         self.limit_beside((id, side), limit, &mut Seen::default())
     }
 
-    /// The same. What was `seen` of other ends' reasons is not worked out again.
+    /// Does the same, reusing the conflicts in `seen` that were computed for other ends.
     pub(crate) fn limit_beside(
         &self,
         (id, side): (ParameterId, Side),
@@ -160,7 +162,7 @@ impl<'a> Explainer<'a> {
             Requirement::Separation { first, second } => {
                 let mut late = example.clone();
                 let shortfall = self.make_late(&mut late, *first, *second);
-                // The wrong way round may do no harm; too near always does.
+                // The reverse order may be harmless; a distance below ε never is.
                 if self.verdict(&late).is_some() || self.verdict(&example).is_none() {
                     example = late;
                 }
@@ -189,8 +191,8 @@ impl<'a> Explainer<'a> {
         }
     }
 
-    /// Gives the example a schedule in which `first` comes as late as it can, compared with
-    /// `second`; a little after it, if there is no limit.
+    /// Gives the example a schedule where `first` comes as late as possible relative to `second`,
+    /// or 1 later if there is no limit.
     fn make_late(
         &self,
         example: &mut Counterexample,
@@ -212,8 +214,8 @@ impl<'a> Explainer<'a> {
         }))
     }
 
-    /// What the judge says of the plan at these values if all happens as early as possible; `None` as in
-    /// [`verdict`](Self::verdict), and where there is no schedule.
+    /// Returns the validator's objection to the plan at these values with the earliest times.
+    /// `None` as in [`verdict`](Self::verdict), and if there is no schedule.
     pub(crate) fn verdict_at(&self, valuation: Valuation) -> Option<String> {
         let network = self.plan.plan.network(&valuation);
         let network = ConsistentNetwork::try_from(network).ok()?;
@@ -225,8 +227,8 @@ impl<'a> Explainer<'a> {
         })
     }
 
-    /// What the judge says about the example; `None` where it cannot be asked, because something
-    /// else than the plan's own numbers is left open, or if it finds nothing wrong.
+    /// Returns the validator's objection to the example. `None` if it has none, or if it cannot
+    /// check the plan, because a number outside the plan is open.
     fn verdict(&self, example: &Counterexample) -> Option<String> {
         let is_askable = self.plan.parameters.iter().all(|parameter| {
             matches!(
@@ -246,7 +248,7 @@ impl<'a> Explainer<'a> {
         }
     }
 
-    /// A requirement in words.
+    /// Describes a requirement.
     pub fn requirement(&self, requirement: &Requirement) -> String {
         let plan = &self.plan.plan;
         let Requirement::Separation { first, second } = requirement else {
@@ -271,16 +273,16 @@ impl<'a> Explainer<'a> {
         }
     }
 
-    /// The text with the names of parameters, which a task does not know, for their numbers.
+    /// Replaces the numbers of parameters, which a task uses, by their names.
     fn with_names(&self, mut text: String) -> String {
-        // From the last on: `?parameter1` is the beginning of `?parameter10`.
+        // In reverse order, because `?parameter1` is a prefix of `?parameter10`.
         for (index, parameter) in self.plan.parameters.iter().enumerate().rev() {
             text = text.replace(&format!("?parameter{index}"), &parameter.name);
         }
         text
     }
 
-    /// A parameter in plain words: `duration of (drive rover depot shelf)`.
+    /// Describes a parameter: `duration of (drive rover depot shelf)`.
     pub fn quantity(&self, id: ParameterId) -> String {
         match self.plan.parameter(id).kind {
             ParameterKind::Timed(index) => self.timed_quantity(index),
@@ -288,7 +290,7 @@ impl<'a> Explainer<'a> {
         }
     }
 
-    /// Which values a parameter can take at all.
+    /// Describes the limit of a parameter's range.
     fn range(&self, id: ParameterId, side: Side) -> String {
         let parameter = self.plan.parameter(id);
         let end = side.of(&parameter.range).value();
@@ -308,7 +310,7 @@ impl<'a> Explainer<'a> {
         }
     }
 
-    /// Why an action cannot take no time at all.
+    /// Explains why the duration of an action is at least ε.
     fn own_separation(&self) -> String {
         let epsilon = self.task.epsilon().to_decimal(6);
         format!("an action whose start and end interfere takes at least {epsilon}")
@@ -319,7 +321,7 @@ impl<'a> Explainer<'a> {
     }
 }
 
-/// By how much the example breaks a requirement on numbers.
+/// Returns the size of the example's violation of a requirement on numbers.
 fn shortfall(broken: &Broken, example: &Counterexample) -> Option<Shortfall> {
     let [inequality] = broken.case.inequalities.as_slice() else {
         return None;

@@ -1,15 +1,15 @@
-//! What other programs can check: a second witness for what is claimed here.
+//! Exports for other programs, as independent checks of this one.
 //!
-//! - [`stnu`]: the network of a plan whose parameters lie in a box, as an STNU for any checker of
+//! - [`stnu`]: the network of a plan whose parameters lie in a box, as an STNU, for any checker of
 //!   controllability.
-//! - [`box_check`]: whether a plan is guaranteed to work in a box, as SMT-LIB 2: each answer is
-//!   `unsat` exactly if it is.
+//! - [`box_check`]: the check whether a plan is guaranteed to work in a box, as SMT-LIB 2. Each answer
+//!   is `unsat` exactly if it is.
 //! - [`region`]: all values for which a plan works, as SMT-LIB 2.
-//! - [`prism`]: what the best executor can reach, without time and on a clock, as decision
-//!   processes in the language of PRISM.
+//! - [`prism`]: decision processes in the language of PRISM, without time and on a clock. Their
+//!   optimum is the success probability of the best executor.
 //!
-//! Dynamic controllability is a game, which SMT-LIB has no words for: [`box_check`] then says only
-//! that every schedule is valid, and [`stnu`] has the other half.
+//! Dynamic controllability is a game, which SMT-LIB cannot express. For the dynamic guarantee,
+//! [`box_check`] therefore only checks that every schedule is valid; [`stnu`] covers the other half.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -61,23 +61,23 @@ use crate::answers::{EnvelopeAnswer, EnvelopeRequest};
 use crate::flow::FlowError;
 use crate::linear_form::LinearForm;
 
-/// How many places of a moment inside an action are told apart.
+/// Largest number of positions that are distinguished for a moment inside an action.
 const MOST_PLACES: usize = 4_096;
 
-/// What is asked for cannot be written.
+/// Reasons why a document cannot be exported.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// Nothing can be said about schedules that are not there.
+    /// The plan has no schedules to write conditions for.
     #[error(
         "the plan has no schedule at the values of this box that are nearest to the nominal ones, \
          so the box is not inside the envelope, and there are no conditions to write"
     )]
     NoSchedule,
-    /// The plan is beyond writing out.
+    /// The plan is beyond exact analysis.
     #[error("this plan cannot be exported: {0}")]
     Refused(Refusal),
-    /// A bound has to hold for values without limit.
+    /// A bound has to hold for an unbounded parameter.
     #[error(
         "a bound of the plan has to hold whatever the value of {parameter} is, and that has no \
          limit: give its interval an end"
@@ -86,14 +86,14 @@ pub enum ExportError {
         /// The parameter's name.
         parameter: String,
     },
-    /// The box in an answer is one of other parameters.
+    /// The box of the answer has other parameters.
     #[error(
         "the answer is about other parameters than this plan has ({}): give the same domain, \
          problem, plan and --vary as for the answer",
         difference
     )]
     OtherParameters {
-        /// What differs.
+        /// The difference.
         difference: String,
     },
     /// The answer has no box.
@@ -101,18 +101,18 @@ pub enum ExportError {
     NoBox,
 }
 
-/// The plan that a request is about, with what it leaves open.
+/// Returns the plan of a request with its open quantities.
 ///
 /// # Errors
-/// When the judge rejects the plan, or the request names what the plan does not have.
+/// When the validator rejects the plan, or the request names things that the plan does not have.
 pub fn opened(request: &EnvelopeRequest) -> Result<ParametrizedPlan, FlowError> {
     Ok(envelope::opened(request)?.0)
 }
 
-/// The box that an answer is about: the envelope that was found, or the box that was asked about.
+/// Returns the box of an answer: the envelope that was found, or the box that was checked.
 ///
 /// # Errors
-/// When the answer has no box, or one of other parameters.
+/// When the answer has no box, or a box of other parameters.
 pub fn box_of(
     answer: &EnvelopeAnswer,
     plan: &ParametrizedPlan,
@@ -149,12 +149,12 @@ pub fn box_of(
     DecoupledEnvelope::new(plan, intervals.collect()).ok_or(ExportError::NoBox)
 }
 
-/// The network of a plan for whoever relies on a box: what the world decides there are contingent
-/// links, what is never observed holds at its worst. It is the network that the dynamic and the
-/// strong guarantee are about. Time zero is called `Z`.
+/// Returns the network of a plan for an executor that relies on a box. Durations that the world
+/// decides are contingent links; values that are never observed are at their worst. The dynamic and
+/// the strong guarantee refer to this network. Time zero is called `Z`.
 ///
 /// # Errors
-/// When a bound has to hold for values without limit.
+/// When a bound has to hold for an unbounded parameter.
 pub fn stnu(
     task: &Task,
     plan: &ParametrizedPlan,
@@ -175,14 +175,14 @@ pub fn stnu(
     })
 }
 
-/// Whether the plan is guaranteed to work in a box, as SMT-LIB 2, with comments. It asks several
-/// questions, each after a `(reset)`; all are answered `unsat` exactly if the box is inside. With
-/// the dynamic guarantee, that is only so if the network of [`stnu`] is dynamically controllable,
-/// too.
+/// Returns the check whether the plan is guaranteed to work in a box, as SMT-LIB 2, with comments.
+/// It consists of several queries, separated by `(reset)`. The answers are all `unsat` exactly if
+/// the box is inside. For the dynamic guarantee, the network of [`stnu`] must also be dynamically
+/// controllable.
 ///
 /// # Errors
-/// When the plan has no schedule at the values nearest to the nominal ones, or is beyond writing
-/// out.
+/// When the plan has no schedule at the values nearest to the nominal ones, or is beyond exact
+/// analysis.
 pub fn box_check(
     task: &Task,
     plan: &ParametrizedPlan,
@@ -206,12 +206,12 @@ pub fn box_check(
     Ok(written)
 }
 
-/// All values for which the plan has a schedule, and every schedule is valid, as SMT-LIB 2, with
-/// comments: the region of the weak guarantee, as far as happenings keep the order that they have
-/// at the nominal values.
+/// Returns all values for which the plan has a schedule, and every schedule is valid, as SMT-LIB 2,
+/// with comments: the region of the weak guarantee, restricted to the order of happenings at the
+/// nominal values.
 ///
 /// # Errors
-/// When the plan has no schedule at its nominal values, or is beyond writing out.
+/// When the plan has no schedule at its nominal values, or is beyond exact analysis.
 pub fn region(task: &Task, plan: &ParametrizedPlan) -> Result<String, ExportError> {
     let ranges = DecoupledEnvelope::ranges(plan);
     let form = LinearForm::new(task, plan, &ranges, &plan.nominal(), MOST_PLACES);
@@ -226,7 +226,7 @@ fn refused(refusal: Refusal) -> ExportError {
     }
 }
 
-/// The parameter without a limit in a constraint that has to hold whatever its value.
+/// Returns the unbounded parameter of a constraint that has to hold for all its values.
 fn unlimited(
     plan: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,

@@ -1,5 +1,4 @@
-//! From a plan with fixed times to the deviations it survives: the figure in ARCHITECTURE.md,
-//! left to right.
+//! From a plan with fixed times to its envelope: the figure in ARCHITECTURE.md, left to right.
 
 use std::sync::Arc;
 
@@ -18,24 +17,25 @@ use crate::answers::envelope::{Search, envelope};
 use crate::answers::{EnvelopeOutcome, EnvelopeRequest, RequestError, Unwatched};
 use crate::room;
 
-/// The quantities to vary, and the parameters of the search.
+/// The quantities to vary, and the settings of the search.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// What to leave open; all durations that the domain fixes if empty.
+    /// Quantities to leave open; if empty, all durations that the domain fixes.
     pub vary: Vec<VarySpec>,
     /// The guarantee inside the envelope.
     pub guarantee: Guarantee,
     /// The rule that sets the time-out of each action.
     pub timeout: TimeoutRule,
-    /// Parameters of the search for the box.
+    /// Settings of the search for the box.
     pub search: Search,
-    /// The world in which durations are to stay inside most likely, with
-    /// [`Objective::Probability`](elbowroom_envelope::Objective::Probability).
+    /// World whose distributions of durations
+    /// [`Objective::Probability`](elbowroom_envelope::Objective::Probability) uses.
     pub world: Option<Arc<WorldModel>>,
 }
 
 impl Default for Settings {
-    /// All durations that the domain fixes, the dynamic guarantee, and the default search.
+    /// Returns settings with all durations open that the domain fixes, the dynamic guarantee, and
+    /// the default search.
     fn default() -> Self {
         Self {
             vary: Vec::new(),
@@ -47,16 +47,16 @@ impl Default for Settings {
     }
 }
 
-/// A plan that leaves no room to compute with.
+/// Reasons why a plan has no envelope.
 #[derive(Debug, thiserror::Error)]
 pub enum FlowError {
-    /// The judge rejects the plan.
+    /// The validator rejects the plan.
     #[error("the plan is not valid: {0}")]
     Invalid(Box<validate::Violation>),
     /// The plan has no order.
     #[error(transparent)]
     Deorder(#[from] DeorderError),
-    /// Something cannot be left open.
+    /// A quantity cannot be left open.
     #[error(transparent)]
     Parametrize(#[from] ParametrizeError),
     /// The plan is beyond exact analysis.
@@ -64,14 +64,13 @@ pub enum FlowError {
     Refused(#[from] Refusal),
 }
 
-/// From a plan with fixed times to the deviations it survives.
+/// Computes the envelope of a plan with fixed times.
 ///
-/// The same as [`answers::envelope::envelope`](crate::answers::envelope::envelope) with nobody
-/// watching.
+/// Equals [`answers::envelope::envelope`](crate::answers::envelope::envelope) without a watcher.
 ///
 /// # Errors
-/// When `settings.vary` names what the plan does not have, and when the plan is beyond exact
-/// analysis. That the plan does not work is an answer.
+/// When `settings.vary` names things that the plan does not have, and when the plan is beyond exact
+/// analysis. A plan that does not work is an answer, not an error.
 pub fn robust_plan(
     task: &Arc<Task>,
     time_triggered: &TimeTriggeredPlan,
@@ -82,7 +81,7 @@ pub fn robust_plan(
     envelope(&request, &mut Unwatched)
 }
 
-/// The plan with only the orderings and bounds that it needs, and a schedule of it.
+/// Returns the plan with only the orderings and bounds that it needs, and a schedule of it.
 ///
 /// # Errors
 /// When the validator rejects the plan. [`RoundingRule`](crate::RoundingRule) reads plans with
@@ -94,13 +93,12 @@ pub fn free(task: &Task, time_triggered: &TimeTriggeredPlan) -> Result<Deordered
     Ok(deorder(task, time_triggered)?)
 }
 
-/// [`free`], and the quantities left open as by [`open`], also of a plan with processes and events:
-/// all its happenings keep their order then, and the times between them are kept near the plan's
-/// own as far as it takes for processes and events to do in every schedule what they do in the
-/// plan.
+/// Does the same as [`free`] and [`open`], but also for plans with processes and events. All
+/// happenings of such a plan keep their order. The times between them stay close enough to the
+/// plan's own that processes and events take the same course in every schedule.
 ///
 /// # Errors
-/// When the judge rejects the plan, and when `specs` names what the plan does not have.
+/// When the validator rejects the plan, and when `specs` names things that the plan does not have.
 pub(crate) fn free_and_open(
     task: &Task,
     time_triggered: &TimeTriggeredPlan,
@@ -117,9 +115,9 @@ pub(crate) fn free_and_open(
     Ok(room::in_order(task, plan, &nominal))
 }
 
-/// [`free`] for plans whose own times may be out of date, such as the rest of a plan that is
-/// executed late: if the validator rejects them, but accepts other times in the same order, the
-/// schedule has those.
+/// Does the same as [`free`] for plans whose own times may be outdated, such as a remaining plan
+/// that is executed late. If the validator rejects these times, but accepts other times in the same
+/// order, the schedule has those.
 ///
 /// # Errors
 /// When the validator rejects the plan.
@@ -145,12 +143,12 @@ pub fn repaired(task: &Task, time_triggered: &TimeTriggeredPlan) -> Option<TimeT
     Some(plan.scheduled(&nominal))
 }
 
-/// The plan with quantities left open; all durations, if nothing is specified. Where needed,
-/// differences of times are kept near the plan's own so that every schedule works as long as these
-/// quantities keep their nominal values.
+/// Returns the plan with quantities left open; all durations, if nothing is specified. Where
+/// needed, differences of times are kept close enough to the plan's own that every schedule works
+/// as long as these quantities keep their nominal values.
 ///
 /// # Errors
-/// When `specs` names what the plan does not have.
+/// When `specs` names things that the plan does not have.
 pub fn open(
     task: &Task,
     freed: Deordered,
@@ -161,18 +159,18 @@ pub fn open(
     Ok(room::of_deordered(task, plan, &nominal))
 }
 
-/// The plan with nothing left open. Where needed, differences of times are kept near the plan's own
-/// so that every schedule works.
+/// Returns the plan without open quantities. Where needed, differences of times are kept close
+/// enough to the plan's own that every schedule works.
 pub fn closed(task: &Task, freed: Deordered) -> ParametrizedPlan {
     let Deordered { plan, nominal, .. } = freed;
     let plan = ParametrizedPlan::closed(task, plan);
     room::of_deordered(task, plan, &nominal)
 }
 
-/// An STN plan, which may have parameters already, with more left open.
+/// Opens further quantities of an STN plan.
 ///
 /// # Errors
-/// When `specs` names what the plan does not have.
+/// When `specs` names things that the plan does not have.
 pub fn open_more(
     task: &Task,
     plan: ParametrizedPlan,
@@ -182,7 +180,7 @@ pub fn open_more(
         return Ok(plan);
     }
     let network = plan.plan.network(&plan.nominal());
-    // Without a schedule there is no answer either, which will be said with its reason.
+    // The analysis reports the reason for a missing schedule later.
     let Ok(network) = ConsistentNetwork::try_from(network) else {
         return Ok(plan);
     };
@@ -190,7 +188,7 @@ pub fn open_more(
     vary(task, plan, &schedule.into(), specs)
 }
 
-/// The judge's verdict on a plan.
+/// Returns the validator's verdict on a plan.
 pub(crate) fn judge(task: &Task, plan: &TimeTriggeredPlan) -> Verdict {
     validate::validate(task, plan, &validate::Settings::default())
 }

@@ -1,10 +1,10 @@
-//! Plans with constraints, as the checker of certificates reads them: [`given_plan`].
+//! Plans with constraints, in the form of the checker of certificates: [`given_plan`].
 
 use elbowroom_num::End;
 use elbowroom_plan::{Bound, ParametrizedPlan, Reason};
 use elbowroom_verify::{Exact, GivenConstraint, GivenInstance, GivenParameter, GivenPlan, Limit};
 
-/// Returns the instances, the constraints and the parameters of an STN plan file, as written there. The
+/// Returns the instances, the constraints and the parameters of an STN plan file, as written. The
 /// checker derives everything else from them.
 pub fn given_plan(plan: &ParametrizedPlan) -> GivenPlan {
     let limit = |bound: &Bound| match bound {

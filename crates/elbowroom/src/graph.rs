@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use elbowroom_model::Task;
 use elbowroom_plan::{Bound, Constraint, Node, ParametrizedPlan, Reason};
 
-/// The network as a graph for Graphviz: `dot -Tsvg`.
+/// Returns the network as a graph for Graphviz: `dot -Tsvg`.
 ///
-/// One box for each action, with its start and end side by side; arrows are constraints, dashed
-/// where they only say what comes first.
+/// Each action is a box, with its start and end side by side. Arrows are constraints; mere
+/// orderings are dashed.
 pub fn to_dot(task: &Task, plan: &ParametrizedPlan) -> String {
     let network = &plan.plan;
     let mut dot = String::from(
@@ -53,7 +53,7 @@ pub fn to_dot(task: &Task, plan: &ParametrizedPlan) -> String {
     dot
 }
 
-/// Why a constraint is there, in one word.
+/// Returns the reason for a constraint, in one word.
 pub fn reason(reason: &Reason) -> &'static str {
     match reason {
         Reason::Given => "given",
@@ -67,7 +67,7 @@ pub fn reason(reason: &Reason) -> &'static str {
     }
 }
 
-/// `[lower, upper]`, or nothing for a mere order.
+/// Returns `[lower, upper]`, or an empty text for a mere ordering.
 fn label(plan: &ParametrizedPlan, constraint: &Constraint) -> String {
     let bound = |bound: &Bound, infinity: &str| match bound {
         Bound::Infinite => infinity.to_owned(),

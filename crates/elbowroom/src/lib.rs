@@ -204,7 +204,7 @@ pub use plan_file::{AnyPlan, PlanKind};
 pub use plan_text::plan_text;
 pub use rounding::{Accepted, RoundingRule};
 
-/// Longer reading. Its code is compiled and run with the tests.
+/// The tutorial. Its code is compiled and run with the tests.
 pub mod tutorial {
     #[doc = include_str!("../docs/tutorial/01-from-a-plan-to-an-envelope.md")]
     pub mod t01_from_a_plan_to_an_envelope {}

@@ -1,5 +1,5 @@
-//! What every schedule of a plan has to satisfy, as linear inequalities without anything left to
-//! unfold: what pages and other programs are given to check values by.
+//! The conditions on the schedules of a plan as linear inequalities, with over-all conditions
+//! expanded. Pages and other programs use them to check values.
 
 use std::collections::BTreeMap;
 
@@ -22,30 +22,30 @@ use elbowroom_stn::{ConsistentNetwork, Network, Windows};
 /// holds in any of its schedules.
 #[derive(Clone, Debug)]
 pub(crate) struct LinearForm {
-    /// The bounds on differences of times. That nothing happens before time zero is one of them.
+    /// The bounds on differences of times, including that no happening is before time zero.
     pub(crate) network: Vec<NetworkBound>,
-    /// The requirements, with all their bad cases. These may use a moment inside an action: the
-    /// node after the plan's last.
+    /// The requirements, with all their bad cases. These may refer to a moment inside an action:
+    /// the node after the plan's last.
     pub(crate) obligations: Vec<Obligation>,
 }
 
 /// A bound on a difference of times.
 #[derive(Clone, Debug)]
 pub(crate) struct NetworkBound {
-    /// Holds in every schedule.
+    /// An inequality that holds in every schedule.
     pub(crate) inequality: Inequality,
-    /// The plan's constraint that it comes from, by position, and which of its sides; `None` if it
-    /// only says that a node comes at 0 or later.
+    /// The position of the plan's constraint, and its side; `None` if the bound only states that a
+    /// node is not before time 0.
     pub(crate) source: Option<(usize, Side)>,
 }
 
 impl LinearForm {
-    /// That of a plan for the values in `values`, in which happenings come in the order that they
-    /// have at `around`. Of the places that a moment inside an action can have among events, up to
-    /// `most_places` are told apart.
+    /// Computes the form of a plan for the values in `values`. Happenings have the order that they
+    /// have at `around`. At most `most_places` positions of a moment inside an action relative to
+    /// events are distinguished.
     ///
     /// # Errors
-    /// When there is no schedule at `around`, or the plan is beyond writing out.
+    /// When there is no schedule at `around`, or the plan is beyond exact analysis.
     pub(crate) fn new(
         task: &Task,
         plan: &ParametrizedPlan,
@@ -79,7 +79,7 @@ impl LinearForm {
     }
 }
 
-/// A difference of times as an inequality.
+/// Returns a difference of times as an inequality.
 pub(crate) fn inequality(difference: &Difference) -> Inequality {
     let mut expression = Linear::difference(difference.from, difference.to);
     expression.constant = -&difference.bound;
@@ -89,7 +89,7 @@ pub(crate) fn inequality(difference: &Difference) -> Inequality {
     }
 }
 
-/// The plan's own bounds.
+/// Returns the plan's own bounds.
 fn bounds(plan: &ParametrizedPlan) -> Vec<NetworkBound> {
     let nodes = plan.plan.nodes().skip(1);
     let mut bounds: Vec<NetworkBound> = nodes
@@ -112,7 +112,8 @@ fn bounds(plan: &ParametrizedPlan) -> Vec<NetworkBound> {
     bounds
 }
 
-/// One side of a constraint, as what is not above zero; `None` if there is no bound on that side.
+/// Returns one side of a constraint as an expression that is at most zero; `None` if it has no
+/// bound on that side.
 fn bound(constraint: &Constraint, side: Side) -> Option<Linear> {
     let (bound, from, to) = match side {
         Side::Lower => (&constraint.lower, constraint.to, constraint.from),
@@ -131,8 +132,8 @@ fn bound(constraint: &Constraint, side: Side) -> Option<Linear> {
     Some(expression)
 }
 
-/// The ways in which an over-all condition can be broken, for each place that its moment can have
-/// among the events that it depends on.
+/// Returns the violations of an over-all condition, for each possible position of its moment among
+/// the events that it depends on.
 fn unfolded(
     task: &Task,
     plan: &ParametrizedPlan,
@@ -178,7 +179,7 @@ fn unfolded(
     Ok(cases)
 }
 
-/// Which events come first whatever the values.
+/// Orderings of events that hold for all values.
 struct Order(BTreeMap<NodeId, Windows>);
 
 impl Order {
@@ -208,8 +209,8 @@ impl Order {
         latest.is_some_and(|latest| *latest <= Rational::ZERO)
     }
 
-    /// Which of the events can have happened at a moment inside the action, in all ways; whether
-    /// these are no more than `most`.
+    /// Enumerates the sets of events that can have happened at a moment inside the action. Returns
+    /// `false` if there are more than `most`.
     fn cuts(
         &self,
         (over_all, events): (&OverAll, &[NodeId]),
@@ -247,7 +248,7 @@ impl Order {
     }
 }
 
-/// The network with each parameter free within its interval.
+/// Returns the network with each parameter free within its interval.
 pub(crate) fn relaxed(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Network {
     let mut network = Network::with_nodes(plan.plan.nodes.len());
     let zero = network_node(NodeId::ZERO);

@@ -1,13 +1,13 @@
-//! How long a plan takes.
+//! Makespan of plans.
 
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 use elbowroom_plan::{Node, ParametrizedPlan, Valuation, network_node};
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network, NodeId};
 
-/// The end time of the last action if everything starts as early as it can, the parameters have
-/// these values, and actions take as long as they are told to; `None` if the plan has no schedule
-/// then.
+/// Returns the end time of the last action in the earliest schedule with these values of the
+/// parameters; `None` if the plan has no schedule. Durations that the executor chooses are as
+/// planned, if possible.
 pub fn earliest_end(plan: &ParametrizedPlan, valuation: &Valuation) -> Option<Rational> {
     let network = as_told(plan, plan.plan.network(valuation))?;
     let schedule = network.earliest_schedule(NodeId(0));
@@ -18,7 +18,7 @@ pub fn earliest_end(plan: &ParametrizedPlan, valuation: &Valuation) -> Option<Ra
         .max()
 }
 
-/// The end time of the last action.
+/// Returns the end time of the last action.
 pub(crate) fn end(plan: &TimeTriggeredPlan) -> Rational {
     let ends = plan.steps.iter().map(|step| {
         let duration = step.duration.clone().unwrap_or_default();
@@ -27,11 +27,11 @@ pub(crate) fn end(plan: &TimeTriggeredPlan) -> Rational {
     ends.max().unwrap_or_default()
 }
 
-/// The schedules of a plan in which the durations that the executor chooses are as planned, as it
-/// tells actions ([`ParametrizedPlan::told`]), or, if there is none, all; `None` if there is none
-/// at all.
+/// Returns the network of the schedules where the durations that the executor chooses are as
+/// planned ([`ParametrizedPlan::told`]). If there is no such schedule, it is the network of all
+/// schedules; `None` if there are none at all.
 ///
-/// A plan that works for other durations only is guaranteed in the weak sense at most.
+/// A plan that works only for other durations has at most the weak guarantee.
 pub(crate) fn as_told(plan: &ParametrizedPlan, network: Network) -> Option<ConsistentNetwork> {
     let mut told = network.clone();
     for constraint in &plan.plan.constraints {

@@ -1,8 +1,8 @@
-//! Temporal networks from files of the field: what can be promised about them, and how often they
-//! are kept.
+//! Temporal networks from files in the formats of the field: controllability checks and simulated
+//! dispatch.
 //!
-//! [`read()`] reads a file in any known format, [`examine`] answers a [`Request`] about it with an
-//! [`Answer`] that can be written as JSON and read back (`docs/formats/network.md`).
+//! [`read()`] reads a file in any known format. [`examine`] answers a [`Request`] about it with an
+//! [`Answer`], which can be serialized as JSON (`docs/formats/network.md`).
 //!
 //! ```
 //! use elbowroom::network::{Request, Verdict, examine, read};
@@ -33,15 +33,15 @@ pub use answer::{
 pub use elbowroom_network::*;
 pub use simulate::{Durations, Simulation, SimulationError};
 
-/// More branches than that are not looked at for weak controllability, unless one asks for more.
+/// Default limit on branches in the check of weak controllability.
 pub const MOST_BRANCHES: usize = 1 << 12;
 
 /// A request for an analysis of a temporal network.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
-    /// After how many branches the question of weak controllability is given up.
+    /// Limit on branches in the check of weak controllability.
     pub most_branches: usize,
-    /// Runs to make, if any.
+    /// Simulated runs, if any.
     pub simulation: Option<Simulation>,
 }
 
@@ -54,10 +54,10 @@ impl Default for Request {
     }
 }
 
-/// Which promises can be made about a network, why not others, and how often dispatch succeeds.
+/// Checks the controllability of a network, explains failures, and simulates dispatch.
 ///
 /// # Errors
-/// When the network cannot be simulated as asked.
+/// When the network cannot be simulated as requested.
 pub fn examine(file: &NetworkFile, request: &Request) -> Result<Answer, SimulationError> {
     let consistent = reasons::consistent(file);
     let form = file.network.dispatchable();

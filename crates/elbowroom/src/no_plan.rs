@@ -40,7 +40,7 @@ pub struct Effort<'a> {
     goes_on: &'a mut dyn FnMut() -> bool,
 }
 
-/// The effort is used up.
+/// The effort is spent.
 struct Spent;
 
 impl<'a> Effort<'a> {
@@ -93,11 +93,11 @@ pub fn no_plan_certificate_within(
     }
 }
 
-/// Returns times before which these conditions do not hold, whatever happens from the situation; `None` for a condition
-/// that never holds. The verifier has accepted them.
+/// Returns times before which these conditions do not hold, whatever happens from the situation;
+/// `None` for a condition that never holds. The verifier has accepted them.
 ///
 /// # Errors
-/// The reason for which they are not known, in words.
+/// The reason why they are not known, in words.
 pub fn earliest_times(
     task: &Task,
     situation: &Situation,
@@ -128,7 +128,7 @@ pub fn with_any_ends(situation: &Situation) -> Situation {
             let mut end = (*body.end).clone();
             end.condition = Condition::TRUE;
             for effect in &mut end.effects {
-                // A guard that is decided at the start counts as open.
+                // A guard that was evaluated at the start counts as undecided.
                 effect.guard.at_start = Condition::Or(vec![Condition::TRUE]);
             }
             body.end = Arc::new(end);

@@ -1,4 +1,4 @@
-//! The two kinds of plan, and which of them a text is.
+//! The two kinds of plans, and their detection in a text.
 
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_plan::ParametrizedPlan;
@@ -34,10 +34,10 @@ pub enum PlanKind {
 }
 
 impl PlanKind {
-    /// Tells the kind of a plan by its content.
+    /// Detects the kind of a plan by its content.
     ///
-    /// An STN plan file declares action instances (`durative-action instance n0 : …`), which no
-    /// line of a planner's output looks like. A text with neither is a plan with fixed times: the
+    /// An STN plan file declares action instances (`durative-action instance n0 : …`); no line of a
+    /// planner's output has this form. A text without declarations is a plan with fixed times; the
     /// empty plan is one.
     pub fn of_text(text: &str) -> Self {
         let is_declaration = |line: &str| {

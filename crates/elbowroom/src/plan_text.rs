@@ -1,4 +1,4 @@
-//! Plans written for other tools, in decimals.
+//! Plans as text for other tools, in decimals.
 
 use elbowroom_model::validate::{Settings, validate};
 use elbowroom_model::{Task, TimeTriggeredPlan};

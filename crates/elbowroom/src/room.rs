@@ -1,11 +1,11 @@
-//! What must be fixed in a plan for each of its schedules to work, and how little of it.
+//! Bounds that make every schedule of a deordered plan valid, as loose as possible.
 //!
-//! Deordering keeps what facts need. Conditions on numbers may need more: that a pump starts no
-//! later than so long after another one, say. Which differences of times these are is found by
-//! asking the soundness check ([`pin_until_sound`]); they are fixed at what they are in the plan,
-//! which is enough in any case. Then each end of each is moved out, all in turn and together with
-//! the durations that are left open, as long as every schedule works. So neither the pins nor the
-//! durations take all the room that there is.
+//! Deordering keeps the orderings that facts require. Conditions on numbers may require more, for
+//! example that a pump starts within some time after another one. The soundness check finds the
+//! differences of times that matter ([`pin_until_sound`]). They are first fixed to their values in
+//! the plan, which is always sufficient. Then the ends of these pins are moved outwards
+//! alternately, together with those of the open durations, as long as every schedule works. So the
+//! pins and the durations share the slack.
 
 use elbowroom_envelope::linear::Factor;
 use elbowroom_envelope::obligations::Requirement;
@@ -20,7 +20,7 @@ use elbowroom_plan::{
     ParameterKind, ParametrizedPlan, Reason, Schedule, Side, StnPlan,
 };
 
-/// [`sound`] of a plan that was deordered, which may be all that it needs.
+/// Does the same as [`sound`] for a deordered plan, which often needs no further bounds.
 pub(crate) fn of_deordered(
     task: &Task,
     plan: ParametrizedPlan,
@@ -32,11 +32,11 @@ pub(crate) fn of_deordered(
     sound(task, &plan, nominal)
 }
 
-/// The plan with as few differences fixed, and as loosely, as it takes for every nominal schedule
-/// to work. If even fixing all of them does not help, the plan as it is: the box check will say
-/// what is wrong with it.
+/// Returns the plan with as few fixed differences as possible, and with bounds as loose as
+/// possible, such that every nominal schedule works. If fixing all of them is not sufficient, the
+/// box check reports the problem later.
 pub(crate) fn sound(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> ParametrizedPlan {
-    // With too much freedom there are too many cases to tell apart.
+    // Too many open sides would lead to too many cases.
     let is_manageable = most_sides(&plan.plan) <= MOST_SIDES;
     if is_manageable && let Some(found) = pinned(task, plan, nominal) {
         return found;
@@ -52,9 +52,9 @@ pub(crate) fn sound(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) ->
     pinned(task, &all, nominal).unwrap_or(all)
 }
 
-/// The plan of a problem with processes and events, all its happenings in their order, and each as
-/// long after the one before it as in the plan, give or take what leaves every schedule valid. Ends
-/// of actions whose durations are left open just keep the order.
+/// Returns the plan of a problem with processes and events with all its happenings in their order.
+/// Each happening keeps its distance from the one before it, within bounds that keep every schedule
+/// valid. Ends of actions with open durations keep only the order.
 pub(crate) fn in_order(
     task: &Task,
     mut plan: ParametrizedPlan,
@@ -85,7 +85,7 @@ pub(crate) fn in_order(
             pins.push((from, to, distance.clone(), Some(distance)));
         }
     }
-    // What is only an order stays as it is.
+    // Mere orderings come first; they are not loosened.
     pins.sort_by_key(|(_, _, _, upper)| upper.is_some());
     let orders = pins
         .iter()
@@ -103,10 +103,10 @@ pub(crate) fn in_order(
     loosened(task, plan, given + orders, &scale)
 }
 
-/// How many sides of one time point may be left open.
+/// Maximum number of open sides of one time point.
 const MOST_SIDES: usize = 12;
 
-/// The greatest number of sides of one time point.
+/// Returns the greatest number of sides of one time point.
 fn most_sides(plan: &StnPlan) -> usize {
     let mut counts = vec![0_usize; plan.nodes.len()];
     let sides = plan.constraints.iter();
@@ -117,7 +117,8 @@ fn most_sides(plan: &StnPlan) -> usize {
     counts.into_iter().max().unwrap_or(0)
 }
 
-/// The plan with pins, none of them needless, as loose as can be; `None` if nothing can be told.
+/// Returns the plan with pins, without redundant ones, as loose as possible; `None` if the
+/// soundness is undecided.
 fn pinned(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> Option<ParametrizedPlan> {
     let mut free = plan.clone();
     free.plan = without_sides(free.plan).0;
@@ -143,7 +144,7 @@ fn pinned(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> Option<Pa
     (!is_refused).then(|| loosened(task, with_pins(&fixed), given, &scale))
 }
 
-/// The longest duration of an action.
+/// Returns the longest duration of an action.
 fn longest(plan: &StnPlan, nominal: &Schedule) -> Rational {
     let durations = plan.instances.iter().enumerate().map(|(index, _)| {
         let id = InstanceId::from(index);
@@ -152,7 +153,7 @@ fn longest(plan: &StnPlan, nominal: &Schedule) -> Rational {
     durations.max().unwrap_or_default()
 }
 
-/// The time points that a broken obligation is about.
+/// Returns the time points of a violated obligation.
 fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
     let differences = broken.case.differences.iter();
     let mut nodes: Vec<NodeId> = differences
@@ -182,8 +183,7 @@ fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
     nodes
 }
 
-/// The plan with the bounds in its constraints from number `given` on moved out as far as was
-/// found.
+/// Returns the plan with loosened bounds in its constraints from number `given` on.
 fn loosened(
     task: &Task,
     plan: ParametrizedPlan,
@@ -192,7 +192,7 @@ fn loosened(
 ) -> ParametrizedPlan {
     let mut open = plan.clone();
     let mut pins = Vec::new();
-    // How far something may deviate is asked with all that is not left open as it is in the plan.
+    // Closed durations keep their planned values if there are open quantities.
     let stays = |constraint: &Constraint| {
         let node = |id: NodeId| plan.plan.nodes[id.index()];
         let ends = (node(constraint.from), node(constraint.to));
@@ -257,13 +257,13 @@ fn loosened(
     loose
 }
 
-/// The number of boxes looked at before the rest stays as it is.
+/// Maximum number of box checks; after that, bounds keep their values.
 const MOST_CHECKS: usize = 2_000;
 
-/// A box that grows as long as every schedule works.
+/// A box that is widened as long as every schedule works.
 ///
-/// Unlike in an envelope, there need not be a schedule for each value of a pin: that the schedules
-/// with that value work is enough.
+/// Unlike in an envelope, there need not be a schedule for each value of a pin; it is sufficient
+/// that all schedules with that value work.
 struct Growth<'a> {
     sound: SoundBox<'a>,
     plan: &'a ParametrizedPlan,
@@ -271,8 +271,8 @@ struct Growth<'a> {
 }
 
 impl Growth<'_> {
-    /// Moves all ends that are times out, by ever smaller steps, in turn: 500, 200, 100, 50, …
-    /// down to ε, or to a thousandth of `scale` where there are others to share with.
+    /// Moves all ends that are times outwards alternately, by decreasing steps: 500, 200, 100, 50,
+    /// … down to ε, or to a thousandth of `scale` if there are several.
     fn run(&mut self, scale: &Rational, epsilon: &Rational) {
         let ends = self.ends();
         let is_shared = ends.len() > 2;
@@ -280,15 +280,15 @@ impl Growth<'_> {
         let steps = steps(scale, epsilon).into_iter();
         for step in steps.filter(|step| !is_shared || *step >= share) {
             let mut open = ends.clone();
-            // A few steps of one size make the next larger one: that was refused, or nothing stops
-            // this end at all.
+            // Four steps of one size exceed the next larger one, which was refused unless the end
+            // is unlimited.
             for _ in 0..MOST_STEPS {
                 open.retain(|&end| self.moves(end, &step));
             }
         }
     }
 
-    /// Upper and lower ends of everything that is a time between two happenings.
+    /// Returns the lower and upper ends of all parameters that are times between two happenings.
     fn ends(&self) -> Vec<BoxEnd> {
         let is_time = |parameter: &Parameter| {
             matches!(
@@ -322,7 +322,7 @@ impl Growth<'_> {
         self.checks <= MOST_CHECKS && self.sound.try_reach(end, reach).unwrap_or(false)
     }
 
-    /// Takes away the ends of a pin that nothing limits.
+    /// Removes the ends of a pin without a limit.
     fn beyond(&mut self, pin: ParameterId) {
         for side in Side::BOTH {
             let end = BoxEnd {
@@ -334,10 +334,11 @@ impl Growth<'_> {
     }
 }
 
-/// How often an end moves by the same step.
+/// Maximum number of steps of one size for an end.
 const MOST_STEPS: usize = 4;
 
-/// 5, 2 and 1 times each power of ten, from the first below `largest` down to `least`.
+/// Returns 5, 2 and 1 times each power of ten times `least`, from the first value up to `largest`
+/// down to `least`.
 fn steps(largest: &Rational, least: &Rational) -> Vec<Rational> {
     let ten = Rational::from(10);
     let mut unit = least.clone();

@@ -1,13 +1,13 @@
-//! The rule about rounded plans: which differences between a printed plan and a valid one count as
-//! rounding.
+//! The rule about rounded plans: the differences between a printed plan and a valid one that count
+//! as rounding.
 //!
 //! Planners round or truncate the numbers that they print, and the validator tolerates no
 //! difference. So a printed plan is read as a valid plan whose times and durations differ from the
 //! printed numbers by at most one unit of the last printed digit, and by at most 0.001; or by at
-//! most the tolerance that the user gives. Happenings that interfere keep their
-//! printed order. Without such a plan, the numbers of the text are taken as they are, and the
-//! verdict is the validator's. Every command that reads a plan reads it by this rule;
-//! `docs/formats/plan.md` states it for users.
+//! most the tolerance that the user gives. Happenings that interfere keep their printed order.
+//! Without such a plan, the numbers of the text are taken as they are, and the verdict is the
+//! validator's. Every command that reads a plan reads it by this rule; `docs/formats/plan.md`
+//! states it for users.
 
 use elbowroom_envelope::{RepairLimits, RepairRun, repair};
 use elbowroom_model::problem::Comparison;
@@ -35,8 +35,8 @@ const MOST_PROGRAMS: usize = 60;
 /// The rule about rounded plans, with its settings.
 #[derive(Clone, Debug, Default)]
 pub struct RoundingRule {
-    /// The difference allowed to each number. Without it, one unit of the last printed digit, at
-    /// most 0.001. With 0, plans are taken exactly as printed.
+    /// The allowed difference of each number. Without it, one unit of the last printed digit, at
+    /// most 0.001. If 0, plans are used exactly as printed.
     pub tolerance: Option<Rational>,
     /// The rules of the validator.
     pub settings: Settings,
@@ -153,8 +153,8 @@ impl RoundingRule {
             Verdict::Undecided(_) => return None,
             Verdict::Invalid(_) => {}
         }
-        // The durations of the domain mostly restore the order that the plan had before rounding. They do
-        // not if an action starts exactly at the end of another one.
+        // The durations of the domain usually restore the order that the plan had before rounding,
+        // unless an action starts exactly at the end of another one.
         let orders = [
             plan.clone(),
             printed.clone(),
@@ -255,7 +255,7 @@ struct StepWindow {
 }
 
 impl StepWindow {
-    /// Returns `true` if the numbers are those of the text and no others.
+    /// Returns `true` if the numbers are exactly those of the text.
     fn is_exact(&self) -> bool {
         let is_point = |interval: &Interval| interval.lower == interval.upper;
         is_point(&self.start) && self.duration.as_ref().is_none_or(is_point)
@@ -396,7 +396,7 @@ fn within(from: NodeId, to: NodeId, window: &Interval) -> Constraint {
     }
 }
 
-/// The plan with the times of a schedule of its network.
+/// Returns the plan with the times of a schedule of its network.
 fn at_times(
     plan: &TimeTriggeredPlan,
     network: &StnPlan,
@@ -414,13 +414,14 @@ fn at_times(
     plan
 }
 
-/// The number between two limits that is nearest to a value.
+/// Returns the number between two limits that is nearest to a value.
 fn clamped(value: &Rational, least: Option<&Rational>, most: Option<&Rational>) -> Rational {
     let value = least.map_or(value, |least| value.max(least));
     most.map_or(value, |most| value.min(most)).clone()
 }
 
-/// Returns the warning that an action overlaps itself, in the numbers as printed and as they are taken.
+/// Returns the warning that an action overlaps itself, in the printed numbers and in those that are
+/// used.
 fn self_overlap(
     source: &Source,
     printed: &PrintedPlan,

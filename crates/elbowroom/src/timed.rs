@@ -1,51 +1,51 @@
-//! The yardstick on a clock: how likely the best of all executors is to reach the goal in a world
-//! of which everything is known but what will happen.
+//! Bounds on the success probability of the best executor without foresight, in a world on a clock
+//! with known distributions.
 //!
-//! The world is a semi-Markov decision process. Its state is the truth of all facts, the actions
-//! under way with the time since each began, what has happened by itself, and the clock. The agent
-//! sees the state, and may at any moment start an action whose condition holds, cancel one that is
-//! under way, or wait. What it does not see is the future: how long an action will take, whether it
-//! fails and what it then leaves behind, when something happens by itself, are drawn from the world
-//! file's distributions, given what has been seen so far. It succeeds as soon as the goal holds. Any action of the problem is
-//! available at any time, and deciding takes no time, so no executor, however it plans, does
-//! better.
+//! The world is a semi-Markov decision process. Its state consists of the truth of all facts, the
+//! running actions with their elapsed times, the past events, and the clock. The agent observes the
+//! state. At any time it may start an action whose condition holds, cancel a running action, or
+//! wait. It does not observe the future: the duration of an action, its failure and the failure's
+//! outcome, and the times of events are drawn from the world file's distributions, conditioned on
+//! the observations. It succeeds as soon as the goal holds. All actions of the problem are
+//! available at any time, and deciding takes no time, so no executor succeeds more often, whatever
+//! its planner.
 //!
-//! **Numbers.** Of a number that actions change the state knows between which values it lies
-//! (`numbers`). A comparison counts as one more fact: from above it holds if some of the values meet it,
-//! from below if all do. What is drawn is cut where that decides a comparison.
+//! **Numbers.** For a number that actions change, the state contains an interval of its values
+//! (`numbers`). A comparison is an additional fact. In the upper bound it holds if some of the
+//! values satisfy it, in the lower bound if all do. Drawn values are divided into intervals where
+//! they decide a comparison.
 //!
-//! What the process leaves out: interfering happenings may be as close as one likes (ε is nothing),
-//! and happenings that coincide take place one after the other. Whether an action has broken down and
-//! can no longer be cancelled is not seen either: the bound from below never cancels one of which that
-//! may be so, and the goal counts when it is over; the one from above always can. A start that fails
-//! costs no time and can be tried again at once.
+//! The process ignores ε: interfering happenings may be arbitrarily close, and simultaneous
+//! happenings take place one after the other. The agent also does not observe whether an action has
+//! already failed and can no longer be cancelled. The lower bound never cancels an action that may
+//! be in this state, and counts the goal when the action is over; the upper bound can always
+//! cancel. A start that fails costs no time and can be retried at once.
 //!
 //! **Bounds.** The best value is bounded from both sides on a grid of time: cells of one length.
 //!
-//! - *Above*, `Side::Above`: the agent is told at the beginning of a cell what will end or happen
-//!   in it, and chooses the order within the cell. What began in cell c and takes n whole cells and
-//!   something ends in cell c + n or in the next one; the agent chooses that, too. An agent in the
-//!   real world that knows less can be imitated step by step, with the remainders drawn at random,
-//!   so this is at least as good as the best.
-//! - *Below*, `Side::Below`: the agent decides only at the boundaries of cells, and what happens
-//!   between them happens in the order that is worst for it. That is a way to act in the real
-//!   world, so the best is at least as good.
+//! - *Above*, `Side::Above`: at the beginning of a cell, the agent learns which actions end and
+//!   which events happen in it, and chooses their order within the cell. An action that starts in
+//!   cell c and takes between n and n + 1 cells ends in cell c + n or in the next one; the agent
+//!   also chooses between these. This agent can imitate any agent of the real process step by step,
+//!   with the remainders drawn at random, so its value is at least the best.
+//! - *Below*, `Side::Below`: the agent decides only at the boundaries of cells, and the happenings
+//!   between them have the worst order. This is a policy of the real process, so its value is at
+//!   most the best.
 //!
-//! Neither takes for granted that being earlier never hurts. Where it does not (no condition asks
-//! for something to be false), fewer cases are looked at.
+//! Neither assumes that it is never harmful to be earlier. If it is never harmful (no condition
+//! requires a fact to be false), fewer cases are examined.
 //!
-//! Where everything happens at known times, if it happens, there is no grid: states are only where something
-//! happens or gets ready to (`moments`).
+//! If everything happens at known times, there is no grid: states exist only when something happens
+//! or becomes ready to happen (`moments`).
 //!
-//! Where plans are known, the value is bounded from below by whoever keeps to the actions of one of them
-//! and acts only when something has happened, too (`within`): that takes far fewer states.
+//! If plans are known, a further lower bound is that of an agent that uses only the actions of one
+//! of them and acts only after a happening (`within`). It needs far fewer states.
 //!
-//! The cells are halved until the bounds are close enough, or there are too many states. Where more
-//! facts are never worse, the bound from above is then taken on finer grids of a *kinder* world
-//! (`kinder`): one in which what may happen at one time or another, and does nothing but harm,
-//! never happens. It has fewer states, and whoever succeeds in the real world does so in it.
-//! Probabilities are floating-point numbers; the bounds are widened by 1e-9, far more than rounding
-//! adds up to.
+//! The cells are halved until the bounds are close enough, or there are too many states. If more
+//! facts are never harmful, the upper bound is then computed on finer grids of a *kinder* world
+//! (`kinder`), without events at random times that only delete facts. It has fewer states, and
+//! every agent succeeds in it at least as often. Probabilities are floating-point numbers; the
+//! bounds are widened by 1e-9, which is far more than the rounding errors.
 
 mod above;
 mod act;
@@ -77,29 +77,30 @@ pub use sets::supported;
 pub use within::Within;
 pub(crate) use world::{Facts, TimedWorld};
 
-/// How far to go.
+/// Limits of the computation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// The bounds are close enough when they are so far apart.
+    /// The difference of the bounds at which the computation stops.
     pub gap: f64,
-    /// No grid is finished on which there are more states than this, all cells together.
+    /// Maximum number of states of a grid, all cells together.
     pub most_states: usize,
-    /// How many cells the first grid has.
+    /// Number of cells of the first grid.
     pub first_cells: usize,
-    /// When a run ends at the latest; `None`: when nothing more happens by itself.
+    /// Latest end of a run; `None` for the time of the last event.
     pub horizon: Option<Rational>,
-    /// The only actions that are available, `(name object …)`; `None`: all that there are.
+    /// The available actions, `(name object …)`; `None` for all.
     pub only: Option<Vec<String>>,
-    /// Sets of actions, such as those of plans: whoever does nothing but these is no better than the
-    /// best, but is easier to reckon with.
+    /// Sets of actions, such as those of plans. An agent that uses only one of these sets is no
+    /// better than the best, but its bound needs fewer states.
     pub plans: Vec<Vec<String>>,
-    /// Further sets of actions: those of plans for when one of the [plans](Self::plans) has failed, with what they
-    /// need of it ([`supported`]). They are only looked at where everything happens at known times, after the plans.
+    /// Further sets of actions: those of new plans after a failure of one of the
+    /// [plans](Self::plans), with the supporting actions of that plan ([`supported`]). They are
+    /// used only if everything happens at known times, after the plans.
     pub fallbacks: Vec<Vec<String>>,
 }
 
 impl Default for Settings {
-    /// A percentage point, and some seconds.
+    /// A difference of one percentage point; some seconds.
     fn default() -> Self {
         Self {
             gap: 0.01,
@@ -113,7 +114,7 @@ impl Default for Settings {
     }
 }
 
-/// Why no finer grid was tried.
+/// Reasons for the end of the refinement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stop {
@@ -121,54 +122,54 @@ pub enum Stop {
     Close,
     /// The next grid has too many states.
     TooManyStates,
-    /// Whoever asked wants no more.
+    /// The caller stopped it.
     Interrupted,
 }
 
-/// What the best of all executors can reach.
+/// Bounds on the success probability of the best executor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimedOptimum {
-    /// It succeeds at least with this probability.
+    /// The lower bound.
     pub lower: f64,
-    /// And at most with this one.
+    /// The upper bound.
     pub upper: f64,
-    /// Each grid that was finished, coarse ones first.
+    /// The finished grids, coarse ones first.
     pub grids: Vec<Grid>,
-    /// Why no finer grid was tried.
+    /// Reason for the end of the refinement.
     pub stop: Stop,
-    /// By whom the bound from below is reached, if not by whoever acts at the boundaries of the finest
+    /// The set of actions behind the lower bound; `None` if the lower bound is that of the finest
     /// grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub within: Option<Within>,
 }
 
-/// What one grid says.
+/// The bounds of one grid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
     /// The length of a cell, in seconds.
     pub step: f64,
-    /// The bound from below.
+    /// The lower bound.
     pub lower: f64,
-    /// The bound from above.
+    /// The upper bound.
     pub upper: f64,
-    /// How many states there were at the beginnings of cells, for both bounds.
+    /// Number of states at the beginnings of cells, for both bounds together.
     pub states: usize,
 }
 
-/// From where the best value is approached.
+/// Direction of a bound on the best value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// A bound from below.
+    /// A lower bound.
     Below,
-    /// A bound from above.
+    /// An upper bound.
     Above,
 }
 
-/// The world is not one for which there is a timed optimum here.
+/// The task or the world has features without a timed optimum.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}; the optimum without foresight is only calculated without that")]
 pub struct NotTabulated {
-    /// What there is.
+    /// The unsupported feature.
     pub what: String,
 }
 
@@ -178,12 +179,13 @@ impl NotTabulated {
     }
 }
 
-/// Bounds for what the best executor without foresight reaches in a world.
+/// Bounds the success probability of the best executor without foresight.
 ///
-/// `goes_on` is asked now and then; what has been found until it says no is the answer.
+/// `goes_on` is called regularly; if it returns `false`, the answer contains the bounds found so
+/// far.
 ///
 /// # Errors
-/// When there is something in the task or in the world that the process does not know.
+/// When the task or the world has a feature that the process does not support.
 pub fn optimum(
     task: &Task,
     model: &WorldModel,
@@ -215,7 +217,7 @@ pub fn optimum(
             return Ok(known);
         }
         if found.is_bounded() {
-            // What is left between the bounds is not due to a grid.
+            // A finer grid would not reduce the remaining difference.
             known.stop = Stop::TooManyStates;
             known.within = search.best.filter(|best| best.lower >= known.lower);
             return Ok(known);
@@ -241,24 +243,24 @@ pub fn optimum(
     Ok(found)
 }
 
-/// Whether the process knows all that there is in a task and in a world, and everything happens at known times, if it
-/// happens.
+/// Returns `true` if the process supports all features of the task and of the world, and happenings
+/// take place only at known times.
 pub fn happens_at_known_times(task: &Task, model: &WorldModel) -> bool {
     let world = TimedWorld::new(task, model, &Settings::default());
     world.is_ok_and(|world| moments::cells(&world).is_some())
 }
 
-/// Whether the process knows all that there is in a task and in a world.
+/// Returns `true` if the process supports all features of the task and of the world.
 pub fn knows(task: &Task, model: &WorldModel, settings: &Settings) -> bool {
     TimedWorld::new(task, model, settings).is_ok()
 }
 
-/// Of the states that there may be, those that act within certain actions may have one in so many before
-/// the whole process is looked at.
+/// The lower bounds from sets of actions first get the maximum number of states divided by this,
+/// before the whole process is examined.
 const QUICK_SHARE: usize = 16;
 
 impl TimedOptimum {
-    /// What is known without any grid.
+    /// Returns the trivial bounds.
     fn unknown() -> Self {
         Self {
             lower: 0.0,
@@ -270,7 +272,8 @@ impl TimedOptimum {
     }
 }
 
-/// Finer and finer grids of a world, of which that is known. `is_promising` is asked after each whether to go on.
+/// Improves the bounds `known` on finer and finer grids. `is_promising` is called after each grid
+/// to decide whether the refinement continues.
 fn refined(
     world: &TimedWorld,
     known: TimedOptimum,
@@ -303,23 +306,24 @@ fn refined(
     }
 }
 
-/// Rounding errors stay far below this.
+/// Widening of the bounds, far above rounding errors.
 const SLACK: f64 = 1e-9;
 
-/// The length of a cell, in seconds.
+/// Returns the length of a cell, in seconds.
 fn step(world: &TimedWorld, cells: usize) -> f64 {
     #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
     let cells = cells as f64;
     world.horizon / cells
 }
 
-/// In which of so many cells what happens does, as a bound sees it; `cells` is below 65,534.
+/// Returns the probabilities of happenings in each of `cells` cells, for a bound; `cells` is below
+/// 65,534.
 pub(crate) fn chances(
     world: &TimedWorld,
     cells: usize,
     side: Side,
 ) -> Result<Chances, NotTabulated> {
-    // What happens at the horizon itself begins a cell, seen from above.
+    // In the upper bound, a happening at the horizon belongs to a further cell.
     let all = cells + usize::from(side == Side::Above);
     Chances::new(world, step(world, cells), all, side)
 }
@@ -334,7 +338,7 @@ fn grid(
         return Ok(Err(Stop::TooManyStates));
     }
     let mut left = settings.most_states;
-    // That from below first: where there are too many states, it is sooner known.
+    // The lower bound first, because it detects sooner that there are too many states.
     let lower = match bound(world, (cells, Side::Below), &mut left, goes_on)? {
         Ok(value) => value,
         Err(why) => return Ok(Err(why)),
@@ -351,7 +355,7 @@ fn grid(
     }))
 }
 
-/// A bound on one grid. `left` is how many states there may still be.
+/// Computes a bound on one grid. `left` is the remaining number of states.
 fn bound(
     world: &TimedWorld,
     (cells, side): (usize, Side),

@@ -1,4 +1,4 @@
-//! Is a plan valid?
+//! Validation of plans.
 
 mod goals;
 
@@ -15,7 +15,7 @@ pub use goals::GoalReached;
 
 use super::{Exact, RequestError, Version, ViolationAnswer, exact};
 
-/// Asks whether a plan is valid, or, without a plan, what a problem consists of.
+/// Requests the validation of a plan, or, without a plan, a summary of a problem.
 #[derive(Clone, Debug)]
 pub struct CheckRequest<'a> {
     /// The problem.
@@ -24,7 +24,7 @@ pub struct CheckRequest<'a> {
     pub plan: Option<&'a TimeTriggeredPlan>,
     /// The name of the plan in the answer, such as its file.
     pub name: String,
-    /// By which rules.
+    /// The validator's settings.
     pub settings: Settings,
 }
 
@@ -38,10 +38,10 @@ pub enum CheckAnswer {
     Problem(ProblemRead),
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CheckFormat {
-    /// The only one.
+    /// The name `elbowroom-check`.
     #[default]
     #[serde(rename = "elbowroom-check")]
     Check,
@@ -50,9 +50,9 @@ pub enum CheckFormat {
 /// The validator's report on a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanChecked {
-    /// Always the same.
+    /// Format of the document.
     pub format: CheckFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The name of the plan, as the request gives it.
     pub plan: String,
@@ -69,7 +69,7 @@ pub struct PlanChecked {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "lowercase")]
 pub enum CheckFinding {
-    /// It is.
+    /// The plan is valid.
     Valid {
         /// The time of the last happening of the plan's actions.
         #[serde(with = "exact")]
@@ -83,16 +83,16 @@ pub enum CheckFinding {
         metric: Option<Rational>,
         /// The value of each numeric fluent at the end.
         values: Vec<FluentValue>,
-        /// How close each comparison came to failing.
+        /// Margins of the comparisons.
         margins: Vec<MarginAnswer>,
-        /// The parts of the goal, in the order in which the plan reaches them.
+        /// The parts of the goal, by the time at which the plan reaches them.
         #[serde(default)]
         goals: Vec<GoalReached>,
         /// The preferences that are violated, or may be.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         preferences: Vec<PreferenceAnswer>,
     },
-    /// It is not.
+    /// The plan is not valid.
     Invalid {
         /// The violation.
         violation: ViolationAnswer,
@@ -104,9 +104,9 @@ pub enum CheckFinding {
 pub struct PreferenceAnswer {
     /// Its name.
     pub name: String,
-    /// How many instances of it are violated; `None` if that cannot be decided.
+    /// Number of its instances that are violated; `None` if that cannot be decided.
     pub violations: Option<usize>,
-    /// The violations, or why they cannot be told.
+    /// The violations, or the reasons why they are unknown.
     pub why: Vec<String>,
 }
 
@@ -117,12 +117,12 @@ pub struct FluentValue {
     pub fluent: String,
     /// Its value.
     pub value: Exact,
-    /// Whether an action of the plan changes it. Not in the document.
+    /// `true` if an action of the plan changes it. Not in the document.
     #[serde(skip)]
     pub is_changed: bool,
 }
 
-/// The margin by which a comparison holds.
+/// Margin of a comparison that holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MarginAnswer {
     /// The comparison.
@@ -131,13 +131,13 @@ pub struct MarginAnswer {
     pub when: String,
     /// The action that needs it; `None` for the goal.
     pub action: Option<String>,
-    /// How close it came.
+    /// Difference of the two sides at the tightest time.
     #[serde(with = "exact")]
     pub margin: Rational,
-    /// The tightest moment.
+    /// The time at which the margin is smallest.
     #[serde(with = "exact")]
     pub time: Rational,
-    /// Whether a margin of 0 would be a violation.
+    /// `true` if a margin of 0 would be a violation.
     #[serde(rename = "strict")]
     pub is_strict: bool,
 }
@@ -145,11 +145,11 @@ pub struct MarginAnswer {
 /// A summary of a problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProblemRead {
-    /// Always the same.
+    /// Format of the document.
     pub format: CheckFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
-    /// Always the same.
+    /// The result.
     pub answer: Readable,
     /// The domain's name.
     pub domain: String,
@@ -157,19 +157,19 @@ pub struct ProblemRead {
     pub problem: String,
 }
 
-/// The only answer about a problem that has been read.
+/// The result for a problem without a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Readable {
-    /// It can be read.
+    /// The problem is readable.
     #[default]
     Readable,
 }
 
-/// Has the judge decide about a plan.
+/// Validates a plan.
 ///
 /// # Errors
-/// When the judge cannot tell.
+/// When the validator cannot decide whether the plan is valid.
 pub fn check(request: &CheckRequest<'_>) -> Result<CheckAnswer, RequestError> {
     let task = request.task;
     let (domain, problem) = (task.problem().domain.clone(), task.problem().name.clone());
@@ -240,7 +240,7 @@ fn preferences(task: &Task, found: &Preferences) -> Vec<PreferenceAnswer> {
         .collect()
 }
 
-/// A time in words.
+/// Formats a time.
 fn nearest(time: &Rational) -> String {
     time.to_decimal(3)
 }
@@ -256,7 +256,7 @@ fn margin(margin: &Margin) -> MarginAnswer {
     }
 }
 
-/// The fluents that the plan's actions change.
+/// Returns the fluents that the plan's actions change.
 fn changed(task: &Task, plan: &TimeTriggeredPlan) -> BTreeSet<FluentId> {
     let steps = plan.steps.iter();
     steps

@@ -1,4 +1,4 @@
-//! How far may each quantity of a plan deviate?
+//! Envelopes: how far each quantity of a plan may deviate.
 
 mod answer;
 mod balance;
@@ -48,7 +48,7 @@ pub(crate) use timeouts::{PlannedBeyond, unknown_action};
 pub(crate) use told::quantities;
 pub use worth::{Relax, Worth};
 
-/// Asks for the envelope of a plan, or whether a box lies inside it.
+/// Requests the envelope of a plan, or checks whether a box lies inside it.
 #[derive(Clone, Debug)]
 pub struct EnvelopeRequest {
     /// The problem.
@@ -57,25 +57,24 @@ pub struct EnvelopeRequest {
     pub plan: AnyPlan,
     /// The name of the plan in the answer, such as its file.
     pub name: String,
-    /// What to leave open; all durations that the domain fixes if empty. An STN plan may leave
-    /// something open itself.
+    /// Quantities to leave open; if empty, all durations that the domain fixes. An STN plan may
+    /// leave some open itself.
     pub vary: Vec<VarySpec>,
     /// The guarantee inside the envelope.
     pub guarantee: Guarantee,
-    /// Whether the dispatcher is to keep to obligations that are bounds on differences of times
+    /// `true` if the dispatcher enforces the obligations that are bounds on differences of times
     /// ([`elbowroom_envelope::enforced`]).
     pub enforce: bool,
     /// The rule that sets the time-out of each action. The plan works as long as each quantity
-    /// stays inside its interval *and* each action ends before its time-out; a box to ask about must not
-    /// reach beyond.
+    /// stays inside its interval *and* each action ends before its time-out. A box to check must
+    /// not exceed the time-outs.
     pub timeout: TimeoutRule,
-    /// Whether this box lies inside the envelope: `d0=[5,30] d1=[10,20]`, as [`parse_box`] reads
-    /// it. If there is none, a large box inside it is searched for.
+    /// A box to check, in the syntax of [`parse_box`]: `d0=[5,30] d1=[10,20]`. Without one, the
+    /// request searches for a large box inside the envelope.
     pub contains: Option<String>,
-    /// How to search.
+    /// Settings of the search.
     pub search: Search,
-    /// The world in which durations are to stay inside most likely, with
-    /// [`Objective::Probability`].
+    /// World whose distributions of durations [`Objective::Probability`] uses.
     pub world: Option<Arc<WorldModel>>,
 }
 
@@ -83,7 +82,7 @@ pub struct EnvelopeRequest {
 /// ([`divide_after`](elbowroom_envelope::Settings::divide_after)). Plans of a thousand actions hardly reach it.
 const DIVIDE_AFTER: usize = 50_000;
 
-/// IRR is asked for, and an objective, which only the largest box has.
+/// IRR was requested with an objective, which only the largest box has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("IRR has no objective")]
 pub struct IrrHasNoObjective;
@@ -105,28 +104,29 @@ pub fn objective_of(
     }
 }
 
-/// Parameters of the search for an envelope.
+/// Settings of the search for an envelope.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Search {
     /// The algorithm; by default the one that [`method_for`](Self::method_for) returns.
     pub method: Option<Method>,
-    /// The search ends when all steps are below this; positive.
+    /// Step size below which the search ends; positive.
     pub precision: Rational,
-    /// If there is one, the precision of each parameter is this share of its nominal value instead.
+    /// Alternative to `precision`: the precision of each parameter as a share of its nominal value.
     pub relative: Option<Rational>,
-    /// How steps change after a success.
+    /// Change of step sizes after a success.
     pub growth: Growth,
-    /// Whether each end is moved onto its limit when the search has ended.
+    /// `true` if each end is moved onto its limit after the search.
     pub sharpen: bool,
-    /// The search ends after that many box checks.
+    /// Maximum number of box checks.
     pub most_checks: Option<usize>,
-    /// Which box is wanted, with [`Method::Best`].
+    /// Settings of [`Method::Best`].
     pub best: BestSettings,
 }
 
 impl Default for Search {
-    /// The box with the greatest least slack, found by a search that begins with IRR: precision a hundredth of
-    /// each nominal value, doubling steps, no sharpening and no limit.
+    /// Returns the settings of the search for the box with the greatest least slack. The search
+    /// begins with IRR: precision a hundredth of each nominal value, doubling steps, no sharpening
+    /// and no limit.
     fn default() -> Self {
         let settings = elbowroom_envelope::Settings::default();
         Self {
@@ -142,7 +142,7 @@ impl Default for Search {
 }
 
 impl Search {
-    /// The search for the largest box by this objective.
+    /// Returns the settings of the search for the largest box by this objective.
     pub fn best(objective: Objective) -> Self {
         let mut search = Self {
             method: Some(Method::Best),
@@ -152,7 +152,7 @@ impl Search {
         search
     }
 
-    /// IRR, the algorithm of paper 1.
+    /// Returns the settings of IRR, the algorithm of paper 1.
     pub fn irr() -> Self {
         Self {
             method: Some(Method::Irr),
@@ -160,7 +160,7 @@ impl Search {
         }
     }
 
-    /// The same with this precision for all parameters, in the unit of the plan.
+    /// Sets this precision for all parameters, in the unit of the plan.
     #[must_use]
     pub fn with_precision(mut self, precision: Rational) -> Self {
         self.precision = precision;
@@ -168,9 +168,9 @@ impl Search {
         self
     }
 
-    /// The method for the plans of a problem. If none is asked for, it is IRR where the search is to have a
-    /// precision, steps that do not double, or sharpened ends, which only IRR has, and for problems with
-    /// processes or events, for whose boxes nothing can be proved; otherwise the largest box is searched for.
+    /// Returns the method for the plans of a problem. The default is the largest box. It is IRR if
+    /// the settings have a precision, steps that do not double, or sharpened ends, which only IRR
+    /// supports, and for problems with processes or events, for whose boxes nothing can be proved.
     pub fn method_for(&self, task: &Task) -> Method {
         if let Some(method) = self.method {
             return method;
@@ -187,7 +187,7 @@ impl Search {
         }
     }
 
-    /// The settings of IRR.
+    /// Returns the settings of IRR.
     pub fn settings(&self) -> elbowroom_envelope::Settings {
         elbowroom_envelope::Settings {
             precision: self.precision.clone(),
@@ -199,22 +199,22 @@ impl Search {
     }
 }
 
-/// The answer, and what it is about.
+/// The answer, with the plan and the box that it is about.
 #[derive(Clone, Debug)]
 pub struct EnvelopeOutcome {
     /// The answer as a document.
     pub answer: EnvelopeAnswer,
-    /// The plan with what is left open; `None` if the judge rejects the plan as it stands.
+    /// The plan with its open quantities; `None` if the validator rejects the plan as it is.
     pub plan: Option<Arc<ParametrizedPlan>>,
-    /// The box that the plan is guaranteed to work in; `None` if there is none, or if the question
-    /// was another one.
+    /// The box inside the envelope; `None` if there is none, or if the request had another aim.
     pub envelope: Option<DecoupledEnvelope>,
-    /// Why the plan fails as planned, or in the box asked about.
+    /// The reason why the plan fails as planned, or in the given box.
     pub why_not: Option<Explanation>,
 }
 
 impl EnvelopeRequest {
-    /// The envelope of a plan, all durations open that the domain fixes, with the default search.
+    /// Requests the envelope of a plan with the default search. All durations are open that the
+    /// domain fixes.
     pub fn new(task: &Arc<Task>, plan: impl Into<AnyPlan>) -> Self {
         Self {
             task: Arc::clone(task),
@@ -235,7 +235,7 @@ impl EnvelopeRequest {
         self.search.method_for(&self.task)
     }
 
-    /// The same with what these settings say.
+    /// Replaces the open quantities and the guarantee by those of `settings`.
     #[must_use]
     pub fn with_settings(mut self, settings: &flow::Settings) -> Self {
         self.vary.clone_from(&settings.vary);
@@ -247,13 +247,13 @@ impl EnvelopeRequest {
     }
 }
 
-/// Finds out how far each quantity may deviate, or whether a box lies inside the envelope.
+/// Computes how far each quantity may deviate, or checks whether a box lies inside the envelope.
 ///
-/// That the plan does not work is an answer, and so is what was found until the watcher wanted no
-/// more.
+/// A plan that does not work is an answer, not an error. If the watcher ends the search, the answer
+/// is the box found so far.
 ///
 /// # Errors
-/// When the request names what the plan does not have, or the plan is beyond exact analysis.
+/// When the request names things that the plan does not have, or the plan is beyond exact analysis.
 pub fn envelope(
     request: &EnvelopeRequest,
     watcher: &mut dyn Watcher,
@@ -310,9 +310,8 @@ pub fn envelope(
     }
 }
 
-/// What had been found when somebody could wait no longer, for those who have no time to hear what
-/// limits it: the box so far, of a plan and after so many checks and seconds, as a watcher was told
-/// it last.
+/// Builds the answer of an interrupted search from its last progress report: plan, box and number
+/// of checks. Unlike [`envelope`], it does not compute the limits of the ends, which takes time.
 pub fn so_far(
     request: &EnvelopeRequest,
     found: Option<(&Arc<ParametrizedPlan>, &DecoupledEnvelope, usize)>,
@@ -354,12 +353,12 @@ pub fn so_far(
     outcome
 }
 
-/// The plan that a request is about, with what it leaves open, and how many bounds were added for
-/// the dispatcher to keep to.
+/// Returns the plan of a request with its open quantities, and the number of bounds added for the
+/// dispatcher to enforce.
 ///
 /// # Errors
-/// When the judge rejects the plan, or the request names what the plan does not have; when the
-/// problem has processes or events.
+/// When the validator rejects the plan, the request names things that the plan does not have, or
+/// the problem has processes or events.
 pub(crate) fn opened(request: &EnvelopeRequest) -> Result<(ParametrizedPlan, usize), FlowError> {
     match request.task.left_to_the_judge() {
         Some(feature) => Err(DeorderError::Unsupported { feature }.into()),
@@ -367,7 +366,7 @@ pub(crate) fn opened(request: &EnvelopeRequest) -> Result<(ParametrizedPlan, usi
     }
 }
 
-/// [`opened`], also if the problem has processes and events.
+/// Like [`opened`], but also for problems with processes and events.
 fn opened_with_nature(request: &EnvelopeRequest) -> Result<(ParametrizedPlan, usize), FlowError> {
     let task = &request.task;
     let plan = match &request.plan {
@@ -377,11 +376,11 @@ fn opened_with_nature(request: &EnvelopeRequest) -> Result<(ParametrizedPlan, us
     if !request.enforce {
         return Ok((plan, 0));
     }
-    // Without a schedule there is nothing to keep to, which will be said with its reason.
+    // A plan without a schedule gets no bounds; the search reports the reason later.
     Ok(elbowroom_envelope::enforced(task, &plan).unwrap_or((plan, 0)))
 }
 
-/// Whether a box lies inside the envelope.
+/// Checks whether a box lies inside the envelope.
 fn contains(
     subject: &Subject<'_>,
     mut oracle: Oracle,
@@ -415,7 +414,7 @@ fn contains(
 struct Subject<'a> {
     request: &'a EnvelopeRequest,
     plan: &'a Arc<ParametrizedPlan>,
-    /// The number of bounds added for the dispatcher to keep to.
+    /// Number of bounds added for the dispatcher to enforce.
     enforced: usize,
     explainer: Explainer<'a>,
 }
@@ -430,7 +429,8 @@ impl Subject<'_> {
         }
     }
 
-    /// That processes and events take another course than in the plan need not break it.
+    /// Rejects an objection that is no proof of failure: processes and events would take another
+    /// course than in the plan, which may be harmless.
     fn refuse_harmless(&self, place: &str, why_not: &Explanation) -> Result<(), FlowError> {
         if !why_not.may_be_harmless(&self.request.task) {
             return Ok(());
@@ -445,7 +445,7 @@ impl Subject<'_> {
         }))
     }
 
-    /// The plan fails even as planned.
+    /// Returns the outcome for a plan that fails as planned.
     fn fails(&self, why_not: Explanation) -> EnvelopeOutcome {
         let failing = Failing::AsPlanned {
             parameters: self.quantities(),

@@ -1,4 +1,4 @@
-//! What every document begins with.
+//! The version of documents.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ impl From<Version> for u32 {
     }
 }
 
-/// A document is of a version that this program does not know.
+/// The unsupported version of a document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("version {0} of this document cannot be read, only 1")]
 pub struct UnknownVersion(pub u32);

@@ -1,4 +1,5 @@
-//! What do logs say about the world, and will the next run stay inside the plan's envelope?
+//! Models of the world learnt from logs, and predictions whether the next run stays inside the
+//! plan's envelope.
 
 mod changes;
 mod courses;
@@ -28,16 +29,16 @@ pub use inside::{ConformalBox, ConformalInterval, InsideRequest, Verdict};
 pub use other_problem::known_sections;
 pub use prediction::{PredictionAnswer, predictions_for};
 
-/// Asks what logs say.
+/// Requests a model of the world from logs.
 #[derive(Clone, Debug)]
 pub struct LearnRequest {
     /// The logs, oldest first.
     pub logs: Vec<Log>,
-    /// How to learn.
+    /// Settings of the learner.
     pub settings: Settings,
-    /// Whether the next run will stay inside the envelope of a plan, if that is asked.
+    /// A plan, to predict whether the next run stays inside its envelope.
     pub inside: Option<InsideRequest>,
-    /// The world file that was expected, if changes by themselves are to be compared with it.
+    /// The expected world file, if changes by themselves are to be compared with it.
     pub expected: Option<Source>,
 }
 
@@ -48,7 +49,7 @@ pub struct Log {
     pub name: String,
     /// The attempts to execute actions, in order.
     pub records: Vec<Record>,
-    /// What became of the facts; `None` where the log does not say, as tables do not.
+    /// Changes of facts; `None` if the log does not contain them, such as a table.
     pub course: Option<Course>,
     /// The believed world of the run; `None` if it had none, or if the log does not contain it.
     pub world: Option<WorldModel>,
@@ -58,7 +59,7 @@ pub struct Log {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// It is a trace, and damaged.
+    /// A damaged trace.
     #[error("{name}: {error}")]
     Trace {
         /// The name of the log.
@@ -66,14 +67,14 @@ pub enum LogError {
         /// The error in it.
         error: TraceError,
     },
-    /// It is a table with mistakes.
+    /// A table with errors.
     #[error(transparent)]
     Table(#[from] Diagnostics),
 }
 
 impl Log {
-    /// Reads a trace of a run (`docs/formats/trace.md`), or a table (`docs/formats/log-csv.md`).
-    /// What begins with `{` is a trace.
+    /// Reads a trace of a run (`docs/formats/trace.md`), or a table (`docs/formats/log-csv.md`). A
+    /// text that begins with `{` is a trace.
     ///
     /// # Errors
     /// When it is neither, with the place of the mistake.
@@ -105,35 +106,36 @@ impl Log {
 /// The result of learning from logs: `docs/formats/learn-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LearnAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: LearnFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The names of the logs, oldest first.
     pub logs: Vec<String>,
-    /// How many attempts there were.
+    /// Number of attempts.
     pub attempts: usize,
     /// Statistics of the attempts, by the actions' names.
     pub actions: Vec<ActionLearnt>,
-    /// How often facts change by themselves: those of each predicate of which one did, or was
-    /// expected to.
+    /// Rates of facts that change by themselves, for each predicate with an observed or expected
+    /// change.
     #[serde(default)]
     pub changes: Vec<ChangesLearnt>,
-    /// All of it as a world file.
+    /// The learnt world file.
     pub world: String,
-    /// The [time-outs](elbowroom_execution::run::TimeoutRule) that follow from the durations: twice the longest of 10,000
-    /// that are drawn from the distribution of an action, and of all that ended in the logs.
+    /// The [time-outs](elbowroom_execution::run::TimeoutRule) that follow from the durations: twice
+    /// the longest of 10,000 draws from the distribution of an action, and of all that ended in the
+    /// logs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timeouts: Option<String>,
-    /// Intervals for the next run, if they were asked for.
+    /// Intervals for the next run, if requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inside: Option<ConformalBox>,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LearnFormat {
-    /// The only one.
+    /// The name `elbowroom-learn`.
     #[default]
     #[serde(rename = "elbowroom-learn")]
     Learn,
@@ -144,45 +146,46 @@ pub enum LearnFormat {
 pub struct ActionLearnt {
     /// The name: `drive`.
     pub action: String,
-    /// How many attempts there were.
+    /// Number of attempts.
     pub attempts: usize,
-    /// How durations are described.
+    /// Description of the durations.
     pub durations: DurationsLearnt,
-    /// How long after the command the actions start; `None` if at once, or if no log says.
+    /// Delay from the command to the start of the action; `None` if there is none, or if no log
+    /// contains it.
     pub delay: Option<FitAnswer>,
-    /// How often they fail.
+    /// Statistics of failures.
     pub failures: FailuresLearnt,
-    /// Whether durations change from log to log; `None` where each ground action is described
-    /// apart.
+    /// Change of the durations from log to log; `None` if each ground action is described
+    /// separately.
     pub drift: Option<DriftAnswer>,
-    /// Whether the frequency of failures does.
+    /// Change of the failure rate from log to log.
     pub failure_drift: DriftAnswer,
-    /// Predictions of the believed world, or of the world file that was expected; `None` without one.
+    /// Predictions of the believed world, or of the expected world file; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prediction: Option<PredictionAnswer>,
 }
 
-/// How durations are described.
+/// Description of the durations of actions of one name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "described", rename_all = "kebab-case")]
 pub enum DurationsLearnt {
-    /// Not at all: nothing was seen to its end, or there are none.
+    /// No description: no action was observed to its end, or the actions have no durations.
     Unknown,
-    /// In seconds, all alike.
+    /// In seconds, all ground actions together.
     Together {
-        /// By this.
+        /// The distribution.
         #[serde(flatten)]
         group: GroupAnswer,
     },
     /// As multiples of the planned duration.
     Relative {
-        /// By this.
+        /// The distribution.
         #[serde(flatten)]
         group: GroupAnswer,
     },
-    /// In seconds, each ground action by itself.
+    /// In seconds, each ground action separately.
     Apart {
-        /// By these.
+        /// The distributions.
         groups: Vec<NamedGroup>,
     },
 }
@@ -190,9 +193,9 @@ pub enum DurationsLearnt {
 /// A group of durations that is described by one distribution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroupAnswer {
-    /// How many were seen to their end.
+    /// Number of durations that were observed to their end.
     pub observed: usize,
-    /// Of how many only a lower bound is known.
+    /// Number of right-censored durations: only a lower bound is known.
     pub censored: usize,
     /// The distribution.
     #[serde(flatten)]
@@ -204,44 +207,44 @@ pub struct GroupAnswer {
 pub struct NamedGroup {
     /// The action: `(drive rover depot shelf)`.
     pub action: String,
-    /// How it is described.
+    /// Description of its durations.
     #[serde(flatten)]
     pub group: GroupAnswer,
 }
 
-/// A distribution that was fitted.
+/// A fitted distribution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FitAnswer {
     /// `constant`, `normal`, `lognormal`, `uniform` or `values`.
     pub family: String,
-    /// Its numbers, by their names in world files.
+    /// Its parameters, by their names in world files.
     pub numbers: Vec<(String, f64)>,
     /// Its mean.
     pub mean: f64,
     /// The standard error of the mean, where the family has one.
     pub standard_error: Option<f64>,
-    /// Whether it explains the samples badly.
+    /// `true` if the distribution fits the samples badly.
     pub doubtful: bool,
 }
 
-/// How often actions fail.
+/// Statistics of failures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FailuresLearnt {
-    /// How many failed.
+    /// Number of failed attempts.
     pub failed: u64,
-    /// Of how many that were neither cancelled nor still running.
+    /// Number of attempts that were neither cancelled nor still running.
     pub ended: u64,
     /// Wilson's 95 % interval of the probability; `None` if none ended.
     pub interval: Option<(f64, f64)>,
     /// `start`, `midway` or `end`; `None` if none failed.
     pub when: Option<String>,
-    /// After how many failures what the start had changed was as before, and of how many failures logs tell that; `None` if
-    /// of none.
+    /// Number of failures that undid the effects of the start, and number of failures for which the
+    /// logs show this; `None` if there is no such failure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub undone: Option<(u64, u64)>,
 }
 
-/// Whether values change from log to log.
+/// Test whether values change from log to log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriftAnswer {
     /// The largest value of the test martingale.
@@ -250,12 +253,13 @@ pub struct DriftAnswer {
     pub since: Option<usize>,
 }
 
-/// Says what logs tell about the world.
+/// Learns a model of the world from logs.
+///
+/// Too few logs are reported in the answer, not as an error.
 ///
 /// # Errors
-/// When the plan that is asked about has no envelope that can be computed, when the world that was
-/// expected does not go with the problem of a log, or when no log tells of facts with which it
-/// could be compared. That the logs are too few for an answer is an answer.
+/// When the envelope of the given plan cannot be computed, when the expected world does not match
+/// the problem of a log, or when no log contains facts to compare it with.
 pub fn learn(
     request: &LearnRequest,
     watcher: &mut dyn Watcher,
@@ -315,8 +319,8 @@ fn predictions(request: &LearnRequest) -> Predictions {
     predictions
 }
 
-/// What a log expected beside what happened, action by action: the mean planned and the mean actual
-/// duration of all attempts that succeeded and had a planned duration.
+/// Returns the mean planned and the mean actual duration of an action: of all attempts that
+/// succeeded and had a planned duration. `None` if there are none.
 pub fn expectation_and_reality(records: &[Record], name: &str) -> Option<(f64, f64)> {
     let pairs: Vec<(f64, f64)> = records
         .iter()

@@ -1,4 +1,4 @@
-//! How likely is a plan to succeed, where is its probability lost, and what would gain some?
+//! The success probability of a plan, its losses, and possible gains.
 
 mod executed;
 mod gains;
@@ -32,32 +32,32 @@ pub use order::{
     ActionAnswer, FactAnswer, HappeningAnswer, LayerAnswer, LossAnswer, LossReason, OrderAnswer,
 };
 
-/// Asks how likely a plan is to succeed.
+/// Requests the success probability of a plan.
 #[derive(Clone, Debug)]
 pub struct OddsRequest<'a> {
     /// The problem.
     pub task: &'a Arc<Task>,
-    /// The plan; without one, the embedded planner makes one, and the best order of it is taken.
+    /// The plan. Without one, the embedded planner makes one, and its best order is used.
     pub plan: Option<TimeTriggeredPlan>,
-    /// How likely everything is.
+    /// Likelihoods of failures, effects and changes.
     pub likelihoods: &'a Arc<Likelihoods>,
-    /// A world on a clock, for executing the plan in samples of it.
+    /// A world on a clock, for executing the plan in samples.
     pub world: Option<&'a WorldModel>,
-    /// How to answer.
+    /// Settings of the analysis.
     pub settings: OddsSettings,
 }
 
-/// How to answer.
+/// Settings of the analysis of a plan's success probability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OddsSettings {
-    /// The state after an effect that fails.
+    /// The state after a failed effect.
     pub semantics: OddsSemantics,
-    /// Whether the answer is about the best order, not about that of the plan's times.
+    /// `true` if the answer is about the best order instead of that of the plan's times.
     pub takes_best_order: bool,
     /// Limit on the number of partial orders that the search for the best order visits.
     pub most_sequences: usize,
-    /// Whether to list all orders.
+    /// `true` if the answer lists all orders.
     pub with_lattice: bool,
     /// `true` if a ground action may overlap itself in plans that are made.
     #[serde(default)]
@@ -65,14 +65,14 @@ pub struct OddsSettings {
     /// The executors that execute the plan in samples of the world.
     #[serde(with = "crate::execute::listed")]
     pub executors: Vec<ExecutorSpec>,
-    /// How many samples.
+    /// Number of samples.
     pub samples: u64,
-    /// The seed of the first sample; the others follow.
+    /// Seed of the first sample. Each further sample has the next seed.
     pub seed: u64,
 }
 
 impl Default for OddsSettings {
-    /// As in paper 2; 1000 samples with `live` and `adaptable`.
+    /// Returns the settings of paper 2, with 1000 samples for `live` and `adaptable`.
     fn default() -> Self {
         let executors = ["live", "adaptable"].iter().map(|name| name.parse());
         Self {
@@ -88,14 +88,14 @@ impl Default for OddsSettings {
     }
 }
 
-/// The state after an effect that fails: [`Semantics`].
+/// The state after a failed effect: [`Semantics`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OddsSemantics {
-    /// The opposite of what it should.
+    /// The opposite of the intended effect, as in paper 2.
     #[default]
     Paper,
-    /// The fact as it was.
+    /// The fact keeps its value.
     World,
 }
 
@@ -108,38 +108,38 @@ impl From<OddsSemantics> for Semantics {
     }
 }
 
-/// How likely a plan is to succeed: `docs/formats/odds-json.md`.
+/// The success probability of a plan: `docs/formats/odds-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OddsAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: OddsFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The domain's name.
     pub domain: String,
     /// The problem's name.
     pub problem: String,
-    /// The state after an effect that fails.
+    /// The state after a failed effect.
     pub semantics: OddsSemantics,
     /// The answer itself.
     #[serde(flatten)]
     pub finding: OddsFinding,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum OddsFormat {
-    /// The only one.
+    /// The name `elbowroom-odds`.
     #[default]
     #[serde(rename = "elbowroom-odds")]
     Odds,
 }
 
-/// The odds, or why there are none.
+/// The success probability, or the reason why it is missing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer")]
 pub enum OddsFinding {
-    /// The odds.
+    /// The analysis.
     #[serde(rename = "odds")]
     Odds(Box<Odds>),
     /// No order of the plan can succeed.
@@ -148,13 +148,13 @@ pub enum OddsFinding {
     /// There is no plan.
     #[serde(rename = "no plan")]
     NoPlan,
-    /// A limit was reached before there was anything.
+    /// A limit was reached before there was a result.
     #[serde(rename = "none")]
     None {
-        /// Which limit.
+        /// The limit.
         reason: String,
     },
-    /// The judge rejects the plan.
+    /// The validator rejects the plan.
     #[serde(rename = "invalid")]
     Invalid {
         /// The reason.
@@ -162,36 +162,36 @@ pub enum OddsFinding {
     },
 }
 
-/// The odds of a plan.
+/// The analysis of a plan's success probability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Odds {
-    /// The order that they are about.
+    /// The analysed order.
     pub order: OrderAnswer,
     /// The gain of another order, of retrying, and of another plan.
     pub gains: GainsAnswer,
     /// The results of executing the plan in samples of the world, if there is one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub executed: Vec<ExecutedAnswer>,
-    /// All orders, if they were asked for.
+    /// All orders, if requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lattice: Option<LatticeFinding>,
 }
 
-/// A plan, and all that its orders are looked for with.
+/// A plan with the data for searches among its orders.
 pub(super) struct Subject<'a> {
     request: &'a OddsRequest<'a>,
     plan: &'a TimeTriggeredPlan,
     search: OrderSearch,
     initial: Circumstances,
-    /// The happenings as the plan has them.
+    /// The happenings in the order of the plan's times.
     as_planned: Vec<NodeId>,
 }
 
-/// Says how likely a plan is to succeed.
+/// Computes the success probability of a plan.
 ///
 /// # Errors
-/// When the likelihoods say nothing of something in the plan, too many facts are coupled, the judge
-/// cannot tell whether the plan is valid, or the planner does not support the problem.
+/// When likelihoods are missing for a part of the plan, too many facts are coupled, the validator
+/// cannot decide whether the plan is valid, or the planner does not support the problem.
 pub fn odds(
     request: &OddsRequest<'_>,
     watcher: &mut dyn Watcher,
@@ -275,7 +275,7 @@ fn finding(
     })))
 }
 
-/// The answer for a valid plan whose happenings do not work as an order.
+/// Returns the answer for a valid plan whose happenings do not work as an order.
 fn fails_in_order() -> OddsFinding {
     let reason = "not supported: the happenings of this plan do not reach the goal as an order, although the plan is valid";
     OddsFinding::None {
@@ -296,14 +296,14 @@ fn works_in_order(
     Ok(order.map_err(|error| coupled(&error))?.probability > 0.0)
 }
 
-/// A plan of the embedded planner.
+/// Returns a plan of the embedded planner.
 fn planned(request: &OddsRequest<'_>) -> PlanAnswer {
     planner(&request.settings)
         .plan(request.task, &Situation::initial(request.task))
         .answer
 }
 
-/// The planner that makes the plan, and new plans in samples.
+/// Returns the planner for the plan, and for new plans in samples.
 fn planner(settings: &OddsSettings) -> Embedded<'static> {
     let mut planner = Embedded::default();
     planner.settings.self_overlap = settings.self_overlap;

@@ -1,4 +1,4 @@
-//! Is there a plan?
+//! Planning: requests for a plan.
 
 mod external;
 mod improving;
@@ -25,20 +25,20 @@ pub use objective::{
     BestPlanRequest, PlanAim, PlanChoice, PlanObjective, PlanWorth, UnknownPlanObjective, best_plan,
 };
 
-/// Asks for a plan.
+/// Requests a plan.
 #[derive(Debug)]
 pub struct PlanRequest<'a> {
-    /// The problem. Planning names facts in it that it did not name before.
+    /// The problem. Planning adds the facts that it uses to the table of this task.
     pub task: &'a Task,
-    /// Whether the first plan is enough. Otherwise better ones are looked for until the watcher
-    /// wants no more, or there is none.
+    /// `true` if the search stops at the first plan. Otherwise it searches for better plans until
+    /// the watcher stops it, or there are none.
     pub first_plan_only: bool,
-    /// About how much memory the search may use, in bytes.
+    /// Memory limit of the search, in bytes (approximate).
     pub most_memory: Option<u64>,
     /// `true` if a ground action may overlap itself in plans of the embedded planner.
     pub self_overlap: bool,
-    /// How many threads the embedded planner may use. The answer is the same whatever their number, but
-    /// for what a time limit allows.
+    /// Number of threads of the embedded planner. The answer does not depend on it, except for the
+    /// effect of a time limit.
     pub threads: usize,
 }
 
@@ -51,12 +51,12 @@ pub struct PlanOutcome {
     pub plan: Option<TimeTriggeredPlan>,
 }
 
-/// A plan, or why there is none: `docs/formats/plan-json.md`.
+/// A plan, or the reason why there is none: `docs/formats/plan-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: PlanFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The domain's name.
     pub domain: String,
@@ -67,10 +67,10 @@ pub struct PlanAnswer {
     /// The answer itself.
     #[serde(flatten)]
     pub finding: PlanFinding,
-    /// How the plan was chosen; left out where plans are compared by metric or makespan.
+    /// The choice among plans; left out if plans are compared by metric or makespan.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub choice: Option<PlanChoice>,
-    /// Why the search ended.
+    /// Reason for the end of the search.
     pub stop: PlanStop,
     /// The number of plans found, each better than the one before as far as the planner knows.
     pub plans: usize,
@@ -82,10 +82,10 @@ pub struct PlanAnswer {
     pub statistics: PlanStatistics,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PlanFormat {
-    /// The only one.
+    /// The name `elbowroom-plan`.
     #[default]
     #[serde(rename = "elbowroom-plan")]
     Plan,
@@ -104,11 +104,11 @@ pub enum PlanFinding {
         /// The value of the problem's metric, if it has one.
         #[serde(with = "exact::option")]
         metric: Option<Rational>,
-        /// The judge's objection to the planner's own times, if they were repaired.
+        /// The validator's objection to the planner's own times, if they were repaired.
         repaired: Option<String>,
-        /// By start time.
+        /// The actions, by start time.
         steps: Vec<PlanStep>,
-        /// The same as text.
+        /// The plan as text.
         plan: String,
     },
     /// No plan exists.
@@ -127,7 +127,7 @@ pub enum PlanFinding {
         /// The reason for the missing certificate, if the planner claims that no plan exists.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         uncertified: Option<String>,
-        /// `true` if all plans were tried without self-overlap; left out elsewhere.
+        /// `true` if all plans without self-overlap were searched; left out otherwise.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         without_self_overlap: bool,
     },
@@ -144,28 +144,28 @@ pub struct PlanStep {
     pub duration: Option<Exact>,
 }
 
-/// Why a search for plans ended.
+/// Reasons for the end of a search for plans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PlanStop {
-    /// The first plan was enough.
+    /// The first plan was sufficient.
     #[serde(rename = "first plan")]
     FirstPlan,
-    /// Time was up.
+    /// The time limit was reached.
     #[serde(rename = "time limit")]
     TimeLimit,
-    /// More memory would have been needed.
+    /// The memory limit was reached.
     #[serde(rename = "memory limit")]
     MemoryLimit,
-    /// The watcher wanted no more.
+    /// The watcher cancelled the search.
     #[serde(rename = "cancelled")]
     Cancelled,
-    /// Nothing is left to search (embedded planner).
+    /// The search space is exhausted (embedded planner).
     #[serde(rename = "exhausted")]
     Exhausted,
-    /// It is proved that there is no plan, by a certificate.
+    /// A certificate proves that there is no plan.
     #[serde(rename = "proved")]
     Proved,
-    /// By itself (other planners), or at the number of plans that is compared without a time limit.
+    /// The planner ended by itself (other planners), or the maximum number of plans was compared.
     #[serde(rename = "ended")]
     Ended,
 }
@@ -176,36 +176,36 @@ pub enum PlanStop {
 pub enum PlanStatistics {
     /// The embedded planner.
     Embedded {
-        /// Ground actions.
+        /// Number of ground actions.
         actions: u64,
-        /// States whose successors were listed.
+        /// Number of expanded states.
         expanded: u64,
-        /// Successors listed.
+        /// Number of generated successors.
         generated: u64,
-        /// States made and estimated.
+        /// Number of states that were evaluated by the heuristic.
         evaluated: u64,
-        /// About how many bytes the states take.
+        /// Approximate size of the states, in bytes.
         memory_bytes: usize,
     },
     /// Another planner.
     External {
-        /// The number of plans that were refused or could not be read.
+        /// Number of plans that were rejected or could not be read.
         refused: usize,
-        /// The most memory that its processes were seen to use together.
+        /// Peak memory of all its processes together, in bytes.
         peak_memory_bytes: u64,
-        /// How many bytes it printed.
+        /// Size of its output, in bytes.
         printed_bytes: u64,
     },
 }
 
 pub use crate::execute::EMBEDDED;
 
-/// Has the embedded planner look for a plan.
+/// Searches for a plan with the embedded planner.
 ///
-/// That there is none, or none was found until the watcher wanted no more, is an answer.
+/// A missing plan is reported in the answer, not as an error.
 ///
 /// # Errors
-/// When the problem needs what the embedded planner does not support.
+/// When the problem has features that the embedded planner does not support.
 pub fn plan(
     request: &mut PlanRequest<'_>,
     watcher: &mut dyn Watcher,
@@ -270,7 +270,7 @@ pub fn plan(
     Ok(PlanOutcome { answer, plan })
 }
 
-/// The answer of who was told to stop before the problem was read.
+/// Returns the answer of a planner that was stopped before the problem was read.
 pub fn unread(planner: &str, halt: Halt, elapsed: Duration) -> PlanOutcome {
     let stop = PlanStop::from(halt);
     let ended = match halt {
@@ -306,7 +306,7 @@ pub fn unread(planner: &str, halt: Halt, elapsed: Duration) -> PlanOutcome {
 }
 
 impl Course<'_> {
-    /// The answer, with how the plan was chosen if it was chosen among many.
+    /// Builds the answer, with the choice if the plan was chosen among several.
     fn answer(
         &mut self,
         task: &Task,
@@ -378,14 +378,14 @@ impl From<Halt> for PlanStop {
     }
 }
 
-/// Counts the plans that come, and tells the watcher.
+/// Counts the plans found, and notifies the watcher.
 struct Course<'a> {
     watcher: &'a mut dyn Watcher,
     begun: Duration,
     plans: usize,
     /// The time at which the first plan was found.
     first: Option<Duration>,
-    /// Why the watcher wanted no more.
+    /// The watcher's reason to stop.
     halt: Option<Halt>,
 }
 
@@ -433,7 +433,7 @@ impl Course<'_> {
     }
 }
 
-/// `memory` is the limit of it, in bytes.
+/// Returns the reason why no plan was found. `memory` is the memory limit, in bytes.
 fn none_found(
     stop: PlanStop,
     (counts, without_self_overlap): (Counts, bool),

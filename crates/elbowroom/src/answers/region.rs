@@ -1,4 +1,4 @@
-//! With which values does a plan work? All of them, as inequalities.
+//! The region of a plan: all values for which it works, as inequalities.
 
 mod boxes;
 mod measure;
@@ -24,26 +24,26 @@ pub use boxes::{BoxAnswer, IntervalAnswer};
 pub use measure::{Measure, Share};
 pub use picture::{Others, PictureError, Plane, picture};
 
-/// How many places of a moment inside an action are told apart.
+/// Largest number of positions that are distinguished for a moment inside an action.
 const MOST_PLACES: usize = 256;
 
-/// The answer as a document (`docs/formats/region-json.md`), and what it is about.
+/// The answer as a document (`docs/formats/region-json.md`), with the plan and the region.
 #[derive(Clone, Debug)]
 pub struct RegionOutcome {
     /// The answer.
     pub answer: RegionAnswer,
-    /// The plan with what is left open; `None` if the judge rejects it.
+    /// The plan with its open quantities; `None` if the validator rejects it.
     pub plan: Option<ParametrizedPlan>,
-    /// The region; `None` if there is no answer, or another one.
+    /// The region; `None` if the answer has none.
     pub region: Option<elbowroom_envelope::Region>,
 }
 
 /// All values of its parameters for which a plan works: `docs/formats/region-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegionAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: RegionFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The domain's name.
     pub domain: String,
@@ -59,10 +59,10 @@ pub struct RegionAnswer {
     pub finding: RegionFinding,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RegionFormat {
-    /// The only one.
+    /// The name `elbowroom-region`.
     #[default]
     #[serde(rename = "elbowroom-region")]
     Region,
@@ -72,32 +72,32 @@ pub enum RegionFormat {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "lowercase")]
 pub enum RegionFinding {
-    /// The plan works with the values of each piece, and with no others in which happenings keep
-    /// their nominal order.
+    /// The plan works exactly for the values in the pieces, among all values that keep the nominal
+    /// order of happenings.
     Region {
         /// The parameters.
         parameters: Vec<Quantity>,
-        /// The pieces; no two have values in common. Empty if the plan works with no values.
+        /// The pieces, which are disjoint. Empty if the plan works for no values.
         pieces: Vec<PieceAnswer>,
-        /// Why this is only a part of the region: a limit, or the end of the time for it. `None` if
-        /// it is all of it.
+        /// The reason why this is only a part of the region: a limit, or lack of time. `None` if it
+        /// is the whole region.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         missing: Option<String>,
-        /// Boxes inside the region, if they were asked for.
+        /// Boxes inside the region, if requested.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         boxes: Vec<BoxAnswer>,
-        /// The volume, if it was asked for and there is one.
+        /// The volume, if requested and positive.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         measure: Option<Measure>,
-        /// The plan in time, as planned, with the times for all values in the ranges of the
-        /// parameters. `None` in documents of earlier versions of this program.
+        /// The times of the plan, as planned and for all values in the ranges of the parameters.
+        /// `None` in documents of earlier versions of this program.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         timeline: Option<Timeline>,
-        /// What every schedule satisfies; `None` if that is too much to write out.
+        /// The inequalities that every schedule satisfies; `None` if there are too many.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         inequalities: Option<Inequalities>,
     },
-    /// The judge rejects the plan as it stands.
+    /// The validator rejects the plan as it is.
     Invalid {
         /// The reason.
         violation: ViolationAnswer,
@@ -106,12 +106,12 @@ pub enum RegionFinding {
     Unscheduled,
     /// The region is not known.
     None {
-        /// What stood against it: a limit, or the end of the time for it.
+        /// The reason: a limit, or lack of time.
         reason: String,
     },
 }
 
-/// Values that satisfy some inequalities; none of these follows from the others.
+/// The values that satisfy some inequalities, without redundant ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PieceAnswer {
     /// The inequalities.
@@ -121,38 +121,38 @@ pub struct PieceAnswer {
 /// `Σ factor · parameter <= bound`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RowAnswer {
-    /// The inequality for people: `dur_0 + dur_3 <= 4893/100`.
+    /// The inequality for users: `dur_0 + dur_3 <= 4893/100`.
     pub text: String,
-    /// The factor of each parameter that counts, by its name.
+    /// The nonzero factors of parameters, by name.
     pub factors: IndexMap<String, Exact>,
     /// The upper bound of the sum.
     #[serde(with = "exact")]
     pub bound: Rational,
-    /// Whether the sum has to be below the bound.
+    /// `true` if the sum has to be below the bound.
     pub strict: bool,
-    /// What it comes from, in words: bounds of the plan, and conditions. Empty for the range of a
+    /// The bounds of the plan and the conditions that imply it, in words. Empty for the range of a
     /// parameter, and for mere orderings.
     pub because: Vec<String>,
 }
 
-/// What a region is to be compared with.
+/// Optional parts of an answer about a region.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RegionSettings {
-    /// Whether the answer has boxes: IRR's and the best ones.
+    /// `true` if the answer has boxes: IRR's and the best ones.
     pub with_boxes: bool,
-    /// Whether the answer has the volume, and each box's share of it.
+    /// `true` if the answer has the volume, and each box's share of it.
     pub with_volume: bool,
-    /// The seed of what is sampled: volumes of more than a few connected parameters.
+    /// Random seed for sampled volumes, used for more than a few connected parameters.
     pub seed: u64,
 }
 
-/// All values for which a plan works.
+/// Computes all values for which a plan works.
 ///
-/// The request's guarantee, box and search do not matter: for single values there is a schedule or
-/// not.
+/// The request's guarantee, box and search do not matter, because the values are fixed: either
+/// there is a schedule for them or not.
 ///
 /// # Errors
-/// When the request names what the plan does not have, or the plan is beyond exact analysis.
+/// When the request names things that the plan does not have, or the plan is beyond exact analysis.
 pub fn region(
     request: &EnvelopeRequest,
     settings: &RegionSettings,
@@ -228,7 +228,7 @@ pub fn region(
     Ok(outcome(finding, Some(plan), found.ok()))
 }
 
-/// What is known when somebody could wait no longer for a single step: nothing.
+/// Builds the answer of an interrupted computation, which has no partial result.
 pub fn so_far(request: &EnvelopeRequest) -> RegionOutcome {
     let reason = ExactError::Ended.to_string();
     outcome(request, RegionFinding::None { reason }, None, None)
@@ -267,7 +267,7 @@ fn answered(explainer: &Explainer<'_>, form: &LinearForm, row: &RegionRow) -> Ro
             RegionSource::Range(_) => {}
             RegionSource::Network(index) => bounds.extend(form.network[index].source),
             RegionSource::Requirement(index) => match &form.obligations[index].requirement {
-                // What is between two happenings is what is said of the network.
+                // The network rows already describe separations.
                 Requirement::Separation { .. } => {}
                 other => because.push(other.describe(task, &plan.plan)),
             },
@@ -288,7 +288,7 @@ fn answered(explainer: &Explainer<'_>, form: &LinearForm, row: &RegionRow) -> Ro
     }
 }
 
-/// What must fit into what, if the row is about durations.
+/// Describes a row about durations: which actions have to fit into which others.
 fn fitting(explainer: &Explainer<'_>, row: &RegionRow, bounds: &[(usize, Side)]) -> Option<String> {
     let (mut takes, mut gives) = (Vec::new(), Vec::new());
     for (id, factor) in &row.factors {
@@ -305,7 +305,7 @@ fn fitting(explainer: &Explainer<'_>, row: &RegionRow, bounds: &[(usize, Side)])
     explainer.sum_words(takes, gives, bounds)
 }
 
-/// `dur_0 + dur_3 <= 4893/100`, with positive factors on both sides.
+/// Formats a row with positive factors on both sides: `dur_0 + dur_3 <= 4893/100`.
 fn text(plan: &ParametrizedPlan, row: &RegionRow) -> String {
     let (mut left, mut right) = (String::new(), String::new());
     for (id, factor) in &row.factors {

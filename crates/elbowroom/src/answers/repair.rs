@@ -1,4 +1,4 @@
-//! What is the least that has to change for a plan to work?
+//! Repairs: the cheapest changes that make a plan work.
 
 mod subject;
 mod words;
@@ -22,11 +22,11 @@ use crate::flow::{self, FlowError};
 use crate::{AnyPlan, room};
 use subject::Subject;
 
-/// The limit on the work of a search through other orders, in linear programs times the square of
-/// the number of time points.
+/// Work limit of a search through other orders, in linear programs times the square of the number
+/// of time points.
 const OTHER_ORDERS: usize = 200_000;
 
-/// Asks for the cheapest change with which a plan works.
+/// Requests the cheapest change that makes a plan work.
 #[derive(Clone, Debug)]
 pub struct RepairRequest {
     /// The problem.
@@ -35,18 +35,19 @@ pub struct RepairRequest {
     pub plan: AnyPlan,
     /// The name of the plan in the answer, such as its file.
     pub name: String,
-    /// What may change; its weight is what a unit of it costs, its range is not left. If empty:
-    /// fixed durations, durations beyond what the domain allows (weight 2), times of timed initials,
-    /// and the parameters and bounds of an STN plan file (weight 1, bounds from below 10).
+    /// Quantities that may change. The weight is the cost per unit of change; values stay inside
+    /// the range. If empty: fixed durations, durations beyond what the domain allows (weight 2),
+    /// times of timed initials, and the parameters and bounds of an STN plan file (weight 1; lower
+    /// bounds 10).
     pub change: Vec<VarySpec>,
-    /// What may not change, of that.
+    /// Exceptions from `change`: quantities that may not change.
     pub keep: Vec<VarySpec>,
-    /// The guarantee that the repaired plan is to have at its nominal values.
+    /// The required guarantee of the repaired plan at its nominal values.
     pub guarantee: Guarantee,
 }
 
 impl RepairRequest {
-    /// The cheapest repair of a plan, where everything may change that may by default.
+    /// Requests the cheapest repair of a plan with the default quantities.
     pub fn new(task: &Arc<Task>, plan: impl Into<AnyPlan>) -> Self {
         Self {
             task: Arc::clone(task),
@@ -59,22 +60,22 @@ impl RepairRequest {
     }
 }
 
-/// The answer, and what it is about.
+/// The answer, with the repaired problem and plan.
 #[derive(Clone, Debug)]
 pub struct RepairOutcome {
     /// The answer as a document (`docs/formats/repair-json.md`).
     pub answer: RepairAnswer,
-    /// The changed problem and the plan with times for it, which the judge accepts; `None` without
-    /// a repair.
+    /// The changed problem, and the plan with times for it, which the validator accepts; `None`
+    /// without a repair.
     pub repaired: Option<(Task, TimeTriggeredPlan)>,
 }
 
-/// The cheapest change with which a plan works: `docs/formats/repair-json.md`.
+/// The cheapest change that makes a plan work: `docs/formats/repair-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RepairAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: RepairFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The domain's name.
     pub domain: String,
@@ -85,17 +86,17 @@ pub struct RepairAnswer {
     /// The least separation of interfering happenings (ε).
     #[serde(with = "exact")]
     pub epsilon: Rational,
-    /// The guarantee that was asked for.
+    /// The requested guarantee.
     pub guarantee: Guarantee,
     /// The answer itself.
     #[serde(flatten)]
     pub finding: RepairFinding,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RepairFormat {
-    /// The only one.
+    /// The name `elbowroom-repair`.
     #[default]
     #[serde(rename = "elbowroom-repair")]
     Repair,
@@ -105,28 +106,29 @@ pub enum RepairFormat {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "lowercase")]
 pub enum RepairFinding {
-    /// The plan works after these changes, and after none that cost less in the `orders` searched.
+    /// The plan works after these changes. No changes that cost less make it work in the `orders`
+    /// searched.
     Repaired {
-        /// What changes; empty if it is enough to take other times for the actions.
+        /// The changes; empty if other times for the actions are sufficient.
         changes: Vec<Change>,
-        /// What the changes cost: the sum of weight times deviation.
+        /// Cost of the changes: the sum of weight times deviation.
         #[serde(with = "exact")]
         cost: Rational,
-        /// No repair costs less than this: the cost, or what it comes arbitrarily near to.
+        /// Lower bound on the cost of repairs: the cost, or its infimum.
         #[serde(with = "exact")]
         bound: Rational,
-        /// What makes the repair cost so much, in words.
+        /// The bounds and conditions that determine the cost, in words.
         because: Vec<String>,
-        /// Bounds that an STN plan has to be given as well, because some of its schedules are not
-        /// valid; they cost nothing.
+        /// Bounds that an STN plan needs in addition, because some of its schedules are not valid.
+        /// They cost nothing.
         keeps: Vec<String>,
-        /// Why the repaired plan, which is valid, does not have the guarantee that was asked for;
+        /// The reason why the repaired plan, which is valid, does not have the requested guarantee;
         /// `None` if it has.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         not_guaranteed: Option<String>,
-        /// The plan with its times, as the judge accepted it.
+        /// The plan with the times that the validator has accepted.
         steps: Vec<PlanStep>,
-        /// How many linear programs were solved; none if nothing had to change.
+        /// Number of solved linear programs; 0 if no change was necessary.
         cases: usize,
         /// The searched orders of interfering actions. No repair in them is cheaper.
         #[serde(default)]
@@ -135,19 +137,19 @@ pub enum RepairFinding {
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         reordered: bool,
     },
-    /// Nothing that may change makes the plan work.
+    /// No allowed change makes the plan work.
     Impossible {
-        /// What stands in the way, in words.
+        /// The bounds and conditions that prevent it, in words.
         because: Vec<String>,
         /// The searched orders of interfering actions.
         #[serde(default)]
         orders: Orders,
     },
-    /// Not known.
+    /// The search ended without a result.
     None {
-        /// What stood against it.
+        /// The reason for the end of the search.
         reason: String,
-        /// No repair costs less than this.
+        /// Lower bound on the cost of repairs.
         #[serde(with = "exact")]
         bound: Rational,
     },
@@ -169,26 +171,26 @@ pub enum Orders {
 pub struct Change {
     /// The quantity, in words.
     pub quantity: String,
-    /// Its value, or of those that it may have, the nearest.
+    /// Its value, or the nearest of several allowed values.
     #[serde(with = "exact")]
     pub from: Rational,
     /// Its new value.
     #[serde(with = "exact")]
     pub to: Rational,
-    /// What each unit of the change costs.
+    /// Cost per unit of the change.
     #[serde(with = "exact")]
     pub weight: Rational,
 }
 
-/// Finds the cheapest change with which a plan works.
+/// Finds the cheapest change that makes a plan work.
 ///
-/// The search first keeps the plan's order of interfering actions. Timed initials may come before or
-/// after them. If that costs anything, other orders are searched, within a limit, and the answer names
-/// the orders that it covers. The repair is checked: the validator accepts the plan for the changed
-/// problem, and the box check accepts its values.
+/// The search first keeps the plan's order of interfering actions. Timed initials may come before
+/// or after them. If that costs anything, other orders are searched, within a limit, and the answer
+/// names the orders that it covers. The repair is checked: the validator accepts the plan for the
+/// changed problem, and the box check accepts its values.
 ///
 /// # Errors
-/// When the request names what the plan does not have, or the plan is beyond exact analysis.
+/// When the request names things that the plan does not have, or the plan is beyond exact analysis.
 pub fn repair(
     request: &RepairRequest,
     watcher: &mut dyn Watcher,
@@ -207,7 +209,7 @@ pub fn repair(
     if times.is_none() {
         return Ok(subject.outcome_of(request, run, (Orders::All, false), halt));
     }
-    // Which other orders could be cheaper, and whether all of them have been searched.
+    // Search other orders for a cheaper repair, and record whether all of them were searched.
     let below = match &run {
         RepairRun::Repaired { repair, .. } => Some(repair.cost.clone()),
         _ => None,
@@ -231,7 +233,7 @@ pub fn repair(
     Ok(subject.outcome_of(request, run, orders, None))
 }
 
-/// What is known when somebody could wait no longer for a single step: nothing.
+/// Builds the answer of an interrupted search, which has no partial result.
 pub fn so_far(request: &RepairRequest, halt: Halt) -> RepairOutcome {
     outcome(request, stopped(Some(halt), Rational::ZERO), None)
 }
@@ -248,7 +250,7 @@ fn stopped(halt: Option<Halt>, bound: Rational) -> RepairFinding {
     }
 }
 
-/// A valid plan needs no other times.
+/// Builds the answer for a valid plan, which keeps its times.
 fn as_it_stands(request: &RepairRequest, plan: &TimeTriggeredPlan) -> RepairOutcome {
     let promise = promised(request, &request.task, plan);
     let finding = RepairFinding::Repaired {
@@ -287,14 +289,14 @@ fn outcome(
     }
 }
 
-/// What a repaired plan is guaranteed to do, and by which bounds.
+/// Additional bounds of a repaired plan, and the reason for a missing guarantee.
 #[derive(Default)]
 struct Promise {
     keeps: Vec<String>,
     why_not: Option<String>,
 }
 
-/// Whether the plan, freed of its times, works at the nominal values.
+/// Deorders the plan, and checks its guarantee at the nominal values.
 fn promised(request: &RepairRequest, task: &Task, plan: &TimeTriggeredPlan) -> Promise {
     let task = Arc::new(task.clone());
     let opened = flow::free(&task, plan).and_then(|freed| flow::open(&task, freed, &[]));
@@ -308,7 +310,7 @@ fn promised(request: &RepairRequest, task: &Task, plan: &TimeTriggeredPlan) -> P
     }
 }
 
-/// What stands against the plan's nominal values.
+/// Returns the objection to the plan's nominal values, if there is one.
 fn objected(
     task: &Arc<Task>,
     plan: &Arc<ParametrizedPlan>,
@@ -325,8 +327,8 @@ fn objected(
 }
 
 impl Subject {
-    /// Searches for the cheapest repair; interfering actions keep the order of these times, if
-    /// there are any.
+    /// Searches for the cheapest repair. If there are `times`, interfering actions keep their
+    /// order.
     fn search(
         &self,
         times: Option<&Schedule>,
@@ -349,8 +351,8 @@ impl Subject {
         run.map_err(FlowError::Refused)
     }
 
-    /// The limits of a search through other orders for something cheaper: the more time points there
-    /// are, the longer each linear program takes.
+    /// Returns the limits of a search through other orders for a repair cheaper than `below`. More
+    /// time points make each linear program slower, so fewer are solved.
     fn limits_of_other_orders(&self, below: Option<Rational>) -> RepairLimits {
         let points = self.plan.plan.nodes.len().max(1);
         RepairLimits {
@@ -411,14 +413,15 @@ impl Subject {
         outcome(request, finding, repaired)
     }
 
-    /// Whether an STN plan works with these values, and which bounds it needs for that.
+    /// Checks the guarantee of an STN plan with these values, and finds the additional bounds that
+    /// it needs.
     fn kept(&self, request: &RepairRequest, values: &Valuation, schedule: &Schedule) -> Promise {
         let mut plan = self.plan.clone();
         let own = plan.parameters.iter_mut().zip(values).enumerate();
         for (index, (parameter, value)) in own {
             parameter.nominal = value.clone();
             if index >= self.given {
-                // What the repair opened does not vary any more.
+                // Parameters that were opened for the repair are fixed again.
                 parameter.range = Interval::point(value.clone());
             }
         }

@@ -1,4 +1,4 @@
-//! What comes of executing a plan?
+//! Execution of plans.
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -13,30 +13,30 @@ use serde::{Deserialize, Serialize};
 use super::{Event, Version, Watcher};
 use crate::execute::{Listener, RunSpec, SpecError, Validated};
 
-/// Asks for a run.
+/// Requests a run.
 pub struct RunRequest<'a> {
     /// The specification of the run.
     pub spec: &'a RunSpec,
     /// The problem, with the ε of the specification.
     pub task: &'a Arc<Task>,
-    /// The plan to begin with; without one, one is made.
+    /// The initial plan; without one, the planner makes one.
     pub plan: Option<TimeTriggeredPlan>,
-    /// How a lasting run stood, to go on from there instead.
+    /// State of an executive's run, to resume it instead.
     pub stand: Option<Stand>,
-    /// How many times the run was over, without a plan, and was gone on with.
+    /// Number of times that the run was over, without a plan, and was continued.
     pub reopened: usize,
-    /// Who makes plans, if it is not whom the specification names: a replay, or a planner on
-    /// another clock than the watcher's.
+    /// Replacement for the planner of the specification: a replay, or a planner with another clock
+    /// than the watcher's.
     pub planner: Option<Box<dyn Planner + 'a>>,
-    /// Who makes plans ready, if it is not an [`Analyst`](crate::execute::Analyst) that is waited for.
+    /// Replacement for the synchronous [`Analyst`](crate::execute::Analyst), which prepares plans.
     pub preparer: Option<Box<dyn Preparer + 'a>>,
     /// The recorder.
     pub recorder: Box<dyn Recorder + 'a>,
-    /// Told what the run believes, whenever that may have changed.
+    /// Callback for the belief state, called whenever it may have changed.
     pub listener: Option<Listener<'a>>,
 }
 
-/// The answer, and the report that it was made of.
+/// The answer, and the report behind it.
 #[derive(Clone, Debug)]
 pub struct RunOutcome {
     /// The answer as a document.
@@ -48,30 +48,30 @@ pub struct RunOutcome {
 /// The result of a run: `docs/formats/run-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunAnswer {
-    /// The answer itself, as the last line of a trace has it.
+    /// The answer itself, as in the last line of a trace.
     #[serde(flatten)]
     pub report: ReportLine,
-    /// Among what the first plan was chosen, in words; left out where it was not.
+    /// The plans among which the first plan was chosen, in words; left out if it was not chosen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_plan: Option<String>,
-    /// The reason why an executor that weighs each move has no table of moves and tries moves out in samples of the
-    /// world instead. Left out if it has one, or needs none.
+    /// The reason why an executor that evaluates each move has no table of moves and samples the
+    /// world instead. Left out if it has a table, or needs none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_table: Option<String>,
     /// Violations that the validator finds in the execution: bugs of this program. Left out if there are
     /// none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub invalid: Vec<String>,
-    /// Always the same.
+    /// Format of the document.
     pub format: RunFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RunFormat {
-    /// The only one.
+    /// The name `elbowroom-run`.
     #[default]
     #[serde(rename = "elbowroom-run")]
     Run,
@@ -82,12 +82,12 @@ pub enum RunFormat {
 pub struct RunProgress<'a> {
     /// The latest entry of the record: a decision, a command, an observation, a plan, …
     pub entry: &'a Entry<'a>,
-    /// The number of plans that have been taken up.
+    /// The number of adopted plans.
     pub plans: usize,
 }
 
 impl<'a> RunRequest<'a> {
-    /// A run of the specification, without a plan and without a record.
+    /// Requests a run of the specification, without a plan and without a record.
     pub fn new(spec: &'a RunSpec, task: &'a Arc<Task>) -> Self {
         Self {
             spec,
@@ -102,21 +102,21 @@ impl<'a> RunRequest<'a> {
         }
     }
 
-    /// Begins with this plan.
+    /// Starts with this plan.
     #[must_use]
     pub fn beginning_with(self, plan: impl Into<Option<TimeTriggeredPlan>>) -> Self {
         let plan = plan.into();
         Self { plan, ..self }
     }
 
-    /// Goes on as a lasting run stood.
+    /// Resumes an executive's run from this state.
     #[must_use]
     pub fn standing(self, stand: impl Into<Option<Stand>>) -> Self {
         let stand = stand.into();
         Self { stand, ..self }
     }
 
-    /// Goes on after the run was over, so many times.
+    /// Sets the number of times that the run was continued after its end.
     #[must_use]
     pub fn reopened(self, times: usize) -> Self {
         Self {
@@ -132,21 +132,21 @@ impl<'a> RunRequest<'a> {
         Self { planner, ..self }
     }
 
-    /// Has plans made ready like that.
+    /// Replaces the preparer of plans.
     #[must_use]
     pub fn prepared_by(self, preparer: impl Preparer + 'a) -> Self {
         let preparer: Option<Box<dyn Preparer + 'a>> = Some(Box::new(preparer));
         Self { preparer, ..self }
     }
 
-    /// Tells what the run believes, as [`Execution::told_to`](crate::execute::Execution::told_to).
+    /// Reports the belief state, as [`Execution::told_to`](crate::execute::Execution::told_to).
     #[must_use]
     pub fn told_to(self, listener: impl FnMut(&Progression) + Send + 'a) -> Self {
         let listener: Option<Listener<'a>> = Some(Box::new(listener));
         Self { listener, ..self }
     }
 
-    /// Keeps a record.
+    /// Sets the recorder.
     #[must_use]
     pub fn recorded_by(self, recorder: impl Recorder + 'a) -> Self {
         let recorder = Box::new(recorder);
@@ -154,15 +154,15 @@ impl<'a> RunRequest<'a> {
     }
 }
 
-/// Executes a plan in a world of one's own. [`simulate`] is for those that a specification
-/// describes.
+/// Executes a plan in a world of the caller. [`simulate`] executes plans in a world that the
+/// specification describes.
 ///
-/// When the watcher wants no more, the run ends in order: what is running is cancelled, and what
-/// came of it until then is the answer. By the watcher's clock, making plans takes time
+/// If the watcher stops the run, the running actions are cancelled, and the answer contains the
+/// results so far. Planning time is measured by the watcher's clock
 /// ([`PlanningTime::Measured`](elbowroom_execution::run::PlanningTime::Measured)).
 ///
 /// # Errors
-/// When the specification contradicts itself. However the run ends is an answer.
+/// When the specification contradicts itself. A run that fails is an answer, not an error.
 pub fn run(
     request: RunRequest<'_>,
     world: &mut dyn World,
@@ -226,7 +226,7 @@ pub fn run(
 /// Executes a plan in the world that the specification describes.
 ///
 /// # Errors
-/// When there is no such world: the specification names a process or contradicts itself, or its
+/// When there is no such world: the specification names a process or contradicts itself, or the
 /// world file cannot be read.
 pub fn simulate(
     request: RunRequest<'_>,
@@ -243,7 +243,7 @@ pub fn simulate(
 }
 
 impl RunAnswer {
-    /// The document about a run.
+    /// Returns the document about a run.
     pub fn of(report: &Report) -> Self {
         Self {
             report: ReportLine::of(report),
@@ -257,13 +257,13 @@ impl RunAnswer {
 }
 
 impl RunOutcome {
-    /// The verdict of the run.
+    /// Returns the verdict of the run.
     pub fn verdict(&self) -> &Verdict {
         &self.report.verdict
     }
 }
 
-/// A watcher that is asked from several sides, one after the other.
+/// A watcher with shared access.
 struct Watched<'w>(Mutex<&'w mut (dyn Watcher + Send)>);
 
 impl<'w> Watched<'w> {
@@ -272,12 +272,12 @@ impl<'w> Watched<'w> {
     }
 }
 
-/// A record that the watcher hears of.
+/// Recorder that also notifies the watcher.
 struct Heard<'a, 'w> {
     inner: Box<dyn Recorder + 'a>,
     watched: &'a Watched<'w>,
     plans: usize,
-    /// What the planner said of the first plan.
+    /// The planner's remark on the first plan.
     remark: Arc<Mutex<Option<String>>>,
 }
 

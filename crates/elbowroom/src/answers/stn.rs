@@ -1,4 +1,4 @@
-//! Which orderings and times does a plan need?
+//! Deordering: plans with only the orderings and bounds that they need.
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -12,46 +12,46 @@ use crate::AnyPlan;
 use crate::flow::{self, FlowError};
 use crate::graph;
 
-/// Asks for a plan with only the orderings and bounds that it needs.
+/// Requests a plan with only the orderings and bounds that it needs.
 #[derive(Clone, Debug)]
 pub struct StnRequest<'a> {
     /// The problem.
     pub task: &'a Task,
-    /// The plan. One that is a network already is taken as it is.
+    /// The plan. A plan that is already a network is not changed.
     pub plan: AnyPlan,
 }
 
-/// The answer, and what it is about.
+/// The answer, and the network.
 #[derive(Clone, Debug)]
 pub struct StnOutcome {
     /// The answer as a document.
     pub answer: StnAnswer,
-    /// The network; `None` if the judge rejects the plan.
+    /// The network; `None` if the validator rejects the plan.
     pub plan: Option<ParametrizedPlan>,
 }
 
 /// A plan as a network: `docs/formats/stn-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StnAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: StnFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The answer itself.
     #[serde(flatten)]
     pub finding: StnFinding,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum StnFormat {
-    /// The only one.
+    /// The name `elbowroom-stn`.
     #[default]
     #[serde(rename = "elbowroom-stn")]
     Stn,
 }
 
-/// The result of the relaxation.
+/// The result of the deordering.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "lowercase")]
 pub enum StnFinding {
@@ -66,7 +66,7 @@ pub enum StnFinding {
         /// Bounds on their differences.
         constraints: Vec<ConstraintAnswer>,
     },
-    /// The judge rejects the plan.
+    /// The validator rejects the plan.
     Invalid {
         /// The reason.
         violation: ViolationAnswer,
@@ -76,11 +76,11 @@ pub enum StnFinding {
 /// A time point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NodeAnswer {
-    /// As in STN plan files.
+    /// Its name in STN plan files.
     pub name: String,
     /// The happening, in words.
     pub what: String,
-    /// When, for timed initials.
+    /// The time of timed initials.
     #[serde(with = "exact::option")]
     pub time: Option<Rational>,
 }
@@ -104,14 +104,14 @@ pub struct ConstraintAnswer {
         deserialize_with = "BoundAnswer::deserialize_upper"
     )]
     pub upper: BoundAnswer,
-    /// Why it is there, in one word.
+    /// The reason for the constraint, in one word.
     pub reason: String,
 }
 
 /// A bound of a constraint.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BoundAnswer {
-    /// There is none.
+    /// No bound.
     Infinite,
     /// A number.
     Finite(Rational),
@@ -119,10 +119,10 @@ pub enum BoundAnswer {
     Parameter(String),
 }
 
-/// Makes a network of a plan.
+/// Converts a plan into a network.
 ///
 /// # Errors
-/// When the plan cannot be deordered. That it is not valid is an answer.
+/// When the plan cannot be deordered. An invalid plan is an answer, not an error.
 pub fn stn(request: &StnRequest<'_>) -> Result<StnOutcome, RequestError> {
     let task = request.task;
     if let Some(feature) = task.left_to_the_judge() {
@@ -193,7 +193,7 @@ fn constraint(plan: &ParametrizedPlan, constraint: &Constraint) -> ConstraintAns
     }
 }
 
-/// A bound as it stands in a document: one of the two.
+/// A bound in a document: either a parameter or a number.
 #[derive(Deserialize)]
 struct Written {
     parameter: Option<String>,

@@ -1,4 +1,4 @@
-//! What the judge says is wrong with a plan.
+//! The validator's objection to a plan.
 
 use elbowroom_model::validate::Violation;
 use elbowroom_num::Rational;
@@ -10,11 +10,11 @@ pub struct ViolationAnswer {
     /// The time.
     #[serde(with = "super::exact")]
     pub time: Rational,
-    /// In which action; `None` if it is the goal that does not hold.
+    /// The action; `None` if the goal does not hold.
     pub action: Option<String>,
     /// The position of that action in the plan, from 0.
     pub step: Option<usize>,
-    /// All of it, in words.
+    /// Description of the violation.
     pub message: String,
 }
 

@@ -1,4 +1,4 @@
-//! Watching a request that takes long.
+//! Progress events and cancellation of long requests.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -11,33 +11,34 @@ use elbowroom_report::validation::Invalid;
 
 use super::RunProgress;
 
-/// Hears how far a request has come, and says when it has to end.
+/// Receives progress events of a request, and decides when it has to end.
 ///
-/// The library looks at no clock: who wants a time limit, or to know how long something took,
-/// brings one.
+/// The library reads no clock. A caller that wants a time limit or measured times implements
+/// [`elapsed`](Watcher::elapsed).
 pub trait Watcher {
-    /// The time since some fixed moment; only differences matter.
+    /// Returns the time since a fixed moment. Only differences are used.
     fn elapsed(&mut self) -> Duration {
         Duration::ZERO
     }
 
-    /// Whether to go on. Asked often; once it has said no, it should not change its mind.
+    /// Decides whether the request continues. It is called often. After the first break, it should
+    /// always break.
     fn flow(&mut self) -> ControlFlow<Halt>;
 
-    /// Something has come about.
+    /// Receives a progress event.
     fn notice(&mut self, event: &Event<'_>) {
         let _ = event;
     }
 }
 
-/// Why a watcher wants no more.
+/// A watcher's reason to stop a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Halt {
-    /// Time is up.
+    /// The time limit was reached.
     TimeLimit,
-    /// More memory would be needed.
+    /// The memory limit was reached.
     MemoryLimit,
-    /// Nobody is interested any longer.
+    /// The caller cancelled the request.
     Cancelled,
 }
 
@@ -47,9 +48,9 @@ pub enum Halt {
 pub enum Event<'a> {
     /// The search for an envelope has tried a step.
     Envelope(EnvelopeProgress<'a>),
-    /// A planner is at work, or has found a plan.
+    /// A planner is running, or has found a plan.
     Plan(PlanProgress<'a>),
-    /// Something has happened in a run.
+    /// An event of a run.
     Run(RunProgress<'a>),
     /// The validator rejects the latest entry of a run: a bug of this program. The run continues.
     Invalid(&'a Invalid),
@@ -60,48 +61,48 @@ pub enum Event<'a> {
 /// Progress of the search for an envelope.
 #[derive(Clone, Debug)]
 pub struct EnvelopeProgress<'a> {
-    /// The plan whose parameters the box is about.
+    /// The plan with the parameters of the box.
     pub plan: &'a Arc<ParametrizedPlan>,
-    /// The box so far. The plan is guaranteed to work in all of it.
+    /// The box so far. The plan is guaranteed to work inside it.
     pub envelope: &'a DecoupledEnvelope,
-    /// How often it has grown.
+    /// Number of widenings.
     pub widenings: usize,
     /// The number of boxes checked.
     pub checks: usize,
-    /// The number of steps that have been tried.
+    /// The number of steps tried.
     pub steps: usize,
 }
 
 /// Progress of a planner.
 #[derive(Clone, Debug)]
 pub struct PlanProgress<'a> {
-    /// The plan, if this is about a new one: about the task of the request, or a copy of it with a
-    /// table of its own.
+    /// The new plan, if there is one. Its facts are those of the task of the request, or of a copy
+    /// with its own table.
     pub plan: Option<&'a TimeTriggeredPlan>,
-    /// The end time of the last action, if this is about a new plan.
+    /// The end time of the last action of the new plan.
     pub makespan: Option<&'a Rational>,
-    /// The value of the problem's metric, if this is about a new plan and it has one.
+    /// The value of the problem's metric for the new plan, if it has one.
     pub metric: Option<&'a Rational>,
-    /// What a new best plan is worth, in words, where plans are not compared by metric or makespan.
+    /// The value of a new best plan, in words, if plans are not compared by metric or makespan.
     pub worth: Option<&'a str>,
     /// The number of plans so far.
     pub plans: usize,
-    /// The number of states that have been looked at; the embedded planner only.
+    /// The number of evaluated states; the embedded planner only.
     pub states: Option<u64>,
-    /// How much memory is used, in bytes; other planners only.
+    /// Memory in use, in bytes; other planners only.
     pub memory: Option<u64>,
 }
 
 /// Progress of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrialsProgress {
-    /// The number of trials that have been made.
+    /// The number of completed trials.
     pub done: u64,
-    /// Of how many.
+    /// The total number of trials.
     pub of: u64,
 }
 
-/// Nobody watches: the work goes on until it is done.
+/// Watcher that ignores all events and never stops a request.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unwatched;
 

@@ -1,4 +1,4 @@
-//! The actions of plans that differ: what a bound within plans goes by.
+//! Sets of actions of different plans, for bounds from plans.
 
 use std::sync::Arc;
 
@@ -13,33 +13,33 @@ use super::{Candidates, Embedded, Limits, Replanning, Rollouts, Tryout};
 use crate::flow;
 use crate::timed::{self, Settings};
 
-/// How many plans there are at most.
+/// Maximum number of plans.
 const MOST_PLANS: usize = 8;
 
-/// How many variants of the problem they are made for at most, and how many states may be looked at for
-/// all but the first.
+/// Maximum number of variants of the problem, and of states for all plans but the first.
 const MOST_SEARCHES: usize = 8;
 const OTHER_STATES: u64 = 10_000;
 
-/// In how many samples of the world the first plan is begun to see what comes after it, how many states may be looked
-/// at for all plans that come after it, and how many of these there are at most.
+/// Number of samples of the first plan to find fallbacks; maximum number of states for all later
+/// plans; maximum number of fallbacks.
 const SAMPLES: u64 = 24;
 const LATER_STATES: u64 = 10_000;
 const MOST_FALLBACKS: usize = 4;
 
-/// Sets of actions within which a bound is looked for.
+/// Sets of actions for restricted policies.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ActionSets {
-    /// Those of plans that differ, as the embedded planner makes them from the beginning, also for slow and scarce
-    /// variants: [`Settings::plans`].
+    /// Actions of different plans for the initial state, by the embedded planner, also for variants
+    /// with long durations and small amounts: [`Settings::plans`].
     pub plans: Vec<Vec<String>>,
-    /// Where everything happens at known times, those of plans that it makes when the first plan has failed in a
-    /// sample of the world, with what they need of the plans before: [`Settings::fallbacks`].
+    /// If everything happens at known times: actions of new plans after a failure of the first plan
+    /// in a sample of the world, with the supporting actions of the plans before:
+    /// [`Settings::fallbacks`].
     pub fallbacks: Vec<Vec<String>>,
 }
 
 impl ActionSets {
-    /// For the yardstick.
+    /// Computes the sets for bounds on the success probability ([`timed`]).
     pub fn new(
         task: &Task,
         world: &WorldModel,
@@ -49,7 +49,8 @@ impl ActionSets {
         Self::of(task, world, embedded, &|_| true, goes_on)
     }
 
-    /// For a [policy](timed::Policy); none where there would be no table for the first of them either.
+    /// Computes the sets for a [policy](timed::Policy); empty if there would be no table even for
+    /// the first set.
     pub fn to_tabulate(
         task: &Task,
         world: &WorldModel,
@@ -81,7 +82,7 @@ impl ActionSets {
             work: embedded.work,
             patience: embedded.patience,
         };
-        // What is only thought of gets no numbers.
+        // Planning must not add facts to the task's own table.
         let thought = task.with_own_table();
         let situation = Situation::initial(&thought);
         let replanning = Replanning {
@@ -106,7 +107,7 @@ impl ActionSets {
     }
 }
 
-/// See [`ActionSets::fallbacks`]; those of plans that are made most often first.
+/// Returns [`ActionSets::fallbacks`], the most frequent first.
 fn fallbacks(
     task: &Task,
     world: &WorldModel,
@@ -117,7 +118,7 @@ fn fallbacks(
     let work = replanning.work;
     let rollouts = Rollouts {
         world: Arc::new(world.clone()),
-        // It makes a new plan at the first deviation, so that more plans are seen.
+        // `guarded` replans at the first deviation, so more plans are found.
         executor: "guarded"
             .parse()
             .unwrap_or_else(|_| ExecutorSpec::default()),
@@ -139,7 +140,7 @@ fn fallbacks(
         let mut before = names(first);
         for plan in tryout.new_plans(first, sample) {
             let own = names(&plan);
-            // What goes on as the plans before is none of its own.
+            // A plan without new actions only continues the earlier plans.
             if own.iter().any(|name| !before.contains(name))
                 && let Ok(mut set) = timed::supported(task, world, &own, &before)
             {
@@ -154,7 +155,7 @@ fn fallbacks(
     found.into_keys().take(MOST_FALLBACKS).collect()
 }
 
-/// The names of a plan's actions.
+/// Returns the names of a plan's actions.
 fn names(plan: &TimeTriggeredPlan) -> Vec<String> {
     let steps = plan.steps.iter();
     steps.map(|step| step.action.name.clone()).collect()

@@ -1,4 +1,4 @@
-//! Makes plans ready: deordering, parameters, envelopes.
+//! Preparation of plans: deordering, parameters, envelopes.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -37,14 +37,14 @@ impl From<FlowError> for PrepareError {
     }
 }
 
-/// Makes plans ready with [`flow`].
+/// Prepares plans with [`flow`].
 #[derive(Clone)]
 pub struct Analyst {
     settings: flow::Settings,
     limit: Option<Limit>,
 }
 
-/// Says, while an envelope is computed, whether to go on.
+/// Decides whether the computation of an envelope continues.
 type Limit = Arc<dyn Fn() -> ControlFlow<()> + Send + Sync>;
 
 impl fmt::Debug for Analyst {
@@ -58,8 +58,8 @@ impl fmt::Debug for Analyst {
 }
 
 impl Analyst {
-    /// `settings.vary` says what to leave open of each plan; what a plan does not have, it cannot
-    /// leave open.
+    /// Creates a preparer. It ignores the specifications in `settings.vary` that name nothing in a
+    /// plan.
     pub fn new(settings: flow::Settings) -> Self {
         Self {
             settings,
@@ -67,8 +67,9 @@ impl Analyst {
         }
     }
 
-    /// The same, but content with the envelope so far as soon as `limit` says so. It is asked after
-    /// each step; the box is sound at any moment, only smaller than it could be.
+    /// Stops the computation of an envelope when `limit` breaks, and uses the box found so far.
+    /// `limit` is called after each step. The box is sound at any time, but may be smaller than
+    /// possible.
     #[must_use]
     pub fn until(mut self, limit: impl Fn() -> ControlFlow<()> + Send + Sync + 'static) -> Self {
         self.limit = Some(Arc::new(limit));
@@ -82,14 +83,14 @@ impl Analyst {
         }
     }
 
-    /// The specifications that fit something in the plan.
+    /// Returns the specifications that match something in the plan.
     fn specs(&self, task: &Task, freed: &Deordered) -> Result<Vec<VarySpec>, ParametrizeError> {
         let mut fitting = Vec::new();
         for spec in &self.settings.vary {
             let plan = freed.plan.clone();
             let one = std::slice::from_ref(spec);
             match parametrize(task, plan, &freed.nominal, one) {
-                // Numbers that the domain leaves open may be given by another specification.
+                // Another specification may define the value of an undefined number.
                 Ok(_) | Err(ParametrizeError::NoNominal { .. }) => fitting.push(spec.clone()),
                 Err(ParametrizeError::NothingMatches { .. }) => {}
                 Err(error) if is_about_an_absent_action(task, spec, &error) => {}
@@ -107,7 +108,7 @@ impl Analyst {
         Ok(flow::open(task, freed, &specs)?)
     }
 
-    /// The orderings by facts alone: see [`Need::Orderings`].
+    /// Returns the orderings that facts require: see [`Need::Orderings`].
     fn orderings(
         task: &Task,
         plan: &TimeTriggeredPlan,
@@ -199,8 +200,8 @@ impl Preparer for Analyst {
     }
 }
 
-/// Fixes the starts of actions that are under way. Nothing else does, because these starts need and change nothing; and
-/// if they could be chosen, the envelope would rest on that choice.
+/// Fixes the starts of running actions. These starts have no conditions or effects, so nothing else
+/// constrains them, and the envelope would depend on the choice of their times.
 fn hold_starts_under_way(plan: &mut StnPlan) {
     let is_under_way = |action: &Action| {
         let body = action.durative();
@@ -223,19 +224,21 @@ fn hold_starts_under_way(plan: &mut StnPlan) {
         }));
 }
 
-/// Where a box is looked for around what is left of a plan, all values are moved in turn, by this part of themselves at
-/// first, so that none takes the room of the others.
+/// Initial step size of the search for a box around the values of a remaining plan: a value is
+/// moved by itself divided by this number. Values are moved alternately, so that none uses up the
+/// slack of the others.
 const FIRST_STEP: i64 = 16;
 
-/// The boxes looked at for that, for each value.
+/// Maximum number of box checks of this search, per parameter.
 const MOST_CHECKS: usize = 64;
 
-/// The exact envelope, asked point by point. Of plans that are beyond exact analysis, the validator judges the earliest times.
+/// The exact envelope, checked point by point. If a plan is beyond exact analysis, the validator
+/// checks its earliest times.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WholeRegion;
 
 impl WholeRegion {
-    /// The oracle for a plan whose nominal values are these.
+    /// Returns the oracle for a plan with these nominal values.
     fn oracle_at(
         task: &Arc<Task>,
         plan: &ParametrizedPlan,
@@ -248,8 +251,7 @@ impl WholeRegion {
         Oracle::new(task, &Arc::new(plan), Guarantee::Weak)
     }
 
-    /// Judges the plan at its earliest times, with these values. Where the validator cannot decide, nothing speaks against
-    /// the plan.
+    /// Validates the plan at its earliest times, with these values. An undecided plan is accepted.
     ///
     /// # Errors
     /// The violation, in words.
@@ -264,7 +266,7 @@ impl WholeRegion {
         }
     }
 
-    /// The plan, with each range cut down to what lies between 0 and twice each value.
+    /// Returns the plan with each range cut to the values between 0 and twice the present value.
     fn nearby(plan: &ParametrizedPlan, values: &Valuation) -> ParametrizedPlan {
         let mut plan = plan.clone();
         for (parameter, value) in plan.parameters.iter_mut().zip(values) {
@@ -272,7 +274,7 @@ impl WholeRegion {
             let room = value.abs();
             let near = Interval::closed(value - &room, value + &room);
             let range = parameter.range.intersection(&near);
-            // What was observed may be out of range.
+            // Observed values may be out of range.
             let has_value = range.contains(value);
             parameter.range = if has_value {
                 range
@@ -284,8 +286,9 @@ impl WholeRegion {
     }
 }
 
-/// A box within which a plan works, with the ends moved on to the borders of ranges that steps in proportion to the
-/// values do not meet, if it works there, too: what is under way may end at once.
+/// Moves the ends of a box onto the nearby ends of ranges, if the plan still works there. The
+/// search misses them, because its steps are proportional to the values. For example, the lower end
+/// of the remaining duration of a running action is 0.
 fn up_to_ranges(oracle: &mut Oracle, known: DecoupledEnvelope) -> DecoupledEnvelope {
     let plan = Arc::clone(oracle.plan());
     let mut wider = known.clone();
@@ -316,7 +319,8 @@ impl Region for WholeRegion {
         values: &Valuation,
     ) -> Option<String> {
         if !plan.reads_more_than_facts(task) {
-            // What facts need is in the network, whatever the durations; the executor has it.
+            // The network contains all orderings that facts require, for any durations. The
+            // executor has this network.
             return None;
         }
         let Ok(mut oracle) = Self::oracle_at(task, plan, values) else {
@@ -331,7 +335,7 @@ impl Region for WholeRegion {
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }
 
-    /// IRR, nearby and in small steps.
+    /// Runs IRR nearby and in small steps.
     fn surroundings(
         &mut self,
         task: &Arc<Task>,
@@ -363,7 +367,8 @@ impl Region for WholeRegion {
         Ok(up_to_ranges(&mut oracle, known))
     }
 
-    /// One oracle for all values: only the proofs that use the greater value are looked for again.
+    /// Uses one oracle for all values, so that only the proofs that use the larger value are
+    /// repeated.
     fn growing<'a>(
         &'a mut self,
         task: &'a Arc<Task>,

@@ -1,20 +1,20 @@
-//! Plans of one problem that differ from each other: a source.
+//! Source of different plans for one problem.
 //!
-//! A planner goes for one thing, such as a short plan. Which of many plans is best by something
-//! that no planner goes for, a probability or a box, is found out by making many and comparing
-//! them. This makes them, one after the other, each time for a [`Variant`] of the problem:
+//! A planner optimizes one criterion, such as the makespan. The best plan by another criterion,
+//! such as a success probability or a box, is found by comparing many plans. This source makes
+//! them, each for a [`Variant`] of the problem:
 //!
-//! 1. as it is, each plan on the way to the shortest one included;
-//! 2. with actions that take long, and events that come early: as long, and as early, as in so many
-//!    of 100 cases where a world is known, by so much where none is; never shorter than planned;
-//! 3. in which actions take more, and bring less, than planned, where a world is known in which
-//!    amounts vary;
-//! 4. for the plan whose actions fail least often, where a world is known;
-//! 5. without an action of a plan that was found, and so on from there.
+//! 1. the problem as it is, with all plans on the way to the shortest one;
+//! 2. long durations and early events: with a world, the durations are quantiles (not exceeded in
+//!    80 of 100 cases, for example); without one, the planned durations are multiplied by a factor;
+//!    no duration is shorter than planned;
+//! 3. larger consumption and smaller production than planned, with a world whose amounts vary;
+//! 4. actions that rarely fail, with a world;
+//! 5. the problem without an action of a plan found before, recursively.
 //!
-//! Plans are of the problem as it is, whatever variant they were made for: the judge has found each
-//! of them valid, and no two have the same actions in the same order. No clock and no dice are
-//! looked at: the same problem, world and limits give the same plans.
+//! The validator has accepted each plan for the problem as it is, whatever variant it was made for.
+//! No two plans have the same actions in the same order. The source uses no clock and no random
+//! seed: the same problem, world and limits give the same plans.
 
 mod scarcity;
 mod variant;
@@ -37,49 +37,51 @@ use scarcity::scarcities;
 pub use variant::Pace;
 use variant::{Variant, duration_fixed_by_domain, written};
 
-/// What is left out of searches for plans to choose from.
+/// Refinements that are disabled in searches for plans to choose from.
 const REFINEMENT: [embedded::Technique; 2] = [
     embedded::Technique::Rescheduling,
     embedded::Technique::Repair,
 ];
 
-/// How many states more than the first plan took a plan of a variant may take.
+/// Maximum number of states for a plan of a variant, as a multiple of the number for the first
+/// plan.
 const PATIENCE: u64 = 8;
 
-/// How many states a search for a plan of a variant has in any case.
+/// Minimum number of states for a plan of a variant.
 const LEAST_STATES: u64 = 1_000;
 
-/// A search for a plan where things are scarce has one in so many of the states that are left: that
-/// there is none often shows only when all was looked at.
+/// A search in a variant with small amounts gets the remaining states divided by this number. If
+/// there is no plan, such a search often has to exhaust the state space.
 const SCARCE_SHARE: u64 = 2;
 
-/// How far candidates are looked for.
+/// Limits on the search for candidate plans.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// The states that may be looked at for the plan of the problem as it is.
+    /// Maximum number of states for the plan of the problem as it is.
     pub most_states: u64,
-    /// Of these, the states for a better plan than the first.
+    /// Maximum number of these states for a better plan than the first.
     pub improve_states: u64,
-    /// The states that may be looked at for all other plans together.
+    /// Maximum number of states for all other plans together.
     pub other_states: u64,
-    /// The number of variants that may be asked for.
+    /// Maximum number of variants.
     pub searches: usize,
-    /// Work limit for all plans together, and for trying them out, in units of [`elbowroom_num::work`].
+    /// Work limit for all plans together, and for their samples, in units of
+    /// [`elbowroom_num::work`].
     pub work: u64,
     /// The plan for the unchanged problem may take this multiple of `work`.
     pub patience: u64,
 }
 
-/// A plan, and what it was made for.
+/// A plan, with the variant that it was made for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// The plan, on the task's clock. The judge has found it valid.
+    /// The plan, on the task's clock. The validator has accepted it.
     pub plan: TimeTriggeredPlan,
-    /// What it was made for, in words; empty for the best plan of the problem as it is.
+    /// The variant that it was made for, in words; empty for the best plan of the problem as it is.
     pub made_for: String,
 }
 
-/// A source of plans that differ.
+/// A source of different plans.
 pub struct Candidates<'a> {
     task: &'a Task,
     situation: &'a Situation,
@@ -88,10 +90,10 @@ pub struct Candidates<'a> {
     limits: Limits,
     queue: VecDeque<Variant>,
     asked: BTreeSet<Variant>,
-    /// Found, and not yet given out.
+    /// Plans found, but not returned yet.
     ready: VecDeque<Candidate>,
     known: BTreeSet<Vec<String>>,
-    /// All that were found.
+    /// All plans found.
     plans: Vec<TimeTriggeredPlan>,
     states: u64,
     budget: work::Budget,
@@ -100,7 +102,7 @@ pub struct Candidates<'a> {
 }
 
 impl<'a> Candidates<'a> {
-    /// The plans of a task from a situation in which nothing is under way.
+    /// Creates a source of plans for a task from a situation without running actions.
     pub fn new(
         task: &'a Task,
         situation: &'a Situation,
@@ -109,7 +111,7 @@ impl<'a> Candidates<'a> {
         limits: Limits,
     ) -> Self {
         let paces: &[Pace] = match world {
-            // Where nothing that takes time, or comes by itself, is left to chance.
+            // No durations or events are random.
             Some(world) if is_punctual(world) => &[],
             Some(_) => &[
                 Pace::Quantile(80),
@@ -133,7 +135,7 @@ impl<'a> Candidates<'a> {
         }
         let scarce = world.map(scarcities).unwrap_or_default();
         for (place, scarcity) in scarce.into_iter().enumerate() {
-            // By turns with those that take long.
+            // Alternate with variants of long durations.
             let place = (2 * place + 1).min(queue.len());
             queue.insert(place, Variant::with(scarcity));
         }
@@ -162,12 +164,13 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// What the planner answered to the problem as it is, once that was asked for.
+    /// Returns the planner's answer for the problem as it is, after that search.
     pub fn answer(&self) -> Option<&embedded::Answer> {
         self.answer.as_ref()
     }
 
-    /// Statistics of all searches so far: the states looked at, and of the first search the rest.
+    /// Returns the statistics: the number of evaluated states of all searches, the other counts of
+    /// the first search.
     pub fn counts(&self) -> Counts {
         let counts = match &self.answer {
             Some(
@@ -183,8 +186,9 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// The next plan; `None` when there are no more within the limits. `goes_on` is asked often, and
-    /// told the number of states looked at so far; when it says no, there are no more plans.
+    /// Returns the next plan; `None` if there are no more plans within the limits. `goes_on` is
+    /// called often, with the number of evaluated states so far; if it returns `false`, there are
+    /// no more plans.
     pub fn next(&mut self, goes_on: &mut dyn FnMut(u64) -> bool) -> Option<Candidate> {
         loop {
             if let Some(candidate) = self.ready.pop_front() {
@@ -200,13 +204,13 @@ impl<'a> Candidates<'a> {
             let variant = self.queue.pop_front()?;
             self.search(&variant, goes_on);
             if self.answer.as_ref().is_none_or(|a| a.found().is_none()) {
-                // Where there is no plan, there is none without this or that either.
+                // Variants without an action have no plan if the problem has none.
                 return None;
             }
         }
     }
 
-    /// The limits on states for a plan of a variant, and for a better plan than the first.
+    /// Returns the limits on states for a plan of a variant, and for a better plan than the first.
     fn most_states(&self, variant: &Variant) -> (u64, u64) {
         if variant.is_problem() {
             (self.limits.most_states, self.limits.improve_states)
@@ -215,7 +219,8 @@ impl<'a> Candidates<'a> {
             let left = (self.limits.other_states + first).saturating_sub(self.states);
             let most = LEAST_STATES.max(PATIENCE.saturating_mul(first)).min(left);
             if variant.scarcity.is_some() {
-                // The first plan found makes up for what is scarce somehow: a better one does so in time.
+                // The first plan found may compensate small amounts in a wasteful way; a better one
+                // does so in time.
                 (left / SCARCE_SHARE, left / SCARCE_SHARE)
             } else {
                 (most, most.min(self.limits.improve_states))
@@ -223,7 +228,7 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// Plans for a variant.
+    /// Searches for plans of a variant.
     fn search(&mut self, variant: &Variant, goes_on: &mut dyn FnMut(u64) -> bool) {
         let own = variant.is_problem();
         let (most, improve) = self.most_states(variant);
@@ -236,7 +241,8 @@ impl<'a> Candidates<'a> {
         } else {
             work
         };
-        // Plans that differ are asked for, not the best one: the states are for searching, not for refining.
+        // The aim is different plans, not the best one, so the states are used for search instead
+        // of refinement.
         let mut tuning = self.settings.tuning.clone();
         tuning.without.extend(REFINEMENT);
         let settings = embedded::Settings {
@@ -300,7 +306,7 @@ impl<'a> Candidates<'a> {
             self.first_states = Some(states);
             self.answer = Some(answer);
         }
-        // The best first: it is what the planner would have been asked for.
+        // The best plan first: it is the planner's answer.
         plans.reverse();
         for (place, plan) in plans.into_iter().enumerate() {
             let Some(plan) = self.of_task(variant, &plan) else {
@@ -321,7 +327,7 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// Whether a plan that is known works as well in a problem like the task, from there.
+    /// Returns `true` if a known plan is valid for `task` from situation `there`.
     fn has_plan_for(&self, task: &Task, there: &Situation) -> bool {
         let works = |plan: &TimeTriggeredPlan| {
             let settings = validate::Settings::default();
@@ -331,8 +337,8 @@ impl<'a> Candidates<'a> {
         self.plans.iter().any(works)
     }
 
-    /// A plan of a variant as a plan of the task: with the domain's durations, and no later than it
-    /// has to be; `None` if the judge finds none.
+    /// Converts a plan of a variant to the task: with the domain's durations, and as early as
+    /// possible. `None` if the validator rejects it.
     fn of_task(&self, variant: &Variant, plan: &TimeTriggeredPlan) -> Option<TimeTriggeredPlan> {
         if variant.is_as_written() {
             return Some(plan.clone());
@@ -357,7 +363,8 @@ impl<'a> Candidates<'a> {
         early.or_else(|| is_valid(&plan).then_some(plan))
     }
 
-    /// Asks for plans that do without one more action, those first that fail most often.
+    /// Queues variants without one more action of the plan, beginning with those that fail most
+    /// often.
     fn go_without(&mut self, variant: &Variant, plan: &TimeTriggeredPlan) {
         let mut names: Vec<&str> = Vec::with_capacity(plan.steps.len());
         for step in &plan.steps {
@@ -379,12 +386,12 @@ impl<'a> Candidates<'a> {
     }
 }
 
-/// Whether actions take as long as planned, and nothing happens by itself.
+/// Returns `true` if durations are as planned, and no events occur.
 fn is_punctual(world: &WorldModel) -> bool {
     world.durations.is_empty() && world.delays.is_empty() && world.exogenous.is_empty()
 }
 
-/// What tells plans apart: their actions, in the order in which they start.
+/// Returns the key of a plan: its actions by start time.
 fn order(plan: &TimeTriggeredPlan) -> Vec<String> {
     let mut steps: Vec<_> = plan.steps.iter().collect();
     steps.sort_by(|a, b| (&a.start, &a.action.name).cmp(&(&b.start, &b.action.name)));
@@ -394,7 +401,7 @@ fn order(plan: &TimeTriggeredPlan) -> Vec<String> {
         .collect()
 }
 
-/// The plan's order with everything as early as it can be; `None` where the plan has no order.
+/// Returns the plan in the same order with the earliest times; `None` if the plan has no order.
 pub(crate) fn tightened(
     task: &Task,
     situation: &Situation,

@@ -4,9 +4,10 @@ use elbowroom_model::ground;
 use elbowroom_model::problem::{Body, Change, Condition, Effect, Guard};
 use elbowroom_model::{Footprint, Task};
 
-/// Returns the reason for which a goal of this task cannot have a deadline, in words; `None` if it can.
+/// Returns the reason why a goal of this task cannot have a deadline, in words; `None` if it can.
 ///
-/// The envelope of a plan respects a deadline if the goal is about facts that unconditional effects of actions change.
+/// The envelope of a plan respects a deadline if the goal is about facts that unconditional effects
+/// of actions change.
 pub fn obstacle_to_deadline(task: &Task, goal: &Condition) -> Option<String> {
     if !task.problem().constraints.is_empty() || !task.constraints().soft.is_empty() {
         let why = "a goal cannot have a deadline where the problem has constraints or preferences";

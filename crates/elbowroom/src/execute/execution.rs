@@ -1,4 +1,4 @@
-//! Everything that executing a plan takes, put together: [`Execution`].
+//! Builder of a run: [`Execution`].
 
 use std::sync::Arc;
 
@@ -16,11 +16,10 @@ use elbowroom_probability::Likelihoods;
 use super::{Analyst, Embedded, SharedRehearse, WholeRegion};
 use crate::flow;
 
-/// A goal in PDDL that is given while a run of this task goes on: the condition alone, as it stands
-/// behind `:goal`.
+/// Reads a goal in PDDL for a running execution of this task: the condition alone, without `:goal`.
 ///
 /// # Errors
-/// In words, in one line, when it is no condition on what the problem has.
+/// One line in words, when it is not a condition of the problem.
 pub fn read_goal(task: &Task, text: &str) -> Result<Condition, String> {
     match elbowroom_pddl::read_goal(&Source::new("the goal", text), task.problem()) {
         Ok((goal, _warnings)) => Ok(goal),
@@ -37,11 +36,11 @@ fn first_mistake(mistakes: &Diagnostics) -> String {
 }
 
 /// Executes a plan in a world, with one of the
-/// [executors](elbowroom_execution::executors::EXECUTORS), and with the embedded planner for when
-/// the plan no longer works. [`Execution`] has everything else that can be chosen.
+/// [executors](elbowroom_execution::executors::EXECUTORS), and with the embedded planner for
+/// replanning. [`Execution`] has further options.
 ///
 /// # Errors
-/// When there is no executor of that name. Whatever happens in the world, there is a report.
+/// When there is no executor of that name. A run that fails is reported, not an error.
 pub fn execute(
     task: &Arc<Task>,
     plan: &TimeTriggeredPlan,
@@ -52,8 +51,8 @@ pub fn execute(
     Ok(execution.beginning_with(plan.clone()).run_in(world))
 }
 
-/// An execution: who decides, who plans, and how; whatever is not said is as the command
-/// `elbowroom run` has it by default.
+/// Builder of a run: executor, planner, settings and ports. The defaults are those of the command
+/// `elbowroom run`.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -131,7 +130,7 @@ pub struct Execution<'a> {
     listener: Option<Listener<'a>>,
 }
 
-/// Is told what a run believes ([`Run::told_to`]).
+/// Callback for the belief state of a run ([`Run::told_to`]).
 pub type Listener<'a> = Box<dyn FnMut(&Progression) + Send + 'a>;
 
 /// The executor of a run: a registered one, or the caller's own.
@@ -141,7 +140,7 @@ enum Decider<'a> {
 }
 
 impl<'a> Execution<'a> {
-    /// An execution of a task, without a plan to begin with.
+    /// Creates an execution of a task, without an initial plan.
     pub fn of(task: &Arc<Task>) -> Self {
         Self {
             task: Arc::clone(task),
@@ -168,19 +167,19 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Begins with this plan. Without one, one is made.
+    /// Starts with this plan. Without one, the planner makes one.
     pub fn beginning_with(self, plan: impl Into<Option<TimeTriggeredPlan>>) -> Self {
         let plan = plan.into();
         Self { plan, ..self }
     }
 
-    /// Goes on as a lasting run stood: see [`Run::standing`].
+    /// Resumes an executive's run from this state: see [`Run::standing`].
     pub fn standing(self, stand: impl Into<Option<Stand>>) -> Self {
         let stand = stand.into();
         Self { stand, ..self }
     }
 
-    /// Goes on after it was over, so many times: see [`Run::reopened`].
+    /// Sets the number of times that the run was continued after its end: see [`Run::reopened`].
     pub fn reopened(self, times: usize) -> Self {
         Self {
             reopened: times,
@@ -188,29 +187,29 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Has this executor decide.
+    /// Sets the executor.
     pub fn by(self, executor: ExecutorSpec) -> Self {
         let executor = Decider::Registered(executor);
         Self { executor, ..self }
     }
 
-    /// Has an executor of your own decide.
+    /// Sets an executor of the caller.
     pub fn decided_by(self, executor: impl Executor + 'a) -> Self {
         let executor = Decider::Another(Box::new(executor));
         Self { executor, ..self }
     }
 
-    /// Runs like that.
+    /// Sets the settings of the run.
     pub fn with_settings(self, settings: RunSettings) -> Self {
         Self { settings, ..self }
     }
 
-    /// Leaves that open in each plan, guarantees that, and searches for envelopes like that.
+    /// Sets the open quantities, the guarantee and the search of envelopes.
     pub fn with_envelopes(self, flow: flow::Settings) -> Self {
         Self { flow, ..self }
     }
 
-    /// Takes this to be likely, in executors that go by that.
+    /// Sets the likelihoods, for executors that use them.
     pub fn with_likelihoods(self, likelihoods: Arc<Likelihoods>) -> Self {
         Self {
             likelihoods,
@@ -218,53 +217,51 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Goes by what `lookahead` found out about the same problem and likelihoods in other runs.
+    /// Reuses results of `lookahead` for the same problem and likelihoods from other runs.
     pub fn with_foresight(self, foresight: Foresight) -> Self {
         Self { foresight, ..self }
     }
 
-    /// Goes by these odds, in executors that look for likelier plans
-    /// ([`ExecutorSpec::asks_odds`]).
+    /// Sets the odds, for executors that search for likelier plans ([`ExecutorSpec::asks_odds`]).
     pub fn with_odds(self, odds: Option<Box<dyn Odds>>) -> Self {
         Self { odds, ..self }
     }
 
-    /// Goes by this outlook, in executors that weigh each move ([`ExecutorSpec::asks_outlook`]).
+    /// Sets the outlook, for executors that evaluate each move ([`ExecutorSpec::asks_outlook`]).
     pub fn with_outlook(self, outlook: Option<Arc<dyn Outlook>>) -> Self {
         Self { outlook, ..self }
     }
 
-    /// Notes why there is no outlook, although the executor weighs each move by one.
+    /// Records the reason for a missing outlook of an executor that evaluates each move.
     pub(crate) fn without_table(self, no_table: Option<String>) -> Self {
         Self { no_table, ..self }
     }
 
-    /// Returns why there is no table of moves for an executor that weighs each move; `None` if there is one or none was
-    /// attempted.
+    /// Returns why there is no table of moves for an executor that evaluates each move; `None` if
+    /// there is one or none was attempted.
     pub fn no_table(&self) -> Option<&str> {
         self.no_table.as_deref()
     }
 
-    /// Tries out what can be done like that, in executors that weigh each move where there is no
-    /// outlook.
+    /// Sets the rollouts, for executors that evaluate each move without an outlook.
     pub fn with_rehearsal(self, rehearsal: Option<SharedRehearse>) -> Self {
         Self { rehearsal, ..self }
     }
 
-    /// Has this planner make plans, not the embedded one with its usual limits
+    /// Sets the planner. The default is the embedded one with its usual limits
     /// ([`Embedded::default`]).
     pub fn planned_by(self, planner: impl Planner + 'a) -> Self {
         let planner: Option<Box<dyn Planner + 'a>> = Some(Box::new(planner));
         Self { planner, ..self }
     }
 
-    /// Has plans made ready like that, not by an [`Analyst`].
+    /// Sets the preparer of plans. The default is an [`Analyst`].
     pub fn prepared_by(self, preparer: impl Preparer + 'a) -> Self {
         let preparer: Option<Box<dyn Preparer + 'a>> = Some(Box::new(preparer));
         Self { preparer, ..self }
     }
 
-    /// Keeps a record.
+    /// Sets the recorder.
     pub fn recorded_by(self, recorder: impl Recorder + 'a) -> Self {
         let recorder = Box::new(recorder);
         Self { recorder, ..self }
@@ -284,13 +281,13 @@ impl<'a> Execution<'a> {
         }
     }
 
-    /// Goes on when the goal is reached, and takes other goals, in PDDL, while it runs: see
-    /// [`Run::lasting`].
+    /// Makes the run persistent: it continues after reaching the goal, and accepts further goals in
+    /// PDDL. See [`Run::lasting`].
     pub fn lasting(self, is_lasting: bool) -> Self {
         Self { is_lasting, ..self }
     }
 
-    /// Can be paused, and its goal abandoned, while it runs: see [`Run::attended`].
+    /// Makes the run accept pauses and the abandonment of its goal: see [`Run::attended`].
     pub fn attended(self, is_attended: bool) -> Self {
         Self {
             is_attended,
@@ -356,7 +353,7 @@ impl<'a> Execution<'a> {
         (run, Box::new(workers))
     }
 
-    /// The whole run, in this world.
+    /// Executes the whole run in this world.
     pub fn run_in(self, world: &mut dyn World) -> Report {
         let (run, mut workers) = self.run();
         run.go(world, &mut *workers)

@@ -1,4 +1,4 @@
-//! Other people's planners behind the port of [`execution`](crate::execution).
+//! Other planners behind the port of [`execution`](crate::execution).
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -11,24 +11,24 @@ use elbowroom_pddl::Source;
 
 use crate::flow;
 
-/// A program that plans, supervised; each of its plans is judged, and where only its times are
-/// rounded, they are chosen again.
+/// A supervised planner process. Each of its plans is validated; if only its times are rounded,
+/// they are computed again.
 ///
-/// The program takes as long as it takes, and that is measured. If it crashes, or somebody kills it, it is
-/// asked once more. What goes wrong with it then, is said in the answer
-/// ([`PlanAnswer::Failed`]): a run has no plan then, and ends.
+/// The planning time is measured. If the process crashes or is killed, it is started once more. If
+/// it fails again, the answer contains the reason ([`PlanAnswer::Failed`]); the run then has no
+/// plan, and ends.
 pub struct External<'a> {
-    /// Which program.
+    /// The planner.
     pub planner: external::Planner,
-    /// The domain, to the letter.
+    /// The domain, as written.
     pub domain: Source,
-    /// The problem, to the letter; in mid-execution it is written anew.
+    /// The problem, as written; for replanning, a new problem is written.
     pub problem: Source,
     /// Its limits.
     pub settings: Settings,
-    /// Whether to take the first plan; otherwise the last one before the time limit.
+    /// `true` to use the first plan; `false` to use the last one before the time limit.
     pub takes_first: bool,
-    /// Asked about fifty times a second whether to go on.
+    /// Called about fifty times a second; returns `false` to stop the planner.
     pub goes_on: &'a (dyn Fn() -> bool + Sync),
 }
 
@@ -44,7 +44,7 @@ impl Planner for External<'_> {
 }
 
 impl External<'_> {
-    /// Has the program plan.
+    /// Runs the planner.
     fn ask(&self, task: &Task, situation: &Situation) -> Report {
         external::plan(
             &self.planner,
@@ -67,7 +67,7 @@ impl External<'_> {
         )
     }
 
-    /// The answer, `before` which as much time had passed.
+    /// Returns the answer. `before` is the duration of an earlier attempt.
     fn answer(&self, report: Report, before: Duration) -> PlannerAnswer {
         let name = &self.planner.name;
         let mut remark = None;
@@ -76,11 +76,11 @@ impl External<'_> {
                 remark = self_overlap(&found.plan);
                 PlanAnswer::Plan(found.plan)
             }
-            // "No plan exists" is its claim, not a proof.
+            // A claim that no plan exists is not a proof.
             Outcome::NotStarted { ref help, .. } => PlanAnswer::Failed {
                 why: format!("{name}: {}; {help}", report.outcome),
             },
-            // The same outcomes are failures where somebody asks for a plan alone.
+            // `plan` requests treat the same outcomes as failures.
             other @ (Outcome::Crashed { .. }
             | Outcome::NotUnderstood { .. }
             | Outcome::Unsupported { .. }
@@ -112,7 +112,7 @@ fn self_overlap(plan: &TimeTriggeredPlan) -> Option<String> {
     ))
 }
 
-/// In whole microseconds.
+/// Converts a duration to seconds, in whole microseconds.
 fn seconds(duration: Duration) -> Rational {
     let micros = i64::try_from(duration.as_micros()).unwrap_or(i64::MAX);
     Rational::new(micros, 1_000_000)

@@ -1,4 +1,4 @@
-//! Actions as a dispatcher sees them that knows no numbers, or no durations but the planned ones.
+//! Plans for dispatchers without numbers, or with planned durations only.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -9,8 +9,8 @@ use elbowroom_model::ground::{
 use elbowroom_model::{Step, Task, TimeTriggeredPlan};
 use elbowroom_plan::with_bounds_of_conditions;
 
-/// The plan without conditions on numbers, and without effects on numbers that decide neither durations nor facts: what
-/// `ROSPlan` orders happenings by.
+/// Returns the plan without conditions on numbers, and without effects on numbers that affect
+/// neither durations nor facts. `ROSPlan` orders happenings in the same way.
 pub(super) fn facts_only(task: &Task, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
     let actions = plan
         .steps
@@ -37,8 +37,8 @@ pub(super) fn facts_only(task: &Task, plan: &TimeTriggeredPlan) -> TimeTriggered
     }
 }
 
-/// The fluents that decide durations and facts: durations, guards of effects on facts, and derived facts read them, or
-/// other such fluents are computed from them.
+/// Returns the fluents that affect durations and facts: durations, guards of effects on facts, and
+/// derived facts read them, or other such fluents are computed from them.
 fn deciding(task: &Task, actions: &[Action]) -> BTreeSet<FluentId> {
     let mut deciding = BTreeSet::new();
     loop {
@@ -86,7 +86,7 @@ fn deciding(task: &Task, actions: &[Action]) -> BTreeSet<FluentId> {
     }
 }
 
-/// Adds the fluents that a condition reads, also through rules.
+/// Adds the fluents that a condition reads, directly or through derived predicates.
 fn include(task: &Task, condition: &Condition, read: &mut BTreeSet<FluentId>) {
     task.visit_fluents_of(condition, &mut |fluent| {
         read.insert(fluent);
@@ -99,7 +99,7 @@ fn include_guard(task: &Task, guard: &Guard, read: &mut BTreeSet<FluentId>) {
     }
 }
 
-/// The action with its comparisons taken for fulfilled.
+/// Returns the action with its comparisons assumed true.
 fn without_conditions(action: &Action) -> Action {
     let mut action = action.clone();
     let without = |snap: &mut SnapAction| snap.condition = taken_as(&snap.condition, true);
@@ -114,7 +114,7 @@ fn without_conditions(action: &Action) -> Action {
     action
 }
 
-/// Drops effects on other fluents than these.
+/// Removes effects on fluents outside `deciding`.
 fn strip(snap: &mut SnapAction, deciding: &BTreeSet<FluentId>) {
     let is_kept = |effect: &Effect| match &effect.change {
         Change::Update { fluent, .. } => deciding.contains(fluent),
@@ -123,7 +123,7 @@ fn strip(snap: &mut SnapAction, deciding: &BTreeSet<FluentId>) {
     snap.effects.retain(is_kept);
 }
 
-/// The condition with its comparisons taken for fulfilled; below a negation, for not fulfilled.
+/// Returns the condition with its comparisons assumed true; below a negation, false.
 fn taken_as(condition: &Condition, truth: bool) -> Condition {
     match condition {
         Condition::Fact(fact) => Condition::Fact(*fact),
@@ -137,8 +137,8 @@ fn taken_as(condition: &Condition, truth: bool) -> Condition {
     }
 }
 
-/// The plan with each planned duration in place of `?duration`: numbers that depend on how long
-/// something takes are followed as if all went as planned.
+/// Returns the plan with each planned duration in place of `?duration`: numbers that depend on
+/// durations are computed as planned.
 pub(crate) fn as_timed(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
     TimeTriggeredPlan {
         steps: plan.steps.iter().map(timed).collect(),
@@ -152,7 +152,7 @@ fn timed(step: &Step) -> Step {
         _ => None,
     };
     Step {
-        // What conditions say of other durations counts among the bounds.
+        // Conditions on durations are converted to bounds.
         action: Arc::new(with_bounds_of_conditions(&step.action).map_leaves(&mut planned)),
         ..step.clone()
     }

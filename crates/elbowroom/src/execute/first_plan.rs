@@ -1,4 +1,4 @@
-//! Which plan a run begins with.
+//! Choice of the first plan of a run.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -21,50 +21,50 @@ use super::planners::{CERTIFICATE_WORK, PATIENCE, without_plan};
 use super::race::{Rules, race};
 use super::rollouts::{Rollouts, Tryout};
 
-/// How many plans are compared at most.
+/// Maximum number of compared plans.
 const MOST_PLANS: usize = 12;
 
-/// How many variants of the problem are planned for at most.
+/// Maximum number of variants of the problem to plan for.
 const MOST_SEARCHES: usize = 20;
 
-/// How many samples the first plan is tried out in before others are made.
+/// Number of samples of the first plan before other plans are made.
 const FIRST_LOOK: u64 = 100;
 
-/// How many actions the plans have at most that are tried out, over all samples: what bounds the
-/// time that a choice takes among plans of hundreds of actions.
+/// Maximum number of actions in sampled plans, summed over all samples. It limits the time of the
+/// choice among plans of hundreds of actions.
 const MOST_ACTIONS: u64 = 50_000;
 
-/// How many states may be looked at for all other plans than the first, in any case.
+/// Minimum number of states for all plans but the first.
 const LEAST_OTHER_STATES: u64 = 10_000;
 
-/// How many partial orders are looked at for the likeliest order of a plan.
+/// Maximum number of partial orders in the search for the likeliest order of a plan.
 const MOST_SEQUENCES: usize = 5_000;
 
-/// By what the first plan of a run is chosen.
+/// Criterion for the first plan of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FirstPlan {
-    /// It is the planner's: the shortest that it finds, or the best by the problem's metric.
+    /// The planner's plan: the shortest that it finds, or the best by the problem's metric.
     #[default]
     Shortest,
-    /// It is the plan, of several that the embedded planner makes, with which the executor reaches
-    /// the goal most often in samples of the world, or, where nothing but likelihoods is known,
-    /// whose actions are likeliest to succeed.
+    /// The likeliest of several plans of the embedded planner: with a world, the plan whose samples
+    /// reach the goal most often; with likelihoods only, the plan whose actions are likeliest to
+    /// succeed.
     Likeliest,
 }
 
-/// A name that is none of [`FirstPlan`].
+/// The name of an unknown [`FirstPlan`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a first plan is `shortest` or `likeliest`, not `{0}`")]
 pub struct UnknownFirstPlan(String);
 
 impl FirstPlan {
-    /// Whether it is the planner's.
+    /// Returns `true` if it is the planner's plan.
     pub fn is_shortest(&self) -> bool {
         *self == Self::Shortest
     }
 
-    /// By which it is mentioned.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Shortest => "shortest",
@@ -89,22 +89,22 @@ impl FromStr for FirstPlan {
     }
 }
 
-/// How likely a plan is to succeed, as far as that was found out.
+/// Success probability of a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
-    /// It was tried out.
+    /// An estimate from samples.
     Sampled {
-        /// How often it succeeded.
+        /// Number of successful samples.
         successes: u64,
-        /// In how many samples.
+        /// Number of samples.
         samples: u64,
     },
-    /// The probability that all its actions succeed and the goal holds after them.
+    /// The exact probability that all its actions succeed and the goal holds after them.
     Exact(f64),
 }
 
 impl Value {
-    /// As a number; 0 if nothing was found out.
+    /// Returns the probability; 0 without samples.
     #[expect(clippy::cast_precision_loss, reason = "some hundred samples")]
     pub fn probability(self) -> f64 {
         match self {
@@ -121,18 +121,18 @@ impl fmt::Display for Value {
     }
 }
 
-/// The plan that was chosen, and among what.
+/// The chosen plan, and the comparison behind the choice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     /// The plan.
     pub plan: TimeTriggeredPlan,
-    /// What it was made for, in words; empty if it is the shortest.
+    /// The variant of the problem that it was made for, in words; empty if it is the shortest plan.
     pub made_for: String,
-    /// How likely it is to succeed.
+    /// Success probability of the plan.
     pub value: Value,
-    /// How likely the shortest plan is to.
+    /// Success probability of the shortest plan.
     pub shortest: Value,
-    /// How many plans were compared.
+    /// Number of compared plans.
     pub plans: usize,
 }
 
@@ -164,48 +164,49 @@ impl fmt::Display for Choice {
     }
 }
 
-/// How to choose.
+/// Settings of the choice.
 pub struct Chooser<'a> {
-    /// How the embedded planner plans.
+    /// Settings of the embedded planner.
     pub settings: embedded::Settings,
-    /// How far it looks. As many states as for the first plan, at most, and 10,000 in any case, may be
-    /// looked at for all others together.
+    /// Maximum number of states for the first plan. All other plans together may take the same
+    /// number, and at least 10,000.
     pub most_states: u64,
     /// See [`Embedded::improve_states`](super::Embedded::improve_states).
     pub improve_states: u64,
-    /// Work limit of the choice, in units of [`elbowroom_num::work`]. If it is spent, the plan is the best so far; to
-    /// find a first plan may take [`PATIENCE`](super::Embedded::patience) times as much.
+    /// Work limit of the choice, in units of [`elbowroom_num::work`]. If it is spent, the plan is
+    /// the best so far. The search for a first plan may take
+    /// [`PATIENCE`](super::Embedded::patience) times as much.
     pub work: u64,
-    /// What is known.
+    /// Knowledge of the world.
     pub known: Known,
-    /// Asked often whether to go on. When it says no, the plan is the best so far.
+    /// Called often; if it returns `false`, the plan is the best so far.
     pub goes_on: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// What is known of the world.
+/// Knowledge of the world.
 #[derive(Clone)]
 pub enum Known {
-    /// Its distributions: plans are tried out.
+    /// Distributions: plans are sampled.
     World(Rollouts),
-    /// How likely actions and facts are to do what they should, whatever the time.
+    /// Likelihoods of actions and facts, independent of time.
     Likelihoods {
-        /// That.
+        /// The likelihoods.
         likelihoods: Arc<Likelihoods>,
-        /// Whether the executor chooses the likeliest order of a plan's actions.
+        /// `true` if the executor chooses the likeliest order of a plan's actions.
         reorders: bool,
     },
 }
 
 impl Chooser<'_> {
-    /// The likeliest plan of a task from a situation in which nothing is under way.
+    /// Returns the likeliest plan of a task from a situation without running actions.
     ///
-    /// The same task, situation and knowledge give the same plan, whatever the run's seed.
+    /// The result depends on the task, the situation and the knowledge only, not on the run's seed.
     ///
     /// # Errors
-    /// What the planner answers where it has no plan.
+    /// The planner's answer, if it has no plan.
     pub fn choose(&self, task: &Task, situation: &Situation) -> Result<Choice, PlanAnswer> {
         let budget = work::Budget::new(self.work);
-        // What is only thought of gets no numbers.
+        // Planning must not add facts to the task's own table.
         let thought = task.with_own_table();
         let world = match &self.known {
             Known::World(rollouts) => Some(&*rollouts.world),
@@ -256,7 +257,8 @@ impl Chooser<'_> {
         })
     }
 
-    /// Values of plans by trying them out. Others than the first are made only if that can fail.
+    /// Estimates the values of plans by samples. Other plans than the first are made only if a
+    /// sample of the first one fails.
     fn sampled(
         &self,
         (task, budget): (&Task, work::Budget),
@@ -319,7 +321,7 @@ impl Chooser<'_> {
 fn first_of_most(values: &[Value]) -> usize {
     let mut best = 0;
     for (place, value) in values.iter().enumerate() {
-        // What differs by rounding is the same.
+        // Differences by rounding are ignored.
         if value.probability() > values[best].probability() + 1e-12 {
             best = place;
         }
@@ -327,8 +329,8 @@ fn first_of_most(values: &[Value]) -> usize {
     best
 }
 
-/// P(A ∩ G) of a plan's own order, or of its best one; `None` if it has none, or that is beyond
-/// what can be computed.
+/// Returns P(A ∩ G) of a plan's own order, or of its best one; `None` if it has none, or if it
+/// cannot be computed.
 fn order_odds(
     task: &Task,
     plan: &TimeTriggeredPlan,
@@ -362,7 +364,7 @@ fn order_odds(
     [own, best].into_iter().flatten().reduce(f64::max)
 }
 
-/// The same plan with the facts of this task.
+/// Returns the same plan with the fact numbers of this task.
 pub(crate) fn renumbered(task: &Task, plan: &TimeTriggeredPlan) -> Option<TimeTriggeredPlan> {
     let steps = plan.steps.iter().map(|step| {
         let action = task.instantiate(step.action.schema, &step.action.arguments);
@@ -378,13 +380,13 @@ pub(crate) fn renumbered(task: &Task, plan: &TimeTriggeredPlan) -> Option<TimeTr
 
 /// A planner whose first plan is [chosen](Chooser).
 pub struct Choosing<'a> {
-    /// Makes all later plans.
+    /// Planner of all later plans.
     pub inner: Box<dyn Planner + 'a>,
-    /// Chooses the first one; `None` when that is done.
+    /// Chooser of the first plan; `None` after the choice.
     pub chooser: Option<Chooser<'a>>,
-    /// When the run begins at the latest. What is asked later goes to the other planner.
+    /// Latest start of the run. Later requests are delegated to `inner`.
     pub latest: Rational,
-    /// The clock by which planning time is measured.
+    /// Clock for the planning time, in seconds.
     pub clock: &'a (dyn Fn() -> Rational + Sync),
 }
 

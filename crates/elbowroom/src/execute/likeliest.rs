@@ -1,4 +1,4 @@
-//! Plans that are likely to succeed in a world of which something is known.
+//! Plans with a great success probability in a world with known distributions.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -19,34 +19,34 @@ use elbowroom_stn::ConsistentNetwork;
 use super::planners::Embedded;
 use super::rewrite::set_durations;
 
-/// How many worlds a plan is tried in.
+/// Number of sampled worlds per plan.
 const SAMPLES: u64 = 200;
 
-/// For how slow a world plans are made: in hundredths of all durations that are shorter.
+/// Quantiles of durations to plan for, in percent.
 const QUANTILES: [u64; 2] = [80, 95];
 
-/// How many samples a quantile is taken from.
+/// Number of samples for a quantile.
 const QUANTILE_SAMPLES: u64 = 100;
 
-/// Where the seeds of the samples begin: far from those that people choose.
+/// First seed of the samples, far from seeds that users choose.
 const SEED: u64 = 0x6f64_6473_0000_0000;
 
-/// Chooses among several plans the one that is likeliest to succeed.
+/// Chooses among several plans the one with the greatest success probability.
 ///
-/// The plans: the one that the planner makes for the problem as it is, and those that it makes for
-/// problems in which every action takes long, and never less than planned. How likely: the share of
-/// sampled worlds in which durations drawn from the world's distributions leave the plan's network
-/// consistent and no action fails. That is the probability that the plan can be scheduled by one
-/// who knows the durations; when one learns them on the way, it is less at times. Amounts are taken
-/// as the domain has them.
+/// The planner makes plans for the problem as it is, and for variants with long durations, none
+/// shorter than planned. The probability is the share of sampled worlds where no action fails and
+/// the plan's network is consistent with the durations drawn from the world's distributions. It is
+/// thus the probability that the plan can be scheduled if all durations are known in advance; an
+/// executor that observes them during execution may have a smaller one. Amounts are those of the
+/// domain.
 ///
-/// The samples are the same for all plans, and depend on nothing but the actions' names.
+/// The samples are the same for all plans, and depend only on the actions' names.
 pub struct Likeliest<'a> {
     /// The model of the world.
     pub model: WorldModel,
     /// The planner.
     pub planner: Embedded<'a>,
-    /// The planning time, as it passes in the world.
+    /// The planning time in the world's seconds.
     pub planning_time: Rational,
     quantiles: BTreeMap<(String, Rational, u64), Rational>,
 }
@@ -86,24 +86,24 @@ impl Odds for Likeliest<'_> {
             time,
             running: Vec::new(),
         };
-        // What is only thought of gets no numbers.
+        // Planning must not add facts to the task's own table.
         let task = rest.belief.task().with_own_table();
         let (_, other) = self.best(&task, &situation).ok()?;
         Some(Compared { present, other })
     }
 }
 
-/// One [`Likeliest`] behind both ports.
+/// A shared [`Likeliest`] that implements both ports.
 #[derive(Clone)]
 pub struct SharedLikeliest(Arc<Mutex<Likeliest<'static>>>);
 
 impl SharedLikeliest {
-    /// Shares it.
+    /// Creates a shared handle.
     pub fn new(likeliest: Likeliest<'static>) -> Self {
         Self(Arc::new(Mutex::new(likeliest)))
     }
 
-    /// Results are right whoever asked before, even after a panic of another thread.
+    /// Results do not depend on earlier calls, so a poisoned lock is ignored.
     fn get(&self) -> MutexGuard<'_, Likeliest<'static>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -122,7 +122,7 @@ impl Odds for SharedLikeliest {
 }
 
 impl<'a> Likeliest<'a> {
-    /// A planner for a world like that.
+    /// Creates a planner for such a world.
     pub fn new(model: WorldModel, planner: Embedded<'a>, planning_time: Rational) -> Self {
         Self {
             model,
@@ -132,20 +132,20 @@ impl<'a> Likeliest<'a> {
         }
     }
 
-    /// The likeliest plan and its probability, or what the planner says instead of a plan.
+    /// Returns the likeliest plan and its probability, or the planner's answer if there is no plan.
     fn best(
         &mut self,
         task: &Task,
         situation: &Situation,
     ) -> Result<(TimeTriggeredPlan, Rational), PlanAnswer> {
         let answer = self.planner.plan(task, situation).answer;
-        // With longer durations, a plan is no easier to find.
+        // Longer durations do not make it easier to find a plan.
         let PlanAnswer::Plan(plan) = answer else {
             return Err(answer);
         };
         let share = self.probability_of(task, situation, &plan);
         let mut best = (plan, share);
-        // Times of what is running already are no more to be chosen.
+        // The times of running actions can no longer be chosen.
         if situation.running.is_empty() {
             for quantile in QUANTILES {
                 let Some(plan) = self.slow_plan(task, situation, quantile) else {
@@ -160,7 +160,7 @@ impl<'a> Likeliest<'a> {
         Ok(best)
     }
 
-    /// A plan for a world in which every action takes long, as a plan of the task.
+    /// Returns a plan for a world with long durations, as a plan of the task.
     fn slow_plan(
         &mut self,
         task: &Task,
@@ -171,7 +171,7 @@ impl<'a> Likeliest<'a> {
         for schema in (0..problem.schemas.len()).map(SchemaId::from) {
             let values = RefCell::new(&mut *self);
             set_durations(task, schema, &mut problem, &|name, planned| {
-                // A plan in which something is over too soon is none of the task.
+                // A plan with shorter durations than planned is no plan of the task.
                 let slow = values.borrow_mut().quantile(name, planned, quantile);
                 slow.max(planned.clone())
             });
@@ -202,7 +202,7 @@ impl<'a> Likeliest<'a> {
         verdict.is_valid().then_some(plan)
     }
 
-    /// The quantile of a duration, in percent.
+    /// Returns the quantile of a duration, in percent.
     fn quantile(&mut self, name: &str, planned: &Rational, quantile: u64) -> Rational {
         let key = (name.to_owned(), planned.clone(), quantile);
         if let Some(known) = self.quantiles.get(&key) {
@@ -218,7 +218,7 @@ impl<'a> Likeliest<'a> {
         value
     }
 
-    /// From the command to the end, in one of the sampled worlds.
+    /// Returns the time from the command to the end, in one of the sampled worlds.
     fn duration(&self, sample: u64, name: &str, planned: &Rational, occurrence: u64) -> Rational {
         let rng = |purpose| keyed(SEED + sample, name, occurrence, purpose);
         let delay = self.model.delay(name, &mut rng(Purpose::Delay));
@@ -228,7 +228,7 @@ impl<'a> Likeliest<'a> {
                 .duration(name, planned, &mut rng(Purpose::Duration))
     }
 
-    /// How likely a plan from a situation is to succeed.
+    /// Returns the success probability of a plan from a situation.
     fn probability_of(
         &self,
         task: &Task,
@@ -246,8 +246,8 @@ impl<'a> Likeliest<'a> {
         self.probability(&freed.plan, &happened, &Rational::ZERO, running)
     }
 
-    /// The share of sampled worlds in which the rest of a plan works. What is running comes first
-    /// in the plan, and takes as long as planned.
+    /// Returns the share of sampled worlds where the remaining plan works. Running actions come
+    /// first in the plan, and take as long as planned.
     fn probability(
         &self,
         plan: &StnPlan,
@@ -263,20 +263,21 @@ impl<'a> Likeliest<'a> {
     }
 }
 
-/// The remaining part of a plan.
+/// The remaining plan.
 struct Rest {
-    /// With what has happened fixed, and what is to come not before now.
+    /// The plan with past times fixed, and no future time before now.
     plan: StnPlan,
-    /// The constraints that say how long an action takes that is to come: which, what it is
-    /// called, how long it is planned to take (the least, where the plan has a choice), and how
-    /// many of that name come before.
+    /// The duration constraints of future actions: the position of the constraint, the name of the
+    /// action, its planned duration (the least, if the plan has a choice), and the number of
+    /// earlier actions of that name.
     to_come: Vec<(usize, String, Rational, u64)>,
 }
 
 impl Rest {
     fn of(plan: &StnPlan, happened: &[Option<Rational>], now: &Rational, running: usize) -> Self {
         let mut plan = plan.clone();
-        // Start and end may also have to be ε apart: the duration is the longest that is asked for.
+        // Other constraints, such as ε-separation, may also relate start and end: the duration is
+        // the greatest lower bound.
         let mut durations: BTreeMap<InstanceId, (usize, Rational)> = BTreeMap::new();
         for (index, constraint) in plan.constraints.iter().enumerate() {
             let Some(instance) = plan.duration_of(constraint) else {
@@ -302,7 +303,7 @@ impl Rest {
             to_come.push((index, name.to_owned(), planned, *count));
             *count += 1;
         }
-        // What an observed duration was, has been told by its two ends.
+        // An observed duration follows from the times of its two ends.
         let is_over = |constraint: &Constraint| {
             happened[constraint.from.index()].is_some() && happened[constraint.to.index()].is_some()
         };
@@ -316,7 +317,7 @@ impl Rest {
         Self { plan, to_come }
     }
 
-    /// Whether it works in one of the sampled worlds.
+    /// Returns `true` if the plan works in one of the sampled worlds.
     fn works(&self, odds: &Likeliest<'_>, sample: u64) -> bool {
         let mut plan = self.plan.clone();
         for (index, name, planned, occurrence) in &self.to_come {
@@ -332,7 +333,7 @@ impl Rest {
     }
 }
 
-/// The duration that the domain fixes to a number.
+/// Returns the duration if the domain fixes it to a number.
 fn fixed_duration(action: &Action) -> Option<Rational> {
     let [only] = action.durative()?.duration.as_slice() else {
         return None;

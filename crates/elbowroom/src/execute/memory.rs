@@ -1,10 +1,9 @@
-//! Planners and preparers that remember what they were asked.
+//! Planners and preparers with a cache.
 //!
 //! A planner whose limits are counted, not timed, is a function: the same task and situation have
-//! the same answer. In a comparison the same questions come again and again. Executors that give a
-//! plan up over the same observation stand in the same situation, and so do trials in which a step
-//! outlives the same bound. Questions are compared in full, so results are the same with and
-//! without memory, and whatever was forgotten.
+//! the same answer. In a comparison, many requests are equal: executors abandon a plan after the
+//! same observation and are then in the same situation, and so are trials whose step exceeds the
+//! same bound. Requests are compared in full, so the results do not depend on the cache.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -16,10 +15,10 @@ use elbowroom_model::{Situation, State, Task, TimeTriggeredPlan, TimedHappening}
 use elbowroom_num::Rational;
 use indexmap::IndexMap;
 
-/// Questions and their answers. When it is full, everything is forgotten.
+/// Cache of requests and answers. It is cleared when it is full.
 #[derive(Clone, Debug)]
 struct Memory<Q, A> {
-    /// By the hash of the question.
+    /// Entries by the hash of the request.
     known: IndexMap<u64, Vec<(Q, A)>>,
     count: usize,
     most: usize,
@@ -50,20 +49,20 @@ impl<Q, A: Clone> Memory<Q, A> {
     }
 }
 
-/// A planner that is asked each question only once.
+/// A planner with a cache.
 ///
-/// It may be asked about one problem only, and the planner must be a function of task and
-/// situation: no clock, no chance.
+/// It serves one problem only, and the planner must be a function of task and situation,
+/// independent of clocks and random numbers.
 #[derive(Clone, Debug)]
 pub struct RememberingPlanner<P> {
     planner: P,
     memory: Memory<Situation, PlanAnswer>,
-    /// The size of the table of facts and fluents that the remembered answers refer to.
+    /// The size of the table of facts and fluents that the cached answers refer to.
     table: Option<(usize, usize)>,
 }
 
 impl<P: Planner> RememberingPlanner<P> {
-    /// A memory for at most `most` answers.
+    /// Creates a cache for at most `most` answers.
     pub fn new(planner: P, most: usize) -> Self {
         Self {
             planner,
@@ -77,7 +76,7 @@ impl<P: Planner> Planner for RememberingPlanner<P> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let table = table(task);
         if *self.table.get_or_insert(table) != table {
-            // Numbers that were given later may mean other facts in another run.
+            // Facts that were numbered later may differ between runs.
             return self.planner.plan(task, situation);
         }
         let hash = hash(&(&situation.time, parts(&situation.state)));
@@ -94,7 +93,7 @@ impl<P: Planner> Planner for RememberingPlanner<P> {
     }
 }
 
-/// A preparer that is asked each question only once. It may be asked about one problem only.
+/// A preparer with a cache. It serves one problem only.
 #[derive(Clone, Debug)]
 pub struct RememberingPreparer<P> {
     preparer: P,
@@ -102,7 +101,7 @@ pub struct RememberingPreparer<P> {
     table: Option<(usize, usize)>,
 }
 
-/// The arguments of a preparer, as a key of its memory.
+/// The arguments of a preparer, as a key of the cache.
 #[derive(Clone, Debug)]
 struct Question {
     need: Need,
@@ -112,7 +111,7 @@ struct Question {
 }
 
 impl<P: Preparer> RememberingPreparer<P> {
-    /// A memory for at most `most` answers.
+    /// Creates a cache for at most `most` answers.
     pub fn new(preparer: P, most: usize) -> Self {
         Self {
             preparer,
@@ -157,7 +156,8 @@ impl<P: Preparer> Preparer for RememberingPreparer<P> {
     }
 }
 
-/// Tables only grow, so one of the same problem and size is the same.
+/// Returns the size of the task's table. Tables only grow, so two tables of one problem with the
+/// same size are equal.
 fn table(task: &Task) -> (usize, usize) {
     (task.fact_count(), task.fluent_count())
 }

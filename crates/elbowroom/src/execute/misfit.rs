@@ -1,12 +1,13 @@
-//! Goals about what cannot be.
+//! Goals with arguments of wrong types.
 
 use elbowroom_model::Problem;
 use elbowroom_model::problem::{Condition, Term, Variable};
 
-/// What in a goal is no fact and no number of the problem, in words: an object that is not of the type
-/// that its place asks for. Nothing can ever make that true.
+/// Describes a fact or fluent of a goal that the problem does not have, because an object has the
+/// wrong type. Such a goal can never be reached.
 ///
-/// A problem file that has such a goal is read with a warning; here somebody can be asked again.
+/// The reader of problem files only warns about such a goal; requests reject it, because their
+/// sender can correct it.
 pub fn misfit(problem: &Problem, goal: &Condition) -> Option<String> {
     match goal {
         Condition::Atom(atom) => {

@@ -20,7 +20,7 @@ fn open_durations(plan: &StnPlan) -> BTreeSet<InstanceId> {
         };
         let action = &plan.instance(id).action;
         let body = action.durative()?;
-        // What reads the planned duration holds for that duration alone.
+        // The conditions and effects hold for the planned duration only.
         let reads_planned = action.with_planned_duration(&Rational::ONE).is_some();
         let is_open = constraint.lower != constraint.upper && !body.is_under_way && !reads_planned;
         is_open.then_some(id)
@@ -30,10 +30,11 @@ fn open_durations(plan: &StnPlan) -> BTreeSet<InstanceId> {
 
 /// Moves open durations away from the ends of their intervals in the envelope.
 ///
-/// Planners choose them as short or as long as the domain and the goal permit, so that the least deviation breaks the
-/// plan. Each value in the envelope is as well guaranteed as the planned one. But the envelope permits more than the
-/// domain's bounds on durations, which may read what another duration changes. So nothing is changed unless the plan
-/// `given`, which has these bounds, is valid with all values.
+/// Planners choose them as short or as long as the domain and the goal permit, so that the smallest
+/// deviation breaks the plan. Every value in the envelope has the same guarantee as the planned
+/// one. However, the envelope permits more than the domain's bounds on durations, which may read
+/// values that another duration changes. So nothing is changed unless the plan `given`, which has
+/// these bounds, is valid with all values.
 pub(super) fn choose(
     task: &Task,
     given: &StnPlan,
@@ -68,9 +69,10 @@ pub(super) fn choose(
     *nominal = schedule;
 }
 
-/// Returns a value near this one that may deviate within the interval: by 1/8 at both ends and, if that leaves
-/// enough below, by 3/10 at the upper end. An action that is too short can be repeated. One that is too long may break a
-/// condition, and fail. No value becomes shorter than the middle of the interval.
+/// Returns a value near this one with slack in the interval: 1/8 of the value at both ends and, if
+/// enough slack remains below, 3/10 at the upper end. An action that is too short can be repeated;
+/// one that is too long may violate a condition, and fail. No value becomes shorter than the middle
+/// of the interval.
 fn away_from_ends(value: &Rational, interval: &Interval) -> Rational {
     let [least, most] = Side::BOTH.map(|side| side.of(interval).value());
     let least = least.cloned().unwrap_or_default();
@@ -85,8 +87,8 @@ fn away_from_ends(value: &Rational, interval: &Interval) -> Rational {
     longer.min(below.min(above).max(far_above).max(middle))
 }
 
-/// Returns the earliest schedule with these durations; if possible, each event happens no earlier than planned. Durations
-/// that are no parameters stay as planned.
+/// Returns the earliest schedule with these durations; if possible, each event happens no earlier
+/// than planned. Durations without a parameter stay as planned.
 fn schedule_at(
     plan: &ParametrizedPlan,
     nominal: &Schedule,
@@ -126,7 +128,7 @@ mod tests {
 
     #[test]
     fn durations_keep_away_from_both_ends() {
-        // There is enough on both sides.
+        // Enough slack on both sides.
         assert_eq!(chosen((10, 1), (7, 1), Some((13, 1))), Rational::from(10));
         assert_eq!(chosen((10, 1), (2, 1), None), Rational::from(10));
         // At the lower end: an eighth more than the least duration, unless that comes too near to the upper end.

@@ -19,25 +19,25 @@ impl<F: FnMut(&Task, &Situation) -> PlanAnswer + Send> Planner for Clockless<F> 
     }
 }
 
-/// The embedded planner, with a limit that does not depend on how fast the machine is: so many
-/// states. Within it the best plan found is taken.
+/// The embedded planner, limited by numbers of states, so that results do not depend on the speed
+/// of the machine. It returns the best plan found within the limits.
 pub struct Embedded<'a> {
-    /// How to plan.
+    /// Settings of the search.
     pub settings: embedded::Settings,
-    /// How many states to look at for a plan at all.
+    /// Maximum number of states for a plan.
     pub most_states: u64,
-    /// How many states to look at for a better plan than the first.
+    /// Maximum number of these states for a better plan than the first.
     pub improve_states: u64,
     /// Work limit for one plan, in units of [`elbowroom_num::work`]; [`u64::MAX`] for no limit.
     pub work: u64,
-    /// As long as there is no plan at all, the search may take this multiple of `work`.
+    /// The search for the first plan may take this multiple of `work`.
     pub patience: u64,
-    /// Work limit for a certificate that no plan exists ([`Effort`]). Without a certificate, the answer is that
-    /// no plan was found. With 0, no certificate is made.
+    /// Work limit for a certificate that no plan exists ([`Effort`]). Without a certificate, the
+    /// answer is that no plan was found. If 0, no certificate is made.
     pub certificate_work: u64,
-    /// The clock by which planning time is measured, in seconds since some fixed time.
+    /// The clock for the planning time, in seconds since some fixed time.
     pub clock: Option<&'a (dyn Fn() -> Rational + Sync)>,
-    /// Asked now and then whether to go on; without it, always.
+    /// Called regularly; returns `false` to stop the search.
     pub goes_on: Option<&'a (dyn Fn() -> bool + Sync)>,
 }
 
@@ -56,8 +56,8 @@ impl Planner for Embedded<'_> {
 }
 
 impl Default for Embedded<'_> {
-    /// 20,000 states, 2,000 of them for a better plan than the first; about a second for a certificate; no
-    /// clock.
+    /// Returns a planner with 20,000 states, 2,000 of them for a better plan than the first, and
+    /// about a second for a certificate, without a clock.
     fn default() -> Self {
         Self {
             settings: embedded::Settings::default(),
@@ -73,7 +73,7 @@ impl Default for Embedded<'_> {
 }
 
 impl Embedded<'_> {
-    /// The answer, and the number of states looked at for it.
+    /// Returns the answer, and the number of evaluated states.
     pub(crate) fn counted(&self, task: &Task, situation: &Situation) -> (PlanAnswer, u64) {
         let mut states = 0;
         let answer = self.answer(task, situation, &mut states);
@@ -107,8 +107,8 @@ impl Embedded<'_> {
     }
 }
 
-/// Returns the answer of a run's planner for an answer of the embedded planner that has no plan. `limits`: on the
-/// states of the search, and on the work for a certificate.
+/// Converts an answer of the embedded planner without a plan to an answer of a run's planner.
+/// `limits`: on the states of the search, and on the work for a certificate.
 pub(crate) fn without_plan(
     answer: &embedded::Answer,
     (task, situation): (&Task, &Situation),
@@ -120,7 +120,7 @@ pub(crate) fn without_plan(
             let goes_on = &mut || goes_on();
             return refuted((task, situation), proof, certificate_work, goes_on);
         }
-        // It says nothing about plans.
+        // This answer does not depend on the existence of plans.
         embedded::Answer::Unsupported(unsupported) => {
             let why = unsupported.to_string();
             return PlanAnswer::Failed { why };
@@ -139,8 +139,8 @@ pub(crate) fn without_plan(
 /// The default limit on the work for one plan, in seconds of one processor.
 pub const PLANNING_BUDGET: i64 = 2;
 
-/// The units of [`elbowroom_num::work`] of a planning budget in seconds of one processor: about one for each
-/// nanosecond.
+/// Converts a planning budget in seconds of one processor to units of [`elbowroom_num::work`]:
+/// about one per nanosecond.
 pub fn planning_work(seconds: &Rational) -> u64 {
     let time = Duration::try_from_secs_f64(seconds.to_f64());
     time.map_or(u64::MAX, |time| {
@@ -183,7 +183,7 @@ pub(crate) fn exhausted(counts: Counts, without_self_overlap: bool) -> String {
     )
 }
 
-/// Beginning of the answer after a search of all plans without self-overlap, where no certificate
+/// Beginning of the answer after a search of all plans without self-overlap, if no certificate
 /// covers the others.
 pub(crate) const WITHOUT_SELF_OVERLAP: &str = "no plan without self-overlap (`--self-overlap`)";
 

@@ -1,14 +1,14 @@
-//! Which of several plans succeeds most often, found out with few trials.
+//! Comparison of success rates of several plans with few samples.
 
 use std::cmp::Reverse;
 
-/// How many samples there are at the end of each round.
+/// Number of samples at the end of each round.
 const ROUNDS: [u64; 4] = [50, 100, 200, 400];
 
-/// How many standard deviations of the difference a plan may be behind.
+/// Lag beyond which a plan is dropped, in standard deviations of the difference.
 const BEHIND: u64 = 2;
 
-/// How often a plan succeeded, in the samples from 0 on.
+/// Results of a plan in the samples from 0 on.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tally {
     results: Vec<bool>,
@@ -27,24 +27,25 @@ impl Tally {
         is_behind(&self.results, &other.results)
     }
 
-    /// Whether it may be ahead of another by one sample in `margin`, as far as chance allows.
+    /// Returns `true` if it may still be ahead of `other` by one sample in `margin`, within the
+    /// error of the samples.
     fn may_be_ahead(&self, other: &Self, margin: u64) -> bool {
         let (own, theirs) = differences(&self.results, &other.results);
         let least = self.samples().min(other.samples()) / margin;
-        // The lead that is asked for lies above what they differ by, and by more than chance.
+        // Tests whether the gap to the required lead is significant.
         let missing = (least + theirs).saturating_sub(own);
         missing.pow(2) <= BEHIND.pow(2) * (own + theirs + 1)
     }
 }
 
-/// Whether results are behind others by more than chance, in the samples that both have: of those
-/// in which only one of the two succeeded, too few are one's own (McNemar's test).
+/// Returns `true` if `results` are significantly behind `others` in the samples that both have:
+/// McNemar's test of the samples with a single success.
 pub(crate) fn is_behind(results: &[bool], others: &[bool]) -> bool {
     let (own, theirs) = differences(results, others);
     theirs > own && (theirs - own).pow(2) > BEHIND.pow(2) * (theirs + own)
 }
 
-/// In how many samples only one of the two succeeded: the first, and the second.
+/// Returns the numbers of samples with success of only the first, and of only the second.
 fn differences(results: &[bool], others: &[bool]) -> (u64, u64) {
     let pairs = || results.iter().zip(others);
     let own = pairs().filter(|(own, other)| **own && !**other).count() as u64;
@@ -52,15 +53,15 @@ fn differences(results: &[bool], others: &[bool]) -> (u64, u64) {
     (own, theirs)
 }
 
-/// How a race goes.
+/// Rules of a race.
 pub(super) struct Rules<'a> {
-    /// How many samples there are at the end of each round.
+    /// Number of samples at the end of each round.
     pub(super) rounds: &'a [u64],
-    /// Whether half of those who are still in it are out after each round (sequential halving; Karnin,
-    /// Koren & Somekh, ICML 2013). The first is not, for that.
+    /// `true` to drop half of the remaining plans after each round (sequential halving; Karnin,
+    /// Koren & Somekh, ICML 2013), except the first plan.
     pub(super) halves: bool,
-    /// Of so many samples, one more has to succeed for anybody to be preferred to the first. Who
-    /// cannot be that far ahead of it, but for chance, is out.
+    /// The lead over the first plan that a plan needs to be preferred: one sample in `margin`.
+    /// Plans that are significantly short of this lead are dropped.
     pub(super) margin: Option<u64>,
 }
 
@@ -74,7 +75,7 @@ impl Default for Rules<'static> {
     }
 }
 
-/// Leaves those who succeeded most often, half of them and the first.
+/// Keeps the better half of the plans, and the first plan.
 fn better_half(tallies: &[Tally], racing: &mut Vec<usize>) {
     let most = racing.len().div_ceil(2);
     let mut best = racing.clone();
@@ -83,12 +84,13 @@ fn better_half(tallies: &[Tally], racing: &mut Vec<usize>) {
     racing.retain(|place| *place == 0 || best.contains(place));
 }
 
-/// The tallies of as many plans as there are, and the place of the one that succeeded most often;
-/// of several, the first of them.
+/// Returns the tallies of `count` plans, and the position of the most successful one; of several,
+/// the first.
 ///
-/// `try_out` says whether a plan succeeds in a sample; all plans are tried in the same ones (common
-/// random numbers), so that they differ by what they are, and not by the dice. Who is behind by more
-/// than chance is tried no further (racing; Maron & Moore, NIPS 1993). `None` of `try_out` ends it.
+/// `try_out` returns the success of a plan in a sample, or `None` to end the race. All plans have
+/// the same samples (common random numbers), so that they differ by their quality and not by the
+/// random seed. Plans that are significantly behind get no further samples (racing; Maron & Moore,
+/// NIPS 1993).
 pub(super) fn race(
     count: usize,
     rules: &Rules<'_>,
@@ -117,7 +119,7 @@ pub(super) fn race(
                 |place: &usize| *place == 0 || tallies[*place].may_be_ahead(&tallies[0], margin);
             racing.retain(may_win);
         }
-        // Nobody can be ahead of one that always succeeds.
+        // No plan can be ahead of one that always succeeds.
         if racing.len() < 2 || best.successes() == best.samples() {
             break;
         }
@@ -139,7 +141,7 @@ fn first_of_most(tallies: &[Tally], racing: &[usize]) -> usize {
 mod tests {
     use super::*;
 
-    /// Plans that succeed in this share of samples, each by a number that the sample shares.
+    /// Plans that succeed in this share of samples. All plans share the random number of a sample.
     fn trials(shares: &[u64]) -> impl FnMut(usize, u64) -> Option<bool> + '_ {
         |place, sample| {
             Some(sample.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32 < (shares[place] << 32) / 100)

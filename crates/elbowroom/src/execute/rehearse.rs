@@ -1,4 +1,4 @@
-//! What comes of each thing that can be done with a plan, in samples of the world: [`Rehearse`].
+//! Comparison of the alternatives of an executor in samples of the world: [`Rehearse`].
 
 mod stage;
 
@@ -25,86 +25,89 @@ use crate::flow;
 use super::{Analyst, Candidates, Embedded, Limits, RememberingPreparer, WholeRegion};
 use stage::Stage;
 
-/// Who may take up a new plan in place of `live`.
+/// Executors that may adopt a new plan instead of `live`.
 const OF_BEGINNINGS: [&str; 3] = ["adaptable", "esterel", "guarded"];
 
-/// Who may take up what is left of a plan. Others need its envelope, which takes long to find.
+/// Executors that may adopt the remaining plan. Others need its envelope, which takes long to
+/// compute.
 const OF_RESTS: [&str; 2] = ["adaptable", "esterel"];
 
-/// Who may execute a new plan.
+/// Executors for new plans.
 const OF_NEW_PLANS: [&str; 2] = ["live", "adaptable"];
 
-/// How many samples there are at the end of each round.
+/// Number of samples at the end of each round.
 const ROUNDS: [u64; 4] = [25, 50, 100, 200];
 
-/// The same, for who takes up a new plan.
+/// Number of samples at the end of each round, for executors of a new plan.
 const ROUNDS_OF_NEW: [u64; 6] = [50, 100, 200, 400, 800, 1600];
 
-/// How many samples are tried out first. If all of them succeed, nothing else is tried out.
+/// Number of samples of the executor's own decision. If enough of them succeed, no alternatives are
+/// sampled.
 const FIRST_LOOK: u64 = 25;
 
-/// How many of these may fail for nothing else to be tried out where nothing has gone wrong, and
-/// where something has, but the plan is not to be given up.
+/// Number of these samples that may fail without a comparison of alternatives: if no action has
+/// failed, and if one has failed but the plan is not to be abandoned.
 const FEW: usize = 2;
 const FEWER: usize = 1;
 
-/// The first of the samples in which the best is tried once more.
+/// First sample of the confirmation of the best alternative.
 const AGAIN: u64 = 1_000_000;
 
-/// How many other plans are made, and how many states may be looked at for all but the first.
+/// Maximum number of other plans, and of states for all of them but the first.
 const MOST_PLANS: usize = 4;
 const PLAN_STATES: u64 = 2_000;
 
-/// How many variants of the problem they are made for at most.
+/// Maximum number of variants of the problem to plan for.
 const MOST_SEARCHES: usize = 6;
 
-/// How many states all new plans may take that are made in the samples of one scene.
+/// Maximum number of states for all new plans in the samples of one scene.
 const SAMPLE_STATES: u64 = 4_000;
 
-/// Of so many samples, one more has to succeed for another executor than `live` to take up a plan.
+/// The lead that another executor needs to adopt a new plan instead of `live`: one sample in
+/// `MARGIN`.
 const MARGIN: u64 = 200;
 
-/// How many answers of the preparer are remembered.
+/// Size of the preparers' caches.
 const MEMORY: usize = 2_000;
 
-/// Where the seeds of the samples begin: far from those that people choose.
+/// First seed of the samples, far from seeds that users choose.
 const SEED: u64 = 0x7265_6865_0000_0000;
 
-/// Tries out what can be done, in samples of the world that its file describes, given what was seen
-/// of it: going on, handing what is left of the plan to another executor (which tries again what
-/// has failed, or skips what is not needed), another plan, and waiting.
+/// Evaluates the alternatives of an executor in samples of the world file, conditioned on the
+/// observations. The alternatives are to continue, to hand the remaining plan over to another
+/// executor (which retries failed actions, or skips unnecessary ones), to replan, and to wait.
 ///
-/// All are tried in the same samples (common random numbers), and who is behind by more than
-/// chance is tried no further. How much is tried is counted, so that no clock matters; when the planner's work limit is
-/// spent, the samples so far decide.
+/// All alternatives have the same samples (common random numbers), and those that are significantly
+/// behind get no further samples. The effort is limited by counts, so results do not depend on a
+/// clock. When the planner's work limit is spent, the samples taken until then decide.
 pub struct Rehearse {
     rollouts: Rollouts,
     planner: Embedded<'static>,
     planning_time: Rational,
-    /// Makes plans ready that are taken up.
+    /// Preparer of adopted plans.
     preparer: RememberingPreparer<Analyst>,
-    /// Makes plans ready in samples, with the envelope that is found at once.
+    /// Preparer of plans in samples, with a quickly computed envelope.
     hasty: RememberingPreparer<Analyst>,
-    /// The plan that was found to be best for a situation.
+    /// The best plan for a situation, until the planner is called for it.
     chosen: Option<(Situation, TimeTriggeredPlan)>,
-    /// What was found at the beginning of a run, by the plan.
+    /// Results for the beginnings of runs, by plan.
     beginnings: Vec<(TimeTriggeredPlan, Choice)>,
-    /// The goal of all that is remembered.
+    /// The goal of the cached results.
     goal: Option<Condition>,
 }
 
-/// One [`Rehearse`] behind both ports.
+/// A shared [`Rehearse`] that implements both ports.
 #[derive(Clone)]
 pub struct SharedRehearse(Arc<Mutex<Rehearse>>);
 
 impl SharedRehearse {
-    /// Shares it.
+    /// Creates a shared handle.
     pub fn new(rehearse: Rehearse) -> Self {
         Self(Arc::new(Mutex::new(rehearse)))
     }
 
-    /// A planner that gives the plan that was found to be best, where one was, and else asks this
-    /// one.
+    /// Returns a planner that answers with the best plan, if one was found for the situation, and
+    /// otherwise calls `planner`.
     pub(super) fn before<'a>(&self, planner: Box<dyn Planner + 'a>) -> Box<dyn Planner + 'a> {
         Box::new(Chosen {
             rehearse: self.clone(),
@@ -145,7 +148,7 @@ fn preparers(
     (remembering(analyst), remembering(hasty))
 }
 
-/// Gives plans that were found to be best.
+/// Planner that answers with the best plan found.
 struct Chosen<'a> {
     rehearse: SharedRehearse,
     planner: Box<dyn Planner + 'a>,
@@ -165,20 +168,20 @@ impl Planner for Chosen<'_> {
     }
 }
 
-/// Something that can be done.
+/// An alternative.
 #[derive(Clone)]
 enum Way {
-    /// What whoever executes says, and whoever it is goes on.
+    /// The executor's own decision; the executor continues.
     AsDecided,
-    /// This executor takes up what is left.
+    /// This executor adopts the remaining plan.
     TakesUp(ExecutorSpec, Box<Mission>),
-    /// This executor takes up another plan, made for this situation.
+    /// This executor adopts another plan, made for this situation.
     Replans(ExecutorSpec, Option<(Situation, TimeTriggeredPlan)>),
-    /// Nothing is begun before that.
+    /// No action is started before this time.
     WaitsUntil(Rational),
 }
 
-/// A way that was found to be best, and how often it and what was decided succeed.
+/// The best alternative, with its success rate and that of the executor's decision.
 #[derive(Clone)]
 struct Choice {
     way: usize,
@@ -240,7 +243,7 @@ impl Rehearsal for Rehearse {
 }
 
 impl Rehearse {
-    /// For runs like those of `rollouts`. `planner` makes plans.
+    /// Creates it for runs like those of `rollouts`, with `planner` for new plans.
     pub fn new(rollouts: Rollouts, planner: Embedded<'static>) -> Self {
         let mut rollouts = rollouts;
         let planning_time = match &rollouts.settings.planning_time {
@@ -280,11 +283,11 @@ impl Rehearse {
         }
     }
 
-    /// The plan that was found to be best for a situation, once.
+    /// Takes the best plan for a situation, if it is known.
     fn chosen_for(&mut self, task: &Task, situation: &Situation) -> Option<TimeTriggeredPlan> {
         let (known, plan) = self.chosen.take()?;
         let mut plan = renumbered(task, &plan).filter(|_| known == *situation)?;
-        // What is under way is in a plan as the situation has it.
+        // Plans contain running actions as the situation defines them.
         for (step, running) in plan.steps.iter_mut().zip(&situation.running) {
             step.action = running.action.clone();
         }
@@ -320,7 +323,7 @@ impl Rehearse {
         })
     }
 
-    /// What can be done with the plan as it is: what was decided first.
+    /// Returns the alternatives with the present plan, beginning with the executor's decision.
     fn first_ways(&mut self, scene: &Scene<'_>) -> Vec<Way> {
         let mut ways = vec![Way::AsDecided];
         let task = scene.belief.task();
@@ -358,7 +361,7 @@ impl Rehearse {
         ways
     }
 
-    /// Other plans, and waiting.
+    /// Adds the alternatives of replanning and waiting.
     fn more_ways(&mut self, scene: &Scene<'_>, ways: &mut Vec<Way>) {
         if scene.is_new {
             return;
@@ -379,7 +382,7 @@ impl Rehearse {
         }
     }
 
-    /// The planner's plan, and others where nothing is under way.
+    /// Returns the planner's plan; without running actions, also other plans.
     fn plans(&self, task: &Task, situation: &Situation) -> Vec<TimeTriggeredPlan> {
         if !situation.running.is_empty() {
             return match self.planner.counted(task, situation).0 {
@@ -453,7 +456,8 @@ impl Rehearse {
             let (best, own) = (tallies[leader].successes(), tallies[0].successes());
             best > own && (best - own).saturating_mul(margin) >= tallies[leader].samples()
         } else {
-            // Of many that were tried, some are ahead by chance: they must be so once more.
+            // The best of many alternatives may be ahead by chance, so its lead is confirmed with
+            // new samples.
             tallies[0].is_behind(&tallies[leader]) && {
                 let mut again = |way: &Way| {
                     let mut samples = AGAIN..AGAIN + ROUNDS[ROUNDS.len() - 1];
@@ -477,7 +481,7 @@ impl Rehearse {
     }
 }
 
-/// Whether all has gone as it should.
+/// Returns `true` if all recent events are starts and successful ends.
 fn is_calm(scene: &Scene<'_>) -> bool {
     let is_good = |news: &News| match news {
         News::Started { .. } => true,

@@ -1,4 +1,4 @@
-//! Problems with other numbers in them.
+//! Rewriting of numbers in problems.
 
 use elbowroom_model::Task;
 use elbowroom_model::problem::{
@@ -7,8 +7,8 @@ use elbowroom_model::problem::{
 };
 use elbowroom_num::Rational;
 
-/// Gives each instance of a schema a duration of its own: a function of its name and of what the
-/// domain says. Where the plan has a say in the duration, or the state, it stays as it is.
+/// Gives each instance of a schema its own duration, computed by `value` from its name and the
+/// domain's duration. Durations that the domain does not fix to a constant are not changed.
 pub fn set_durations(
     task: &Task,
     schema: SchemaId,
@@ -37,7 +37,7 @@ pub fn set_durations(
     }
 }
 
-/// A function of the schema's parameters, with a value for each of its instances.
+/// Adds a function of the schema's parameters, with a value for each of its instances.
 pub fn add_function_of(
     task: &Task,
     schema: SchemaId,
@@ -48,7 +48,7 @@ pub fn add_function_of(
     let lifted = problem.schemas[schema.index()].clone();
     let function = FunctionId::from(problem.functions.len());
     problem.functions.push(Function {
-        // No PDDL name has a space, so none is the same.
+        // PDDL names have no spaces, so the name is unique.
         name: format!("{} {what}", lifted.name),
         parameters: lifted.parameters.clone(),
     });
@@ -64,7 +64,7 @@ pub fn add_function_of(
     })
 }
 
-/// All arguments of fitting types.
+/// Returns all argument lists with matching types.
 fn instances(schema: &Schema, problem: &Problem) -> Vec<Vec<ObjectId>> {
     let mut instances: Vec<Vec<ObjectId>> = vec![Vec::new()];
     for parameter in &schema.parameters {

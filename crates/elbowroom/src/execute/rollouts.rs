@@ -1,4 +1,4 @@
-//! Trying a plan out in samples of a world that is known by its distributions.
+//! Rollouts: execution of a plan in samples of a world model.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -16,40 +16,39 @@ use super::first_plan::renumbered;
 use super::{Analyst, Embedded, Execution, RememberingPlanner, RememberingPreparer};
 use crate::flow;
 
-/// Where the seeds of the samples begin: far from those that people choose.
+/// First seed of the samples, far from seeds that users choose.
 const SEED: u64 = 0x7472_7900_0000_0000;
 
-/// How many answers of planner and preparer are remembered.
+/// Size of the caches of planner and preparer.
 const MEMORY: usize = 2_000;
 
-/// Who tries plans out, and in what.
+/// Settings of rollouts.
 #[derive(Clone)]
 pub struct Rollouts {
-    /// The world, of which nothing is known but its distributions.
+    /// The world model.
     pub world: Arc<WorldModel>,
-    /// Who executes. One that chooses among plans by itself on the way is taken as `live`.
+    /// The executor. One that chooses among plans during execution is replaced by `live`.
     pub executor: ExecutorSpec,
-    /// How to run.
+    /// Settings of the runs.
     pub settings: RunSettings,
-    /// What is left open, and how envelopes are searched for.
+    /// The open quantities, and the search for envelopes.
     pub flow: flow::Settings,
-    /// What the executor takes to be likely.
+    /// The executor's likelihoods.
     pub likelihoods: Arc<Likelihoods>,
-    /// The planner for new plans on the way: its settings, the states that it may look at for one
-    /// plan and for a better one, and for all together; without it, none are made.
+    /// Settings of replanning; without them, no new plans are made.
     pub replanning: Option<Replanning>,
-    /// Whether the plan is there when the run begins. If not, it comes as soon as planning is
-    /// expected to be over.
+    /// `true` if the plan is available at the start of the run. If `false`, it arrives after the
+    /// expected planning time.
     pub is_ready: bool,
 }
 
-/// The states that a search for a plan in a sample may examine.
+/// Maximum number of states of a search for a plan in a sample.
 const MOST_STATES: u64 = 20_000;
 
-/// Making new plans on the way.
+/// Settings of replanning in rollouts.
 #[derive(Clone, Debug)]
 pub struct Replanning {
-    /// How to plan.
+    /// Settings of the search.
     pub settings: embedded::Settings,
     /// See [`Embedded::most_states`].
     pub most_states: u64,
@@ -57,14 +56,15 @@ pub struct Replanning {
     pub improve_states: u64,
     /// See [`Embedded::work`].
     pub work: u64,
-    /// The states that all plans of all samples may take together. What is not remembered after
-    /// that counts as if there were no plan.
+    /// Maximum number of states for all plans of all samples together. After that, requests that
+    /// are not cached are answered as if there were no plan.
     pub all_states: u64,
 }
 
 impl Replanning {
-    /// As a planner is limited, but with at most 20,000 states for each plan, and ten times as many for all plans
-    /// together: where no plan exists, one sample must not use up the work of all.
+    /// Returns the limits of a planner, but with at most 20,000 states for each plan, and ten times
+    /// as many for all plans together. If no plan exists, a single sample must not use up the work
+    /// of all.
     pub fn within(planner: &Embedded<'_>) -> Self {
         let most_states = planner.most_states.min(MOST_STATES);
         Self {
@@ -77,7 +77,7 @@ impl Replanning {
     }
 }
 
-/// Tries plans of one problem out.
+/// Executes plans of one problem in samples.
 pub struct Tryout<'a> {
     rollouts: Rollouts,
     task: Arc<Task>,
@@ -87,7 +87,8 @@ pub struct Tryout<'a> {
 }
 
 impl<'a> Tryout<'a> {
-    /// Of this problem. `work`: what all samples may take together, in the units of [`elbowroom_num::work`].
+    /// Creates it for a problem. `work` limits the work of all samples together, in units of
+    /// [`elbowroom_num::work`].
     pub fn new(
         task: &Task,
         mut rollouts: Rollouts,
@@ -99,7 +100,7 @@ impl<'a> Tryout<'a> {
         {
             rollouts.executor = live;
         }
-        // What planning takes on a clock is not known beforehand.
+        // Measured planning times are not known in advance.
         if rollouts.settings.planning_time == PlanningTime::Measured {
             rollouts.settings.planning_time = PlanningTime::Seconds(Rational::ZERO);
         }
@@ -116,7 +117,7 @@ impl<'a> Tryout<'a> {
                         improve_states: replanning.improve_states,
                         work,
                         patience: 1,
-                        // A sample says nothing about whether a plan exists.
+                        // Samples need no proof that no plan exists.
                         certificate_work: 0,
                         clock: None,
                         goes_on: Some(goes_on),
@@ -144,14 +145,14 @@ impl<'a> Tryout<'a> {
         }
     }
 
-    /// Whether the goal is reached in a sample of the world, beginning with this plan. The same
-    /// plan succeeds in the same samples, whatever else was tried out.
+    /// Returns `true` if this plan reaches the goal in a sample of the world. The result does not
+    /// depend on earlier calls.
     pub fn succeeds(&mut self, plan: &TimeTriggeredPlan, sample: u64) -> bool {
         self.run(plan, sample, &mut Vec::new()) == Some(Verdict::GoalReached)
     }
 
-    /// The new plans that are made in a sample of the world, beginning with this plan, without what is under way when
-    /// they begin.
+    /// Returns the new plans that are made in a sample of the world after starting with this plan,
+    /// without the actions that are already running.
     pub(super) fn new_plans(
         &mut self,
         plan: &TimeTriggeredPlan,
@@ -162,7 +163,8 @@ impl<'a> Tryout<'a> {
         made
     }
 
-    /// How a run ends, and the plans that are `made` in it; `None` if the plan is none of the problem's.
+    /// Returns the verdict of a run and appends the new plans to `made`; `None` if the plan is not
+    /// one of the problem.
     fn run(
         &mut self,
         plan: &TimeTriggeredPlan,
@@ -170,7 +172,7 @@ impl<'a> Tryout<'a> {
         made: &mut Vec<TimeTriggeredPlan>,
     ) -> Option<Verdict> {
         let rollouts = &self.rollouts;
-        // Plans that were made later may be about facts that have no number here yet.
+        // Later plans may contain facts that are not numbered in this table yet.
         let plan = renumbered(&self.task, plan)?;
         let task = Arc::new(self.task.with_own_table());
         let (first, later) = if rollouts.is_ready {
@@ -197,11 +199,11 @@ impl<'a> Tryout<'a> {
     }
 }
 
-/// Has its first plan already.
+/// Planner with a prepared first plan.
 struct Scripted<'p> {
     first: Option<TimeTriggeredPlan>,
     planner: &'p mut dyn Planner,
-    /// All others that it gave.
+    /// All later plans.
     made: &'p mut Vec<TimeTriggeredPlan>,
 }
 
@@ -219,7 +221,7 @@ impl Planner for Scripted<'_> {
     }
 }
 
-/// The embedded planner, with a limit on what all its plans take together.
+/// The embedded planner, with a limit on the effort for all its plans together.
 pub(super) struct Metered<'a> {
     embedded: Embedded<'a>,
     left: u64,
@@ -227,7 +229,7 @@ pub(super) struct Metered<'a> {
 }
 
 impl Metered<'_> {
-    /// One that remembers what it was asked, or nobody if there is none.
+    /// Returns a planner with a cache, or [`NoPlanner`] without settings of replanning.
     pub(super) fn boxed(replanning: Option<&Replanning>) -> Box<dyn Planner> {
         let Some(replanning) = replanning else {
             return Box::new(NoPlanner);
@@ -259,7 +261,7 @@ impl Planner for Metered<'_> {
             });
         }
         let (answer, states) = self.embedded.counted(task, situation);
-        // Even a plan that takes no search takes some time.
+        // A plan without search also takes some time.
         self.left = self.left.saturating_sub(states.max(1));
         PlannerAnswer::from(answer)
     }

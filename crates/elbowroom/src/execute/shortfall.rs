@@ -1,4 +1,5 @@
-//! Reasons for which the embedded planner has no plan: deadlines that are missed, and goals that exclude each other.
+//! Reasons why the embedded planner has no plan: missed deadlines, and goals that exclude each
+//! other.
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;

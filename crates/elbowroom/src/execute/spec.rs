@@ -1,4 +1,4 @@
-//! What a run is, as data: [`RunSpec`].
+//! Specification of a run as data: [`RunSpec`].
 
 mod text_form;
 mod wiring;
@@ -24,18 +24,17 @@ use text_form::{positive, required};
 
 pub use wiring::{FirstPlanError, SpecError, SpoilerError};
 
-/// The name of the planner that plans nothing.
+/// Name for a run without a planner.
 pub const NOBODY: &str = "none";
 
-/// The name by which specifications and answers mention the embedded planner.
+/// Name of the embedded planner in specifications and answers.
 pub const EMBEDDED: &str = "embedded";
 
-/// Everything that a run depends on, but for the plan that it begins with and what the world does.
+/// All data that a run depends on, except its initial plan and the events of the world.
 ///
-/// It is what the arguments of `elbowroom run` become, the header of a trace
-/// (`docs/formats/trace.md`), and what a replay reads: one type, so that none of them can mean
-/// another run than the others. A member that is unknown or missing is a mistake; members that are
-/// only there where they say something are [so marked](RunSpec::planner_time).
+/// The arguments of `elbowroom run`, the header of a trace (`docs/formats/trace.md`) and the input
+/// of a replay are all of this type, so that they have the same meaning. A member that is unknown
+/// or missing is an error; optional members are [marked as such](RunSpec::planner_time).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(
@@ -51,7 +50,7 @@ pub struct RunSpec {
     /// planned.
     #[serde(deserialize_with = "required")]
     pub world: Option<String>,
-    /// The command line of the process that is the world.
+    /// The command line of the process that simulates or controls the world.
     #[serde(deserialize_with = "required")]
     pub world_process: Option<String>,
     /// The world file that the executor believes (`docs/formats/world.md`): distributions of durations, failures and
@@ -66,31 +65,31 @@ pub struct RunSpec {
         skip_serializing_if = "std::ops::Not::not"
     )]
     pub is_world_embedded: bool,
-    /// A world that lets each action end when that is worst; left out where it is none.
+    /// A world that ends each action at the worst time; left out if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spoiler: Option<Spoiler>,
     /// The planner: [`EMBEDDED`], [`NOBODY`], or the name or command line of another one.
     pub planner: String,
-    /// How many seconds another planner has for better plans than its first; left out where the
-    /// first is taken.
+    /// Time limit of another planner for better plans than its first, in seconds; left out if the
+    /// first plan is used.
     #[serde(default, with = "positive::option")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub planner_time: Option<Rational>,
     /// A likelihood file (`docs/formats/likelihoods.md`); without one, everything is certain.
     #[serde(deserialize_with = "required")]
     pub likelihoods: Option<NamedText>,
-    /// Whether there is a plan to begin with; in a trace, it is the first entry.
+    /// `true` if there is an initial plan; in a trace, it is the first entry.
     pub has_plan: bool,
-    /// Whether the run goes on when its goal is reached, and takes others (`elbowroom serve`); left
-    /// out where it does not.
+    /// `true` if the run is persistent: it continues after reaching its goal, and accepts further
+    /// goals (`elbowroom serve`). Left out if `false`.
     #[serde(
         default,
         rename = "lasting",
         skip_serializing_if = "std::ops::Not::not"
     )]
     pub is_lasting: bool,
-    /// The run accepts pauses, and its goal can be abandoned (`elbowroom run --token`). Omitted if
-    /// `false`.
+    /// `true` if the run accepts pauses and the abandonment of its goal (`elbowroom run --token`).
+    /// Left out if `false`.
     #[serde(
         default,
         rename = "attended",
@@ -100,65 +99,65 @@ pub struct RunSpec {
     /// The executor.
     #[serde(with = "as_text")]
     pub executor: ExecutorSpec,
-    /// Which of the possible trajectories of the world to take.
+    /// Random seed of the simulated world.
     pub seed: u64,
-    /// By what the first plan is chosen, where none is given; left out where that is `shortest`.
+    /// Criterion for the first plan, if none is given; left out if it is `shortest`.
     #[serde(default, skip_serializing_if = "FirstPlan::is_shortest")]
     pub first_plan: FirstPlan,
-    /// How many states the embedded planner may look at for one plan.
+    /// Maximum number of states of the embedded planner for one plan.
     pub planner_states: u64,
-    /// How many of them for a better plan than the first.
+    /// Maximum number of these states for a better plan than the first.
     pub improve_states: u64,
     /// Work limit for each choice of the first plan and each new plan, in seconds of one processor
     /// ([`elbowroom_num::work`]); left out if there is no limit.
     #[serde(default, with = "positive::option")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub planning_budget: Option<Rational>,
-    /// `true` if a ground action may overlap itself in plans of the embedded planner; left out where it may not.
+    /// `true` if a ground action may overlap itself in plans of the embedded planner; left out if
+    /// `false`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub self_overlap: bool,
-    /// How many threads the embedded planner may use for one plan. Nothing that is decided depends on it, but
-    /// for how soon a plan is there; so it is no part of a trace.
+    /// Number of threads of the embedded planner. It affects only the planning time, so it is not
+    /// part of a trace.
     #[serde(skip, default = "one")]
     pub threads: usize,
-    /// What to leave open; all durations that the domain fixes if empty.
+    /// Quantities to leave open; if empty, all durations that the domain fixes.
     #[serde(with = "listed")]
     pub vary: Vec<VarySpec>,
     /// The guarantee inside envelopes.
     pub guarantee: Guarantee,
-    /// How close to its limit each end of an envelope should come; left out where that is a
-    /// hundredth of each nominal value.
+    /// Precision of the ends of an envelope; left out if it is a hundredth of each nominal value.
     #[serde(default, with = "positive::option")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub precision: Option<Rational>,
-    /// What envelopes are to be the best of; left out where they are IRR's.
+    /// Objective of envelopes; left out if they are IRR's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub objective: Option<Objective>,
-    /// The treatment of running actions when a new plan is made.
+    /// The treatment of running actions in replanning.
     #[serde(with = "as_text")]
     pub running: RunningRule,
-    /// The planning time, as it passes in the world.
+    /// The planning time in the world's seconds.
     #[serde(with = "as_text")]
     pub planning_time: PlanningTime,
-    /// Whether plans are made beside the run, while it goes on
-    /// ([`RunSettings::plans_aside`]); left out where they are not.
+    /// `true` if plans are made in the background of the run ([`RunSettings::plans_aside`]); left
+    /// out if `false`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub plans_aside: bool,
-    /// Whether they are made ready beside it, too ([`RunSettings::readies_aside`]); left out where they
-    /// are not.
+    /// `true` if plans are also prepared in the background ([`RunSettings::readies_aside`]); left
+    /// out if `false`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub readies_aside: bool,
-    /// How many seconds of the world pass in one second on the wall clock; without one, there is no
-    /// wall clock.
+    /// Speed of the world's clock relative to the wall clock; without one, the run does not wait
+    /// for the wall clock.
     #[serde(with = "positive::nullable")]
     pub realtime: Option<Rational>,
-    /// The rule that sets the time-out of each action: `10x,600`, 10 times the planned duration, at
-    /// least 600 seconds, unless something else is given.
+    /// The rule that sets the time-out of each action. The default is `10x,600`: 10 times the
+    /// planned duration, at least 600 seconds.
     #[serde(default, with = "as_text")]
     pub timeout: TimeoutRule,
-    /// How often a new plan may be made.
+    /// Maximum number of new plans.
     pub max_replans: usize,
-    /// When the run ends in any case, in the world's seconds.
+    /// Time limit of the run, in the world's seconds.
     #[serde(with = "positive")]
     pub time_limit: Rational,
     /// The least separation of interfering happenings (ε).
@@ -170,7 +169,7 @@ fn one() -> usize {
     1
 }
 
-/// A file: its name, for messages, and what stands in it.
+/// A file: its name, for messages, and its content.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NamedText {
@@ -180,11 +179,11 @@ pub struct NamedText {
     pub text: String,
 }
 
-/// A world that lets each action end when that is worst.
+/// A world that ends each action at the worst time.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spoiler {
-    /// Inside which box: `dur_0=[8,14]`; without one, inside the plan's envelope.
+    /// The box of durations: `dur_0=[8,14]`; without one, the plan's envelope.
     #[serde(rename = "box", deserialize_with = "required")]
     pub inside: Option<String>,
 }
@@ -199,7 +198,7 @@ impl From<&Source> for NamedText {
 }
 
 impl NamedText {
-    /// As a source, for those who read it.
+    /// Returns it as a source for readers.
     pub fn source(&self) -> Source {
         Source::new(self.name.as_str(), self.text.as_str())
     }
@@ -209,7 +208,7 @@ impl NamedText {
 pub const MOST_STATES: u64 = 1_000_000_000;
 
 impl RunSpec {
-    /// A run of this problem with everything else as the command has it by default.
+    /// Creates a run of this problem with the defaults of the command.
     pub fn new(domain: NamedText, problem: NamedText) -> Self {
         let settings = RunSettings::default();
         let planner = Embedded::default();
@@ -252,7 +251,7 @@ impl RunSpec {
         }
     }
 
-    /// The settings of the run.
+    /// Returns the settings of the run.
     pub fn settings(&self) -> RunSettings {
         RunSettings {
             running: self.running,
@@ -260,15 +259,15 @@ impl RunSpec {
             most_replans: self.max_replans,
             timeout: self.timeout.clone(),
             time_limit: self.time_limit.clone(),
-            // In a simulation without a clock nobody can be warned.
+            // A simulation without a clock has no user to warn.
             plans_aside: self.plans_aside,
             readies_aside: self.readies_aside,
             watches_room: self.world_process.is_some() || self.realtime.is_some(),
         }
     }
 
-    /// Whether plans can be made beside the run: there is a clock, by which planning takes as long as
-    /// it takes, and a planner that keeps nothing from one plan to the next.
+    /// Returns `true` if plans can be made in the background: there is a clock that measures
+    /// planning times, and the planner keeps no state between plans.
     pub fn can_plan_aside(&self) -> bool {
         let has_clock = self.world_process.is_some() || self.realtime.is_some();
         let keeps = self.executor.asks_odds() || self.executor.asks_outlook();
@@ -278,7 +277,7 @@ impl RunSpec {
             && !keeps
     }
 
-    /// The quantities to vary, and the parameters of the search for envelopes.
+    /// Returns the quantities to vary, and the settings of the search for envelopes.
     pub fn envelopes(&self) -> flow::Settings {
         let mut flow = flow::Settings {
             vary: self.vary.clone(),
@@ -299,8 +298,9 @@ impl RunSpec {
         self.believed.as_ref().or(simulated).map(String::as_str)
     }
 
-    /// Returns the model of the world that the executor believes: that of [`Self::believed_world`], or, in a simulation
-    /// without one, that everything goes as planned. `None` if the world is a process and nothing is believed of it.
+    /// Returns the model of the world that the executor believes: that of [`Self::believed_world`],
+    /// or, in a simulation without one, a model where everything goes as planned. `None` if the
+    /// world is a process without a believed world.
     ///
     /// # Errors
     /// When the world file cannot be read.
@@ -324,7 +324,7 @@ impl RunSpec {
         }
     }
 
-    /// The likelihoods for the executor.
+    /// Returns the likelihoods for the executor.
     ///
     /// # Errors
     /// When the likelihood file cannot be read.

@@ -1,4 +1,4 @@
-//! A world that plays the durations of a plan's actions as spitefully as a box allows.
+//! Adversarial world: it chooses the worst durations within a box.
 
 use std::collections::BTreeMap;
 
@@ -11,31 +11,29 @@ use elbowroom_sim::{Begun, Pace};
 use elbowroom_stn::NodeId as NetworkNode;
 use elbowroom_stn::uncertain::{Spoiler, UncertainNetwork};
 
-/// A [`Spoiler`] behind the port of [`sim`](crate::sim): sees what is started, and says when it
-/// ends.
+/// A [`Spoiler`] behind the port of [`sim`](crate::sim). It observes starts, and decides when
+/// actions end.
 ///
-/// Durations that the box does not leave open, and actions that are not in the plan, last as long
-/// as planned. Every action ends by its time-out. Without time-outs, an action whose interval is
-/// infinite ends late.
+/// Actions outside the plan, and durations that the box does not leave open, are as planned. Every
+/// action ends by its time-out. Without time-outs, an action whose interval is infinite ends late.
 #[derive(Clone, Debug)]
 pub struct Spoiling {
     spoiler: Spoiler,
     plan: StnPlan,
-    /// For each action's name, its instances, in the order in which they start if nothing
-    /// deviates.
+    /// For each action's name, its instances, by start time without deviations.
     instances: BTreeMap<String, Vec<InstanceId>>,
-    /// The time at which each node happened.
+    /// The time of each node that has happened.
     happened: Vec<Option<Rational>>,
     /// Timed initials, with their times.
     timed: Vec<(NodeId, Rational)>,
-    /// Actions under way.
+    /// The running actions.
     running: BTreeMap<Ticket, InstanceId>,
-    /// When that ends on which the spoiler does not decide.
+    /// End times of the actions that the spoiler does not control.
     ends: BTreeMap<Ticket, Rational>,
 }
 
 impl Spoiling {
-    /// Spoils a plan whose network, with what the world decides in it, is that one
+    /// Creates an adversary of a plan with this network with uncertainty
     /// ([`ParametrizedPlan::uncertain_network`](elbowroom_plan::ParametrizedPlan::uncertain_network)).
     /// `nominal` is the schedule without deviations, `timeout` the latest end of each action.
     pub fn new(
@@ -88,9 +86,9 @@ impl Spoiling {
     }
 }
 
-/// The same network, in which everything ends at some time: what the world may draw out without
-/// end lasts at most longer than all other bounds together. No conflict needs more. What `latest` has
-/// lasts no longer than that.
+/// Returns the network with finite contingent links. An unbounded link gets an upper bound longer
+/// than all other bounds together, which is sufficient for every conflict. The ends in `latest` are
+/// also bounded by it.
 fn in_the_end(
     network: &UncertainNetwork,
     latest: &BTreeMap<NetworkNode, Rational>,

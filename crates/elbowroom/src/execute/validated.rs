@@ -37,12 +37,12 @@ pub struct Validated<'a, R> {
 
 type Listener<'a> = Box<dyn FnMut(&Invalid) + Send + 'a>;
 
-/// The validator's findings in a run so far; shared by clones.
+/// The validator's findings in a run so far, shared between clones.
 #[derive(Clone)]
 pub struct Findings(Arc<Mutex<Validation<'static>>>);
 
 impl<'a, R: Recorder> Validated<'a, R> {
-    /// Creates the recorder and its findings. `stand` is the snapshot from which the run continues, or
+    /// Creates the recorder and its findings. `stand` is the snapshot of a run to continue, or
     /// `None` for a new run.
     pub fn new(inner: R, task: &Arc<Task>, stand: Option<&Stand>) -> (Self, Findings) {
         let mut validation = Validation::new(task, read_goal);
@@ -59,7 +59,8 @@ impl<'a, R: Recorder> Validated<'a, R> {
         (recorder, validation)
     }
 
-    /// Tells `listener` each of the first findings when it is found, not only at the end of the run.
+    /// Reports each of the first findings to `listener` immediately, not only at the end of the
+    /// run.
     #[must_use]
     pub fn told_to(mut self, listener: impl FnMut(&Invalid) + Send + 'a) -> Self {
         self.listener = Some(Box::new(listener));

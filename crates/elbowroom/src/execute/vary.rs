@@ -1,17 +1,17 @@
-//! What is to be left open, before there is a plan.
+//! Checks of the quantities to leave open, before there is a plan.
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::parametrize::{ParametrizeError, Target, VarySpec, parametrize};
 use elbowroom_plan::{Schedule, StnPlan};
 
-/// Whether each specification names something that the problem has, or a plan may have.
+/// Checks that each specification names something in the problem or in a possible plan.
 ///
-/// What a plan does not have, it cannot leave open, and that is no mistake: the next plan may have
-/// it. A name that nothing in the problem has is one.
+/// A specification may name something that a plan does not have: the next plan may have it. A name
+/// that is unknown in the problem is an error.
 ///
 /// # Errors
-/// The first mistake.
+/// The first error.
 pub fn check_vary(task: &Task, specs: &[VarySpec]) -> Result<(), ParametrizeError> {
     let plan = StnPlan::unconstrained(task, Vec::new());
     let timed = task.timed().iter().map(|timed| timed.time.clone());
@@ -19,7 +19,8 @@ pub fn check_vary(task: &Task, specs: &[VarySpec]) -> Result<(), ParametrizeErro
     for spec in specs {
         let is_about_the_problem = matches!(spec.target, Target::Initial(_) | Target::Timed { .. });
         match parametrize(task, plan.clone(), &nominal, std::slice::from_ref(spec)) {
-            // Another specification may have the value; if not, that is said when there is a plan.
+            // Another specification may define the value; if not, preparing the plan reports the
+            // error.
             Ok(_) | Err(ParametrizeError::NoNominal { .. }) => {}
             Err(ParametrizeError::NothingMatches { .. }) if !is_about_the_problem => {}
             Err(error) if is_about_an_absent_action(task, spec, &error) => {}
@@ -30,8 +31,8 @@ pub fn check_vary(task: &Task, specs: &[VarySpec]) -> Result<(), ParametrizeErro
     Ok(())
 }
 
-/// Whether a specification that fits nothing names an action of the domain, or a number that one
-/// leaves open, and the plan just does not use it.
+/// Returns `true` if a specification matches nothing only because the plan does not use the action
+/// of the domain, or the open number of an action, that it names.
 pub(super) fn is_about_an_absent_action(
     task: &Task,
     spec: &VarySpec,
@@ -54,7 +55,7 @@ pub(super) fn is_about_an_absent_action(
         && spec.text.split([' ', '(', ')']).any(is_action)
 }
 
-/// Whether it is what a step of a plan may be called: `n0`.
+/// Returns `true` if it can be the label of a plan's step: `n0`.
 fn is_label(name: &str) -> bool {
     let number = name.strip_prefix(['n', 'N']);
     number.is_some_and(|number| !number.is_empty() && number.bytes().all(|it| it.is_ascii_digit()))

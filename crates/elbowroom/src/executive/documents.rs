@@ -1,4 +1,4 @@
-//! What is asked and answered, as JSON: `docs/serve.md`.
+//! Requests and responses as JSON: `docs/serve.md`.
 
 use std::fmt;
 
@@ -11,7 +11,8 @@ use serde_json::{Map, Value, json};
 use super::Described;
 use super::schema::documents;
 
-/// A number that somebody gives: plain, as a text such as `"1/3"`, or as this program writes it.
+/// A number in a request: a JSON number, a text such as `"1/3"`, or the form that this program
+/// writes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GivenNumber(pub Rational);
 
@@ -70,27 +71,27 @@ fn end_schema(definitions: &mut Map<String, Value>) -> Value {
     json!({ "anyOf": [Exact::schema(definitions), infinite] })
 }
 
-/// What an executive is doing.
+/// Activity of an executive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Activity {
-    /// It has not begun.
+    /// The run has not begun.
     #[default]
     Beginning,
-    /// It makes a plan.
+    /// The planner makes a plan.
     Planning,
-    /// It executes one.
+    /// A plan is executed.
     Executing,
-    /// It was asked to pause.
+    /// The run is paused on request.
     Paused,
-    /// It has nothing to do, or cannot do it, and waits for a change.
+    /// The executive is idle: there is no goal, or no plan, and it waits for a change.
     Resting,
-    /// It has ended.
+    /// The run has ended.
     Over,
 }
 
 impl Activity {
-    /// All of them, as documents write them.
+    /// All values with their names in documents.
     pub const NAMES: &[(Self, &str)] = &[
         (Self::Beginning, "beginning"),
         (Self::Planning, "planning"),
@@ -116,55 +117,56 @@ impl Described for Activity {
 }
 
 documents! {
-    /// How things stand.
+    /// The state of the run.
     pub struct State {
-        /// The time by the world's clock when it was last heard, in seconds.
+        /// The time of the world's clock at its last message, in seconds.
         pub now: Exact,
-        /// For how many seconds the world has not answered what it was asked, by this machine's clock; none as long as
-        /// it answers within a second. Until it does, nothing is started, and no request is taken in.
+        /// Time for which the world has not answered a request, in seconds of this machine's clock;
+        /// none if it answers within a second. Until it answers, no action is started, and no
+        /// request is accepted.
         pub unanswered: Option<u64>,
-        /// What the executive is doing.
+        /// Activity of the executive.
         pub activity: Activity,
-        /// Why, in words, where there is something to say: why it rests, or makes a plan.
+        /// The reason why it is idle or makes a plan, in words.
         pub why: Option<String>,
         /// The open goals.
         pub goals: Vec<OpenGoal>,
-        /// What is under way.
+        /// The running actions.
         pub running: Vec<Running>,
-        /// How many plans were taken up so far.
+        /// Number of plans adopted so far.
         pub plans: usize,
         /// The facts that are believed to be true.
         pub facts: Vec<String>,
-        /// The numbers as they are believed to be.
+        /// The believed values of numbers.
         pub numbers: Vec<NumberNow>,
-        /// Facts and numbers that are in doubt. Until they are known, such a fact counts as false, such a number keeps its
-        /// value, and a goal that reads them is not reached.
+        /// Facts and numbers in doubt. Until their values are known, such a fact counts as false,
+        /// such a number keeps its value, and a goal that reads them is not reached.
         pub in_doubt: Vec<InDoubt>,
     }
 
-    /// A fact or a number that is in doubt.
+    /// A fact or a number in doubt.
     pub struct InDoubt {
         /// The fact or the number.
         pub name: String,
-        /// Since when.
+        /// The start of the doubt.
         pub since: Exact,
-        /// The reason, and how the doubt can be settled.
+        /// The reason, and the observations that settle the doubt.
         pub why: String,
     }
 
-    /// A goal that is to be reached.
+    /// An open goal.
     pub struct OpenGoal {
         /// Its name; that of the problem's own goal is `problem`.
         pub name: String,
         /// The goal, in PDDL.
         pub goal: String,
-        /// The reason for which it is set aside while other goals are pursued; none if it is pursued.
+        /// The reason why it is set aside while other goals are pursued; none if it is pursued.
         pub aside: Option<String>,
     }
 
-    /// The goals: those that are open, and the last ones that were closed.
+    /// The open goals, and the most recently closed ones.
     pub struct GoalsNow {
-        /// The goals: first those that were closed, then the open ones, each in their order.
+        /// The closed goals, by time of closing, followed by the open ones, oldest first.
         pub goals: Vec<GoalNow>,
     }
 
@@ -178,34 +180,38 @@ documents! {
         pub value: Exact,
         /// Its deadline on the world's clock, if there is one.
         pub deadline: Option<Exact>,
-        /// `pursued`; `set-aside` while others are pursued; `impossible` if no plan exists, or `unplanned` if none was found,
-        /// from where the executive rests; `achieved`, `cancelled`, or `failed` if it was not achieved by its deadline.
+        /// `pursued`; `set-aside` while others are pursued; `impossible` if no plan exists, or
+        /// `unplanned` if none was found, when the executive is idle; `achieved`, `cancelled`, or
+        /// `failed` if it was not achieved by its deadline.
         pub state: String,
-        /// When it was given, by the world's clock; none if an earlier segment of the journal has it.
+        /// The time at which it was given, by the world's clock; none if an earlier segment of the
+        /// journal contains it.
         pub given: Option<Exact>,
-        /// Since when it is in this state.
+        /// The time of the change to this state.
         pub since: Exact,
         /// The reason for a state other than `pursued` and `achieved`, if it is known.
         pub why: Option<String>,
     }
 
-    /// An action under way.
+    /// A running action.
     pub struct Running {
         /// The number of its start.
         pub ticket: u64,
         /// The action.
         pub action: String,
-        /// When it was started.
+        /// The time of its start.
         pub since: Exact,
-        /// How long it was planned to take.
+        /// Planned duration.
         pub planned: Option<Exact>,
-        /// From when on a new plan is needed if it has not ended, once that is near.
+        /// The time at which a new plan is needed if the action has not ended; given only shortly
+        /// before.
         pub needed: Option<Exact>,
-        /// When it times out and is cancelled if it has made no progress by then, once that is near.
+        /// The time at which the action times out and is cancelled unless it makes progress; given
+        /// only shortly before.
         pub times_out: Option<Exact>,
-        /// The part that is done, from 0 to 1, if the world has said so.
+        /// The completed part, from 0 to 1, if the world has reported it.
         pub completion: Option<Exact>,
-        /// What the world has said last about it.
+        /// The world's last note about it.
         pub note: Option<String>,
     }
 
@@ -217,13 +223,13 @@ documents! {
         pub value: Exact,
     }
 
-    /// The plan that is executed.
+    /// The current plan.
     pub struct PlanNow {
         /// Its actions, by planned start; none if there is no plan.
         pub steps: Vec<StepNow>,
-        /// When it was taken up, by the world's clock.
+        /// The time of its adoption, by the world's clock.
         pub since: Option<Exact>,
-        /// How many plans were taken up so far.
+        /// Number of plans adopted so far.
         pub plans: usize,
     }
 
@@ -241,95 +247,95 @@ documents! {
         pub ticket: Option<u64>,
     }
 
-    /// What holds whatever the world does within limits.
+    /// The guarantee for the remaining plan.
     pub struct GuaranteeNow {
-        /// The guarantee for the rest of the plan: `envelope`, `part-of-envelope`, `planned` or
+        /// The guarantee for the remaining plan: `envelope`, `part-of-envelope`, `planned` or
         /// `luck`, if the executor makes one.
         pub promise: Option<String>,
-        /// Since when.
+        /// The time at which it was made.
         pub since: Option<Exact>,
-        /// The last thing since it rested that deviated so much that a plan was given up for it.
+        /// The last deviation that made the executor abandon a plan, since the executive was idle.
         pub deviation: Option<String>,
         /// The rule that sets the time-out of each action: `10x,600` is 10 times the planned
         /// duration, at least 600 seconds; `none` if time-outs are off. The promise holds as long as each
         /// quantity stays inside its interval and each action ends before its time-out.
         pub timeout: String,
-        /// The quantities that may deviate, and how far.
+        /// The quantities that may deviate, with their intervals.
         pub parameters: Vec<Room>,
     }
 
-    /// How far a quantity may deviate.
+    /// A quantity and its guaranteed interval.
     pub struct Room {
         /// Its name.
         pub name: String,
-        /// What it is, in words: `duration of (move a b)`.
+        /// The quantity in words: `duration of (move a b)`.
         pub meaning: String,
-        /// Its value if nothing deviates.
+        /// Its planned value.
         pub nominal: Exact,
-        /// The least value that is guaranteed to work; none if nothing is guaranteed: if the promise is neither
-        /// `envelope` nor `part-of-envelope`.
+        /// The lower end of the guaranteed interval; none if there is no guarantee, that is, if the
+        /// promise is neither `envelope` nor `part-of-envelope`.
         pub least: Option<LowerEnd>,
-        /// The greatest one.
+        /// The upper end of the guaranteed interval.
         pub most: Option<UpperEnd>,
         /// The time-out of the action whose duration it is; none if it is no duration, or if
         /// time-outs are off.
         pub timeout: Option<Exact>,
     }
 
-    /// What is next, and why.
+    /// The last decision and the next action.
     pub struct NextNow {
-        /// What was decided last: `start`, `wait`, `cancel`, `replan` or `goal-reached`.
+        /// The last decision: `start`, `wait`, `cancel`, `replan` or `goal-reached`.
         pub decision: Option<String>,
-        /// When.
+        /// The time of the decision.
         pub decided: Option<Exact>,
-        /// Until when it waits, if nothing happens before.
+        /// The end of the wait, if no event ends it before.
         pub until: Option<Exact>,
-        /// Why, in words.
+        /// The reason, in words.
         pub why: Option<String>,
-        /// The next action of the plan that has not been started.
+        /// The next action of the plan to start.
         pub step: Option<StepNow>,
     }
 
-    /// A goal that somebody gives.
+    /// A goal given by a client.
     #[serde(deny_unknown_fields)]
     pub struct NewGoal {
-        /// Its name; without one, it gets one. The goal of the same name is replaced.
+        /// Its name; without one, a name is generated. A goal of the same name is replaced.
         [optional serde(default)]
         pub name: Option<String>,
-        /// The goal, in PDDL, as it stands behind `:goal`.
+        /// The goal, in PDDL, without `:goal`.
         pub goal: String,
         /// Its value, a positive number; 1 by default. If not all goals can be reached together, those with the greatest sum of
         /// values are pursued.
         [optional serde(default)]
         pub value: Option<GivenNumber>,
-        /// Its deadline on the world's clock. Plans achieve it until then; otherwise it is closed as failed. By default
-        /// there is none.
+        /// Its deadline on the world's clock. Plans achieve the goal by then; otherwise it is
+        /// closed as failed. By default there is none.
         [optional serde(default)]
         pub deadline: Option<GivenNumber>,
-        /// The deadline in seconds from now, in place of `deadline`; a positive number.
+        /// The deadline in seconds from now, instead of `deadline`; a positive number.
         [optional serde(default)]
         pub within: Option<GivenNumber>,
     }
 
-    /// The end of a running action.
+    /// The end of a running action, reported or requested by a client.
     #[serde(deny_unknown_fields)]
     pub struct NewOutcome {
         /// The number of its start.
         pub ticket: u64,
-        /// `done` or `failed`, as it was observed; `cancelled` to have the world cancel it.
+        /// `done` or `failed` for an observed end; `cancelled` to have the world cancel the action.
         pub becomes: String,
     }
 
-    /// A fact as it is from now on.
+    /// A new value of a fact.
     #[serde(deny_unknown_fields)]
     pub struct NewFact {
         /// The fact, such as `(at rover depot)`.
         pub fact: String,
-        /// Whether it is true.
+        /// `true` if the fact is true.
         pub becomes: bool,
     }
 
-    /// A number as it is from now on.
+    /// A new value of a number.
     #[serde(deny_unknown_fields)]
     pub struct NewNumber {
         /// The fluent, such as `(charge rover)`.
@@ -338,30 +344,31 @@ documents! {
         pub value: GivenNumber,
     }
 
-    /// A problem for the domain that the executive was started with.
+    /// A new problem for the domain of the executive.
     #[serde(deny_unknown_fields)]
     pub struct NewProblem {
         /// The text of the problem file, in PDDL.
         pub problem: String,
     }
 
-    /// A request has come in.
+    /// Acknowledgement of a request.
     pub struct Taken {
-        /// Whether the executive has taken it in: then it survives a crash if there is a journal.
+        /// `true` if the executive has accepted the request. With a journal, an accepted request
+        /// survives a crash.
         pub taken: bool,
-        /// What it waits for, in words, if it has not been taken in.
+        /// The event that the request waits for, in words, if it has not been accepted yet.
         [optional serde(default, skip_serializing_if = "Option::is_none")]
         pub until: Option<String>,
-        /// The name of the goal that the request is about.
+        /// The name of the goal in the request.
         [optional serde(default, skip_serializing_if = "Option::is_none")]
         pub name: Option<String>,
     }
 
-    /// Why a request is refused.
+    /// Rejection of a request.
     pub struct Refusal {
-        /// What is wrong, in one sentence.
+        /// The error, in one sentence.
         pub error: String,
-        /// What to do about it.
+        /// The remedy.
         pub help: String,
     }
 }

@@ -8,13 +8,13 @@ use super::documents::{
 };
 use super::schema::Described;
 
-/// Something that can be asked of an executive.
+/// A method of the interface.
 pub struct Method {
     /// `GET`, `POST`, `PUT` or `DELETE`.
     pub verb: &'static str,
-    /// The path; `{name}` stands for a part of it.
+    /// The path; `{name}` is a placeholder for a part of it.
     pub path: &'static str,
-    /// What it is for.
+    /// Description of the method.
     pub about: &'static str,
     body: Option<Schema>,
     answer: Answer,
@@ -28,7 +28,7 @@ enum Answer {
 }
 
 impl Method {
-    /// Whether it changes something, for which a token is needed.
+    /// Returns `true` if it changes something, which requires a token.
     pub fn changes(&self) -> bool {
         self.verb != "GET"
     }
@@ -59,7 +59,7 @@ const fn change(
     }
 }
 
-/// Everything that can be asked of an executive.
+/// All methods of the interface.
 pub const METHODS: &[Method] = &[
     get("/v1/state", "How things stand", Answer::Json(State::schema)),
     get(
@@ -159,7 +159,7 @@ pub const METHODS: &[Method] = &[
     ),
 ];
 
-/// The interface as a document of `OpenAPI` 3.1.
+/// Returns the interface as a document of `OpenAPI` 3.1.
 pub fn openapi() -> Value {
     let mut schemas = Map::new();
     let refusal = Refusal::schema(&mut schemas);
@@ -228,7 +228,7 @@ mod tests {
     use super::{METHODS, openapi};
     use serde_json::Value;
 
-    /// All references in a document.
+    /// Collects all references in a document.
     fn references<'v>(value: &'v Value, found: &mut Vec<&'v str>) {
         match value {
             Value::Object(members) => {

@@ -1,12 +1,12 @@
-//! JSON schemas of documents, made where the documents are declared.
+//! JSON schemas of documents, generated from their declarations.
 
 use elbowroom_report::exact::Exact;
 use serde_json::{Map, Value, json};
 
 /// A type whose JSON form can be described.
 pub trait Described {
-    /// The schema (as `OpenAPI` 3.1 and JSON Schema 2020-12 have it); what it refers to goes into
-    /// `definitions`.
+    /// Returns the schema, in the form of `OpenAPI` 3.1 and JSON Schema 2020-12. Referenced schemas
+    /// are added to `definitions`.
     fn schema(definitions: &mut Map<String, Value>) -> Value;
 }
 
@@ -59,7 +59,7 @@ impl<T: Described> Described for Vec<T> {
     }
 }
 
-/// Declares documents, whose comments and fields are their schemas, too.
+/// Declares documents. Their comments and fields also define their schemas.
 macro_rules! documents {
     ($(
         $(#[doc = $about:literal])+

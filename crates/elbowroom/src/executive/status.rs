@@ -1,4 +1,4 @@
-//! How a run stands, for those who ask while it goes on.
+//! State of a run, for clients of an executive.
 
 mod goals;
 
@@ -25,8 +25,8 @@ use super::documents::{
     Running, State, StepNow, UpperEnd,
 };
 
-/// Follows a lasting run by its record. Clones are the same; whoever asks is answered at once, and
-/// holds nothing up: names are made from a copy of what is believed.
+/// Follows a persistent run by its record. Clones share the state. Requests are answered at once
+/// and do not block the run, because names are computed from a copy of the belief state.
 #[derive(Clone, Default)]
 pub struct Status(Arc<Mutex<Known>>);
 
@@ -37,15 +37,15 @@ struct Known {
     is_planning: bool,
     is_paused: bool,
     is_over: bool,
-    /// The reason for which the state is one of the past, if it is.
+    /// The reason why the state is outdated, if it is.
     past: Option<&'static str>,
-    /// Why it rests, if it does.
+    /// The reason why the executive is idle, if it is.
     rest: Option<String>,
-    /// Why a plan is made.
+    /// The reason for making a plan.
     why: Option<String>,
     goals: GoalList,
     running: BTreeMap<u64, Running>,
-    /// Of these, those that were seen to start.
+    /// The tickets of running actions whose start was reported.
     started: BTreeSet<u64>,
     plans: usize,
     steps: Vec<StepNow>,
@@ -58,7 +58,7 @@ struct Known {
 }
 
 impl Status {
-    /// Of a run of this task that has not begun, and whose actions time out by that rule.
+    /// Creates the status of a run of this task that has not begun, with this rule for time-outs.
     pub fn new(task: &Task, timeout: TimeoutRule) -> Self {
         let mut goals = GoalList::default();
         if !task.problem().goal.is_trivial() {
@@ -74,39 +74,39 @@ impl Status {
     }
 
     fn known(&self) -> MutexGuard<'_, Known> {
-        // Whoever panicked has left what is known of the run as it was or as it is.
+        // Each update is complete or has no effect, so a poisoned lock is ignored.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes note of an entry of the record.
+    /// Updates the state with an entry of the record.
     pub fn record(&self, entry: &Entry<'_>) {
         self.known().record(entry);
     }
 
-    /// The run begins as an earlier one stood.
+    /// Sets the state to the snapshot of an earlier run, which the run continues.
     pub fn begin_at(&self, snapshot: &SnapshotLine) {
         self.known().begin_at(snapshot);
     }
 
-    /// Takes note of what is believed.
+    /// Updates the belief state.
     pub fn believe(&self, belief: &Progression) {
         let belief = Arc::new(belief.clone());
         self.known().belief = Some(belief);
     }
 
-    /// The names of the open goals.
+    /// Returns the names of the open goals.
     pub fn goals(&self) -> Vec<String> {
         let goals = self.known().goals.open();
         goals.into_iter().map(|goal| goal.name).collect()
     }
 
-    /// Returns the open goals, and the last ones that were closed.
+    /// Returns the open goals, and the most recently closed ones.
     pub fn all_goals(&self) -> GoalsNow {
         self.known().goals.all()
     }
 
-    /// Returns the present state. Its facts and numbers are those at the present time: timed initials and
-    /// continuous effects change them also while nothing is recorded.
+    /// Returns the present state. Its facts and numbers include timed initials and continuous
+    /// effects since the last entry of the record.
     pub fn state(&self) -> State {
         let (mut state, belief) = {
             let known = self.known();
@@ -114,9 +114,10 @@ impl Status {
         };
         if let Some(belief) = belief {
             let mut belief = Progression::clone(&belief);
-            // Timed initials and continuous effects since the last entry; what cannot be computed keeps its value.
+            // Timed initials and continuous effects since the last entry. A number that cannot be
+            // computed keeps its value.
             let _ = belief.advance(&state.now.0);
-            // What was given up for its silence is believed to run no more.
+            // Actions that have timed out are no longer running in the belief state.
             let runs = |ticket: u64| belief.running().contains_key(&Ticket(ticket));
             let started = self.known().started.clone();
             state
@@ -138,17 +139,17 @@ impl Status {
         state
     }
 
-    /// Sets whether the run replays its journal, so that its state is one of the past.
+    /// Sets whether the run replays its journal. Its state is then outdated.
     pub fn set_replayed(&self, is_replayed: bool) {
         self.known().past = is_replayed.then_some("the journal is replayed");
     }
 
-    /// Returns whether the run replays its journal.
+    /// Returns `true` if the run replays its journal.
     pub fn is_replayed(&self) -> bool {
         self.known().past.is_some()
     }
 
-    /// The world's clock says so, though nothing has happened.
+    /// Updates the time of the world's clock, without an event.
     pub fn pass(&self, now: &Rational) {
         let mut known = self.known();
         if *now > known.now {
@@ -156,7 +157,7 @@ impl Status {
         }
     }
 
-    /// The plan.
+    /// Returns the current plan.
     pub fn plan(&self) -> PlanNow {
         let known = self.known();
         PlanNow {
@@ -166,7 +167,7 @@ impl Status {
         }
     }
 
-    /// What is guaranteed.
+    /// Returns the guarantee.
     pub fn guarantee(&self) -> GuaranteeNow {
         let known = self.known();
         let promise = known.promise.as_ref();
@@ -185,7 +186,7 @@ impl Status {
         }
     }
 
-    /// What is next, and why.
+    /// Returns the last decision and the next action.
     pub fn next(&self) -> NextNow {
         let known = self.known();
         let decided = known.decided.as_ref();
@@ -207,17 +208,17 @@ impl Status {
     }
 }
 
-/// Why a run rests whose record does not say.
+/// Reason of an idle run whose present segment of the journal does not contain the reason.
 const BEFORE: &str = "the reason is in an earlier segment of the journal";
-/// Why a plan is made at the beginning, and where a run that was over goes on.
+/// Reason for making a plan at the beginning, and when a run continues after its end.
 const NO_PLAN: &str = "there is no plan yet";
-/// Why a run rests that was asked for nothing.
+/// Reason of an idle run without goals.
 const NO_GOAL: &str = "there is no goal";
 const TO_COME: &str = "to-come";
 const RUNNING: &str = "running";
 const SUCCEEDED: &str = "succeeded";
 
-/// The goal of a problem, in PDDL, as it stands behind `:goal`.
+/// Returns the goal of a problem, in PDDL, without `:goal`.
 pub fn goal_text(task: &Task) -> String {
     let text = write_problem(task, &Situation::initial(task), &ProblemText::default());
     let text = text.unwrap_or_default();
@@ -321,7 +322,7 @@ impl Known {
                 self.goals.try_again();
                 self.rest = None;
                 self.why = Some(match reason.cause {
-                    // For the record, a run begins as where a plan has come.
+                    // The record of a run begins with the cause of a new plan.
                     Cause::NewPlan => NO_PLAN.to_owned(),
                     _ => reason.to_string(),
                 });
@@ -470,7 +471,7 @@ impl Known {
                 duration,
             } => (ticket, action, duration),
             Command::Cancel { ticket } => {
-                // What was never seen to start may never be seen to end.
+                // An action without a reported start may have no reported end.
                 if !self.started.contains(&ticket.0) {
                     self.end(ticket.0, "cancelled");
                 }
@@ -531,7 +532,7 @@ impl Known {
                     running.note = Some(note.clone()).filter(|note| !note.is_empty());
                 }
             }
-            // What was objected to had no effect.
+            // Rejected requests have no effect.
             Event::Asked(request) if !is_remarkable => self.asked(request),
             Event::Asked(_)
             | Event::Fact { .. }

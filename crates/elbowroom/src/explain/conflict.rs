@@ -1,4 +1,5 @@
-//! Why a plan has no schedule: what takes too long, and what it must fit into.
+//! Explanations for plans without a schedule: the durations that are too long, and the bound that
+//! they exceed.
 
 use std::collections::BTreeMap;
 
@@ -9,25 +10,25 @@ use elbowroom_plan::{
 
 use super::Explainer;
 
-/// Constraints that contradict each other, in words.
+/// Constraints that contradict each other, with a description.
 pub(super) struct Conflict {
-    /// The conflict: which durations have to fit into which bound.
+    /// Description of the conflict: the durations that exceed a bound.
     pub(super) reason: String,
-    /// By how much it is too long.
+    /// Excess of the durations over the bound.
     pub(super) excess: Rational,
-    /// The bounds that follow each other in a circle.
+    /// The negative cycle of bounds.
     cycle: Vec<Origin>,
 }
 
-/// Conflicts that have come up in a plan: one is mostly what limits many ends.
+/// Known conflicts of a plan. Usually, a single conflict limits many ends.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
     conflicts: Vec<SeenConflict>,
-    /// By parameter: the conflicts that it is part of.
+    /// The conflicts of each parameter.
     of: BTreeMap<ParameterId, Vec<usize>>,
 }
 
-/// A conflict of which the words do not depend on the values.
+/// A conflict whose description does not depend on the values.
 #[derive(Debug)]
 struct SeenConflict {
     cycle: Vec<Origin>,
@@ -35,8 +36,8 @@ struct SeenConflict {
 }
 
 impl Seen {
-    /// Why the plan has no schedule at these values, while it has one if the parameter does not
-    /// deviate so far. If it has one, that is empty.
+    /// Returns the reason why the plan has no schedule at these values, where only the parameter
+    /// deviates too far. Empty if the plan has a schedule.
     pub(super) fn reason(
         &mut self,
         explainer: &Explainer<'_>,
@@ -62,7 +63,7 @@ impl Seen {
                 {
                     parameters.push(*id);
                 }
-                // The value is in the words.
+                // The description contains the value.
                 Some((_, Bound::Parameter(_))) => return reason,
                 Some(_) | None => {}
             }
@@ -98,7 +99,7 @@ impl<'a> Edge<'a> {
         }
     }
 
-    /// The constraint, and the bound of it.
+    /// Returns the constraint and its bound.
     fn bound(self) -> Option<(&'a Constraint, &'a Bound)> {
         match self {
             Self::Beginning => None,
@@ -108,7 +109,8 @@ impl<'a> Edge<'a> {
     }
 }
 
-/// Whether a cycle of bounds, each of which there is, leaves no room for a schedule at these values.
+/// Returns `true` if a cycle of bounds is negative at these values, so that there is no schedule.
+/// `false` if one of the bounds is infinite.
 fn is_too_long(plan: &StnPlan, cycle: &[Origin], valuation: &Valuation) -> bool {
     let mut room = Total::default();
     for edge in cycle.iter().map(|origin| Edge::of(plan, *origin)) {
@@ -128,7 +130,7 @@ fn is_too_long(plan: &StnPlan, cycle: &[Origin], valuation: &Valuation) -> bool 
     room.value().is_negative()
 }
 
-/// The contradiction in the plan's constraints at these values; `None` if there is none.
+/// Returns the conflict of the plan's constraints at these values; `None` if there is none.
 pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<Conflict> {
     let plan = &explainer.plan.plan;
     let (network, origins) = plan.network_with_origins(valuation);
@@ -139,8 +141,8 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
         .map(|id| origins[id.index()])
         .collect();
     let mut walked: Vec<Edge<'_>> = cycle.iter().map(|id| Edge::of(plan, *id)).collect();
-    // Walking a cycle goes back in time along what takes long; people read forwards, from the
-    // first of what must fit to the last.
+    // The cycle follows lower bounds backwards in time. The description lists them forwards,
+    // beginning after an upper bound.
     let first_room = walked.iter().position(|o| matches!(o, Edge::AtMost(_)));
     walked.rotate_left(first_room.unwrap_or(0));
     let mut needs: Vec<String> = Vec::new();
@@ -168,8 +170,8 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
 }
 
 impl Explainer<'_> {
-    /// What takes at least so long, or what it has to fit into, at the nominal values; `None` for
-    /// mere orderings.
+    /// Describes a bound at the nominal values: a lower bound by the time that it takes, an upper
+    /// bound by the time that it allows. `None` for mere orderings.
     pub(crate) fn bound_words(&self, constraint: &Constraint, side: Side) -> Option<String> {
         let nominal = self.plan.nominal();
         match side {
@@ -182,9 +184,9 @@ impl Explainer<'_> {
 }
 
 impl Explainer<'_> {
-    /// What a sum of bounds says: that actions which take as long as these parameters must fit into
-    /// others and into fixed bounds. Each bound is a constraint of the plan, by position, and which
-    /// of its sides; those that are parameters themselves do not count.
+    /// Describes a sum of bounds: actions with the durations `takes` must fit into actions with the
+    /// durations `gives` and into fixed bounds. Each bound is the position of a constraint of the
+    /// plan, and a side of it. Bounds that are parameters are ignored.
     pub(crate) fn sum_words(
         &self,
         takes: Vec<String>,
@@ -247,15 +249,16 @@ impl Explainer<'_> {
     }
 }
 
-/// The constraint that a chain of actions has to fit into.
+/// An upper bound on a chain of actions.
 enum Room {
-    /// An action during which it must happen.
+    /// The duration of an action that contains the chain.
     Action(String),
-    /// Anything else: a deadline, a bound.
+    /// Another upper bound, such as a deadline.
     Limit(String),
 }
 
-/// `A, B must fit into C`; `deadline of D at 60, because A, B must be over before it`.
+/// Forms the sentence: `A, B must fit into C`, or `deadline of D at 60, because A, B must be over
+/// before it`.
 fn sentence(needs: &[String], rooms: &[Room]) -> String {
     let needs = needs.join(", ");
     let mut actions = Vec::new();
@@ -271,7 +274,8 @@ fn sentence(needs: &[String], rooms: &[Room]) -> String {
         (true, true, _) => limits,
         (true, false, true) => format!("the duration of {actions}"),
         (true, false, false) => format!("{limits}, and the duration of {actions}"),
-        // Its end comes no later than its start, which nothing but a condition over no time allows.
+        // The end comes no later than the start, which only an over-all condition over an empty
+        // interval allows.
         (false, true, true) => {
             format!("an over-all condition holds only if {needs} ends as soon as it starts")
         }
@@ -281,8 +285,8 @@ fn sentence(needs: &[String], rooms: &[Room]) -> String {
     }
 }
 
-/// What the edge says if it keeps start and end of one action in their order: because they interfere,
-/// or because of constraints on the course, or processes and events.
+/// Describes an edge that orders the start and the end of one action: because they interfere, or
+/// because of trajectory constraints, processes or events.
 fn own_order(explainer: &Explainer<'_>, origin: Edge<'_>, valuation: &Valuation) -> Option<String> {
     let Edge::AtLeast(constraint) = origin else {
         return None;
@@ -304,7 +308,7 @@ fn own_order(explainer: &Explainer<'_>, origin: Edge<'_>, valuation: &Valuation)
     }
 }
 
-/// The time that a lower bound takes; `None` for mere separations.
+/// Describes the time that a lower bound takes; `None` for mere separations.
 fn need(
     explainer: &Explainer<'_>,
     constraint: &Constraint,
@@ -334,7 +338,7 @@ fn need(
     })
 }
 
-/// The room that an upper bound leaves. `next` follows on the cycle.
+/// Describes the time that an upper bound allows. `next` is the next edge of the cycle.
 fn room(
     explainer: &Explainer<'_>,
     constraint: &Constraint,

@@ -1,4 +1,5 @@
-//! Why no executor can keep to a box although there is a schedule for all values in it.
+//! Explanations for boxes that no executor can guarantee, although there is a schedule for all
+//! values.
 
 use elbowroom_envelope::{ControlConflict, ControlGround};
 use elbowroom_plan::{DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, Reason};
@@ -6,8 +7,8 @@ use elbowroom_plan::{DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind
 use super::Explainer;
 
 impl Explainer<'_> {
-    /// The value that an executor would have to know in advance, and the constraints that demand
-    /// it.
+    /// Describes the values that an executor would have to know in advance, and the constraints
+    /// that require it.
     pub(super) fn uncontrollable(&self, conflict: &ControlConflict) -> String {
         let mut unknown: Vec<ParameterId> = Vec::new();
         let mut between: Vec<String> = Vec::new();
@@ -39,7 +40,7 @@ impl Explainer<'_> {
         reason
     }
 
-    /// The same with the values that the parameters may take.
+    /// Does the same, with the intervals of the parameters.
     pub(super) fn uncontrollable_in(
         &self,
         conflict: &ControlConflict,
@@ -68,7 +69,7 @@ impl Explainer<'_> {
         }
     }
 
-    /// A constraint of the plan in words.
+    /// Describes a constraint of the plan.
     pub(crate) fn constraint(&self, index: usize) -> String {
         let plan = &self.plan.plan;
         let constraint = &plan.constraints[index];

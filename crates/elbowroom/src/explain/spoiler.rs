@@ -1,4 +1,4 @@
-//! How a world beats every executor in a box that cannot be kept to, played out.
+//! Simulated strategies of an adversarial world in a box that is not dynamically controllable.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::PlanNetwork;
@@ -8,15 +8,15 @@ use elbowroom_stn::{ConsistentNetwork, Constraint, MovingWindows, OutOfWindow};
 
 use super::Explainer;
 
-/// The limit on rounds of a play, which is endless only if nothing has a limit.
+/// Maximum number of rounds of a play. Only a network without limits reaches it.
 const MOST_ROUNDS: usize = 10_000;
 
-/// The time at which an executor without foresight starts an action: the earliest or the latest.
+/// Policy of an executor without foresight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Policy {
-    /// As early as the windows allow.
+    /// Starts actions as early as the windows allow.
     Early,
-    /// As late as they allow.
+    /// Starts actions as late as the windows allow.
     Late,
 }
 
@@ -24,14 +24,14 @@ enum Policy {
 struct Play {
     /// The happenings so far, in order.
     happened: Vec<(Rational, NodeId)>,
-    /// The window that could not be kept.
+    /// The violated window.
     broken: OutOfWindow,
     windows: MovingWindows,
 }
 
 impl Explainer<'_> {
-    /// What the world does to an executor that starts everything early, and to one that starts
-    /// everything late, in words. Empty if the network can be controlled after all.
+    /// Describes the world's strategies against an executor that starts everything early, and
+    /// against one that starts everything late. Empty if the network is dynamically controllable.
     pub(super) fn spoiled(&self, refused: &DecoupledEnvelope) -> Vec<String> {
         let Ok(network) = self.plan.uncertain_network(refused) else {
             return Vec::new();
@@ -84,7 +84,7 @@ impl Explainer<'_> {
                         Policy::Early => window.earliest.clone(),
                         Policy::Late => window.latest.clone(),
                     };
-                    // What may be put off for ever is not put off.
+                    // An action without a latest time starts at its earliest time.
                     let time = time.or_else(|| window.earliest.clone()).unwrap_or_default();
                     if next.as_ref().is_none_or(|(earliest, _)| time < *earliest) {
                         next = Some((time, node));
@@ -181,7 +181,7 @@ impl Explainer<'_> {
     }
 }
 
-/// Whether all that a requirement puts before a node has happened.
+/// Returns `true` if all nodes have happened that a requirement orders before `node`.
 fn is_ready(network: &PlanNetwork, times: &[Option<Rational>], node: NodeId) -> bool {
     let requirements = network.network.requirements();
     let mut leaving = requirements.leaving(network_node(node));

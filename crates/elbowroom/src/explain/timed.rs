@@ -1,4 +1,4 @@
-//! Timed initials in words: deadlines, and others.
+//! Descriptions of timed initials, such as deadlines.
 
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::{Change, Condition, FactId};
@@ -8,7 +8,8 @@ use elbowroom_plan::{Node, NodeId, Parameter, ParameterKind};
 use super::Explainer;
 
 impl Explainer<'_> {
-    /// Why the node must come before the timed initials: `deadline of (open w) at 320.118`.
+    /// Describes why the node must come before the timed initials: `deadline of (open w) at
+    /// 320.118`.
     pub(super) fn deadline(&self, node: NodeId, timed: usize) -> String {
         let time = self.at_time(timed);
         match self.lost(node, timed) {
@@ -21,9 +22,9 @@ impl Explainer<'_> {
         }
     }
 
-    /// A bound that a plan puts on a node's absolute time, by the deadline behind it if there is
-    /// one: the first timed initial at or after it that takes away what the node needs. If the
-    /// bound keeps more distance from that than interfering happenings have to, both are named.
+    /// Describes a plan's bound on a node's absolute time by the deadline behind it, if there is
+    /// one: the first timed initial at or after the bound that deletes a condition of the node. If
+    /// the bound is more than ε before the deadline, the description names both.
     pub(super) fn deadline_behind(&self, node: NodeId, bound: &Rational) -> Option<String> {
         let (index, timed) = self
             .task
@@ -41,7 +42,7 @@ impl Explainer<'_> {
         Some(format!("{deadline} ({node} at {bound} or before)"))
     }
 
-    /// The change by the timed initials that concerns the node: `(open w) becomes false`.
+    /// Describes the change by the timed initials that concerns the node: `(open w) becomes false`.
     pub(super) fn timed_change(&self, node: NodeId, timed: usize) -> String {
         let changes = &self.task.timed()[timed].changes;
         let footprint = self.plan.plan.footprint(self.task, node);
@@ -68,7 +69,7 @@ impl Explainer<'_> {
         }
     }
 
-    /// ` at 60`; nothing where the time is left open.
+    /// Returns ` at 60`; empty if the time is open.
     pub(super) fn at_time(&self, timed: usize) -> String {
         let is_open = |p: &Parameter| p.kind == ParameterKind::Timed(timed);
         if self.plan.parameters.iter().any(is_open) {
@@ -77,7 +78,7 @@ impl Explainer<'_> {
         format!(" at {}", self.task.timed()[timed].time.to_decimal(6))
     }
 
-    /// The time of the timed initials, as a quantity.
+    /// Describes the time of the timed initials as a quantity.
     pub(super) fn timed_quantity(&self, timed: usize) -> String {
         match self.task.timed()[timed].changes.as_slice() {
             [Change::Delete(fact)] => format!("deadline of {}", self.task.fact_name(*fact)),
@@ -92,7 +93,8 @@ impl Explainer<'_> {
         }
     }
 
-    /// A fact that the timed initials make false and that is needed at the node, or until then.
+    /// Returns a fact that the timed initials delete, and that is a condition of the node or of the
+    /// action that it ends.
     fn lost(&self, node: NodeId, timed: usize) -> Option<FactId> {
         let mut needed = self.plan.plan.footprint(self.task, node).reads;
         if let Node::End(id) = self.plan.plan.nodes[node.index()]

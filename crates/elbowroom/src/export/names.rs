@@ -1,11 +1,11 @@
-//! Names that every reader takes: letters, digits and underscores, no two the same.
+//! Unique names that every reader accepts: letters, digits and underscores.
 
 use std::collections::BTreeSet;
 
 use elbowroom_plan::{NodeId, StnPlan};
 
-/// The names of a plan's time points, by node: `n0_start` for the start of `n0`, and `Z` for time
-/// zero, as the field has it.
+/// Returns the names of a plan's time points, by node: `n0_start` for the start of `n0`, and `Z`
+/// for time zero, as is usual in the field.
 pub(super) fn points(plan: &StnPlan) -> Vec<String> {
     distinct(plan.nodes().map(|(node, _)| {
         if node == NodeId::ZERO {
@@ -16,7 +16,7 @@ pub(super) fn points(plan: &StnPlan) -> Vec<String> {
     }))
 }
 
-/// Names like these.
+/// Makes names unique and replaces other characters.
 pub(super) fn distinct(wanted: impl Iterator<Item = String>) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let plain = |name: String| -> String {

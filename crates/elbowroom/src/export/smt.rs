@@ -1,4 +1,4 @@
-//! The box check and the region as SMT-LIB 2.
+//! The box check and the region in SMT-LIB 2.
 
 use std::fmt::Write as _;
 
@@ -33,14 +33,14 @@ impl<'a> Text<'a> {
             plan,
             form,
             symbols: Symbols {
-                // No node is called so: names end in what happens there.
+                // No node has this name, because names of nodes end in the kind of happening.
                 times: times.chain(["moment".to_owned()]).collect(),
                 parameters: names::distinct(parameters),
             },
         }
     }
 
-    /// What the text says, for people.
+    /// Returns the heading that explains the text to readers.
     pub(super) fn box_heading(&self, envelope: &DecoupledEnvelope, guarantee: Guarantee) -> String {
         let mut text = self.heading();
         let claim = match guarantee {
@@ -85,7 +85,7 @@ impl<'a> Text<'a> {
         self.plan.describe(self.task, ParameterId::from(parameter))
     }
 
-    /// The question whether some schedule is not valid.
+    /// Writes the query whether some schedule is invalid.
     pub(super) fn conditions(&self, envelope: &DecoupledEnvelope, text: &mut String) {
         part(
             text,
@@ -114,7 +114,7 @@ impl<'a> Text<'a> {
         text.push_str(")\n(check-sat)\n");
     }
 
-    /// The question whether some values have no schedule.
+    /// Writes the query whether some values have no schedule.
     pub(super) fn schedules(&self, envelope: &DecoupledEnvelope, text: &mut String) {
         part(
             text,
@@ -126,7 +126,7 @@ impl<'a> Text<'a> {
         let _ = writeln!(text, "(assert (not {}))\n(check-sat)", self.has_schedule());
     }
 
-    /// The question whether no fixed times do for all that the world can decide.
+    /// Writes the query whether no fixed times satisfy the network for all choices of the world.
     pub(super) fn fixed_times(&self, network: &UncertainNetwork<Rational>, text: &mut String) {
         part(
             text,
@@ -171,7 +171,7 @@ impl<'a> Text<'a> {
         let _ = writeln!(text, "(assert {chosen})\n(check-sat)");
     }
 
-    /// All values for which the plan works.
+    /// Returns the text about all values for which the plan works.
     pub(super) fn region(&self, ranges: &DecoupledEnvelope) -> String {
         let mut text = self.heading();
         comment(
@@ -215,7 +215,7 @@ impl<'a> Text<'a> {
         &self.symbols.times[self.plan.plan.nodes.len()]
     }
 
-    /// The symbols of all times but zero.
+    /// Returns the symbols of all times but zero.
     fn chosen_times(&self) -> Vec<String> {
         self.symbols.times[1..self.plan.plan.nodes.len()].to_vec()
     }
@@ -258,7 +258,7 @@ impl<'a> Text<'a> {
         }
     }
 
-    /// The network as one term.
+    /// Returns the network as one term.
     fn network(&self) -> String {
         let bounds = self.form.network.iter();
         let bounds = bounds.map(|bound| self.symbols.inequality(&bound.inequality));
@@ -269,7 +269,7 @@ impl<'a> Text<'a> {
         quantified("exists", &self.chosen_times(), &self.network())
     }
 
-    /// Some requirement is broken, with what it is in words.
+    /// Writes the disjunction of all violations of requirements, each with a description.
     fn broken(&self, text: &mut String) {
         text.push_str("(or false\n");
         for obligation in &self.form.obligations {
@@ -294,13 +294,13 @@ impl<'a> Text<'a> {
     }
 }
 
-/// All of these hold, one a line.
+/// Returns the conjunction, with each part on a line.
 fn lines(parts: &[String]) -> String {
     let parts: Vec<String> = parts.iter().map(|part| format!("\n  {part}")).collect();
     format!("(and true{})", parts.concat())
 }
 
-/// A quantifier over real numbers; none if there are no names.
+/// Adds a quantifier over real numbers, unless there are no names.
 fn quantified(quantifier: &str, names: &[String], term: &str) -> String {
     if names.is_empty() {
         return term.to_owned();
@@ -309,7 +309,7 @@ fn quantified(quantifier: &str, names: &[String], term: &str) -> String {
     format!("({quantifier} ({})\n{term})", names.join(" "))
 }
 
-/// A question of its own.
+/// Begins a query.
 fn part(text: &mut String, words: &str) {
     text.push('\n');
     comment(text, words);
@@ -325,7 +325,7 @@ fn comment(text: &mut String, words: &str) {
     }
 }
 
-/// Words that end no comment.
+/// Joins lines, so that the words stay within a comment.
 fn one_line(words: &str) -> String {
     words.split_whitespace().collect::<Vec<_>>().join(" ")
 }

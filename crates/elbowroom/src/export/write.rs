@@ -7,14 +7,14 @@ use elbowroom_num::Rational;
 /// The symbols of times, by node, and of parameters.
 #[derive(Clone, Debug)]
 pub(super) struct Symbols {
-    /// Of times: of each node of the plan, and of a moment inside an action.
+    /// Symbols of times: of each node of the plan, and of a moment inside an action.
     pub(super) times: Vec<String>,
-    /// Of parameters.
+    /// Symbols of parameters.
     pub(super) parameters: Vec<String>,
 }
 
 impl Symbols {
-    /// `left <= right`, with positive factors on both sides.
+    /// Returns `left <= right`, with positive factors on both sides.
     pub(super) fn inequality(&self, inequality: &Inequality) -> String {
         let (mut left, mut right) = (Vec::new(), Vec::new());
         let mut term = |coefficient: &Rational, factors: &[&str]| {
@@ -59,7 +59,7 @@ impl Symbols {
     }
 }
 
-/// An operator on some terms; one term stands for itself, and none is 0.
+/// Applies an operator to terms; a single term is returned unchanged, and no terms are 0.
 fn applied(operator: &str, parts: &[String]) -> String {
     match parts.len() {
         0 => "0.0".to_owned(),
@@ -68,7 +68,7 @@ fn applied(operator: &str, parts: &[String]) -> String {
     }
 }
 
-/// All of these hold.
+/// Returns the conjunction.
 pub(super) fn all(mut parts: Vec<String>) -> String {
     match parts.len() {
         0 => "true".to_owned(),
@@ -77,7 +77,7 @@ pub(super) fn all(mut parts: Vec<String>) -> String {
     }
 }
 
-/// A real number.
+/// Formats a real number.
 pub(super) fn number(value: &Rational) -> String {
     let size = value.abs();
     let text = size.to_string();

@@ -1,4 +1,4 @@
-//! What there is to say about a network, for programs: `docs/formats/network.md`.
+//! The answer about a network as a document: `docs/formats/network.md`.
 
 use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
@@ -11,37 +11,40 @@ pub(super) const VERSION: u32 = 1;
 /// The analysis of a temporal network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
-    /// `elbowroom-network-answer`.
+    /// The name of the document, `elbowroom-network-answer`.
     pub format: String,
-    /// 1.
+    /// The version of the document, 1.
     pub version: u32,
     /// The network's own name; empty if it has none.
     pub name: String,
-    /// In which format it was read.
+    /// The format of the file.
     pub read_as: String,
-    /// How many time points it has.
+    /// Number of time points.
     pub points: usize,
-    /// How many requirements `to - from <= bound`.
+    /// Number of requirements `to - from <= bound`.
     pub requirements: usize,
-    /// How many contingent links.
+    /// Number of contingent links.
     pub links: usize,
     /// Remarks on parts of the file that were interpreted leniently, or left out.
     pub remarks: Vec<String>,
-    /// Whether there is a schedule, if the world is kind.
+    /// Consistency: there is a schedule for some durations of the links.
     pub consistent: Promise,
-    /// Whether there is one for whatever the world does. Not for networks without links.
+    /// Weak controllability: there is a schedule for all durations of the links. `None` for
+    /// networks without links.
     pub weak: Option<Promise>,
-    /// Whether an executor can be sure to find one as it goes.
+    /// Dynamic controllability: an executor that observes durations as they occur can always find a
+    /// schedule. `None` for networks without links.
     pub dynamic: Option<Promise>,
-    /// Whether one fits all.
+    /// Strong controllability: a single schedule works for all durations of the links. `None` for
+    /// networks without links.
     pub strong: Option<Promise>,
-    /// How often dispatch succeeds.
+    /// Success rate of simulated dispatch.
     pub simulation: Option<Simulated>,
 }
 
 impl Answer {
-    /// Whether the network can be executed: it is dynamically controllable or, without links,
-    /// consistent.
+    /// Returns `true` if the network can be executed: it is dynamically controllable or, without
+    /// links, consistent.
     pub fn is_executable(&self) -> bool {
         let promise = self.dynamic.as_ref().unwrap_or(&self.consistent);
         promise.verdict == Verdict::Yes
@@ -52,25 +55,25 @@ impl Answer {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// It can.
+    /// The property holds.
     Yes,
-    /// It cannot.
+    /// The property does not hold.
     No,
-    /// The limit on branches was reached before that was known.
+    /// The limit on branches was reached before a result.
     Undecided,
 }
 
 /// The result of a controllability check, with the conflict if it fails.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Promise {
-    /// Whether.
+    /// The result.
     pub verdict: Verdict,
-    /// Why not.
+    /// The conflict, if the property does not hold.
     pub reason: Option<Reason>,
-    /// Strong controllability: when the points happen that the executor chooses.
+    /// For strong controllability, the times of the points that the executor chooses.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub schedule: Vec<Time>,
-    /// Undecided: how many branches were looked at.
+    /// For an undecided property, the number of examined branches.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub branches: Option<usize>,
 }
@@ -97,35 +100,34 @@ impl Promise {
 /// A conflict: the constraints that contradict each other.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reason {
-    /// By how much the steps contradict each other: a positive number; `inf` if there is no limit
-    /// to it.
+    /// Size of the conflict, a positive number; `inf` if it is unbounded.
     pub by: Number,
-    /// The bounds in the order of a cycle.
+    /// The bounds of the cycle, in its order.
     pub steps: Vec<Step>,
-    /// Whether `steps` has all of the cycle.
+    /// `true` if `steps` contains the whole cycle.
     pub is_whole: bool,
-    /// The links that matter, and at which end each is taken.
+    /// The links of the conflict, each with the end of its interval.
     pub durations: Vec<LinkDuration>,
 }
 
 /// One bound of a reason.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Step {
-    /// `requirement`, `early` or `late` (the end of a link may come so early, or so late), or
-    /// `duration` (a link takes so long).
+    /// `requirement`, `early` or `late` (the earliest or the latest end of a link), or `duration`
+    /// (a duration of a link).
     pub given: String,
-    /// In words.
+    /// The bound in words.
     pub words: String,
 }
 
 /// The duration of a contingent link in a conflict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LinkDuration {
-    /// The point from which the link counts.
+    /// The activation point of the link.
     pub activation: String,
     /// The point that the world chooses.
     pub end: String,
-    /// `lower` or `upper`; `within` where it lies between.
+    /// `lower` or `upper` for an end of the interval; `within` for a value between.
     pub at: String,
     /// The duration.
     pub value: Number,
@@ -134,23 +136,23 @@ pub struct LinkDuration {
 /// The time of a time point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Time {
-    /// The point.
+    /// The time point.
     pub point: String,
     /// The time.
     pub time: Number,
 }
 
-/// A number as an exact text and, beside it, as the nearest float.
+/// A number as an exact text and as the nearest float.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Number {
     /// A whole number, `p/q`, or `inf`.
     pub exact: String,
-    /// The nearest float; `None` of infinity.
+    /// The nearest float; `None` for infinity.
     pub decimal: Option<f64>,
 }
 
 impl Number {
-    /// More than any number.
+    /// Returns infinity.
     pub fn infinite() -> Self {
         Self {
             exact: "inf".to_owned(),
@@ -158,7 +160,7 @@ impl Number {
         }
     }
 
-    /// In short decimals, for people.
+    /// Formats it in short decimals, for users.
     pub fn short(&self) -> String {
         let number = self.exact.parse::<Rational>();
         number.map_or_else(|_| self.exact.clone(), |it| elbowroom_network::number(&it))
@@ -179,30 +181,30 @@ impl From<&Rational> for Number {
 pub struct Simulated {
     /// The number of runs.
     pub runs: u64,
-    /// In how many all requirements held.
+    /// The number of runs that satisfied all requirements.
     pub successes: u64,
-    /// In which share.
+    /// The share of these runs.
     pub share: f64,
-    /// The 95 % confidence interval for it (Wilson 1927).
+    /// The 95 % confidence interval of the success probability (Wilson 1927).
     pub interval: [f64; 2],
-    /// The seed.
+    /// The random seed.
     pub seed: u64,
-    /// How durations were drawn.
+    /// Distribution of the durations.
     pub durations: Durations,
     /// `dispatchable` (by the dispatchable network) or `early-first` (as early as the windows
-    /// allow, as if the ends of links could be chosen).
+    /// allow, as if the executor could choose the ends of links).
     pub executor: String,
-    /// In how many runs a duration lay outside the bounds of its link.
+    /// The number of runs with a duration outside the bounds of its link.
     pub outside: u64,
-    /// The requirements that were broken most often.
+    /// The requirements that were violated most often.
     pub broken: Vec<Broken>,
 }
 
-/// A requirement that did not hold.
+/// A violated requirement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Broken {
     /// The requirement in words.
     pub requirement: String,
-    /// In how many runs.
+    /// The number of runs that violated it.
     pub runs: u64,
 }

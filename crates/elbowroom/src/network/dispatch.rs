@@ -1,4 +1,4 @@
-//! One execution of a network whose links take so long.
+//! Execution of a network with given durations of its links.
 
 use std::sync::Arc;
 
@@ -8,9 +8,10 @@ use elbowroom_stn::{Minimal, NodeId, Schedule};
 
 /// The dispatcher of the controllable time points.
 pub(super) enum Executor {
-    /// By the dispatchable network, as early as it allows.
+    /// Follows the dispatchable network, as early as it allows.
     Dispatchable(Arc<Dispatchable<Rational>>),
-    /// As early as the windows allow, as if the ends of links could be chosen. It promises nothing.
+    /// Follows the windows, as early as they allow, as if the executor could choose the ends of
+    /// links. It has no guarantee.
     EarlyFirst(Minimal<Rational>),
 }
 
@@ -29,7 +30,7 @@ struct Run<'a> {
     now: Rational,
 }
 
-/// The time of each event; `None` if the executor waits for ever.
+/// Returns the time of each event; `None` if the executor waits for ever.
 pub(super) fn run(
     network: &UncertainNetwork<Rational>,
     executor: &Executor,
@@ -51,7 +52,7 @@ pub(super) fn run(
     while run.happened.contains(&None) {
         let world = run.next_end();
         let chosen = run.next_chosen();
-        // What falls together is observed before it is decided upon.
+        // At equal times, observations come before decisions.
         let (node, time) = match (world, chosen) {
             (Some(world), Some(chosen)) if world.1 <= chosen.1 => world,
             (_, Some(chosen)) => chosen,
@@ -68,14 +69,14 @@ impl Run<'_> {
     fn happen(&mut self, node: NodeId, time: Rational) {
         if let Decider::Dispatcher(dispatcher) = &mut self.decider {
             // A duration outside the bounds of its link may miss a window; the requirements are
-            // looked at in the end.
+            // checked at the end.
             let _ = dispatcher.happen(node, &time);
         }
         self.now.clone_from(&time);
         self.happened[node.index()] = Some(time);
     }
 
-    /// The end of a link that comes next.
+    /// Returns the next end of a link.
     fn next_end(&self) -> Option<(NodeId, Rational)> {
         let ends = self.network.link_ids().filter_map(|id: LinkId| {
             let link = self.network.link(id);
@@ -86,7 +87,7 @@ impl Run<'_> {
         ends.min_by(|(_, one), (_, other)| one.cmp(other))
     }
 
-    /// The point that the executor chooses next, if nothing happens before.
+    /// Returns the point that the executor chooses next, if nothing happens before.
     fn next_chosen(&self) -> Option<(NodeId, Rational)> {
         let next = match &self.decider {
             Decider::Dispatcher(dispatcher) => {
@@ -108,8 +109,8 @@ impl Run<'_> {
         next.map(|(node, time)| (node, time.max(self.now.clone())))
     }
 
-    /// Whether the executor chooses a point that has not happened, and all that must come before it
-    /// have.
+    /// Returns `true` if the executor chooses this point, it has not happened, and all points
+    /// before it have.
     fn is_enabled(&self, minimal: &Minimal<Rational>, node: NodeId) -> bool {
         if self.network.is_contingent(node) || self.happened[node.index()].is_some() {
             return false;
@@ -118,7 +119,8 @@ impl Run<'_> {
             let must_follow = minimal
                 .distance(node, other)
                 .is_some_and(|most| !most.is_positive());
-            // Points that fall together wait for none of each other, but all for the world.
+            // Simultaneous points do not wait for each other, except for points that the world
+            // chooses.
             let is_mutual = minimal
                 .distance(other, node)
                 .is_some_and(|most| !most.is_positive());
@@ -129,7 +131,7 @@ impl Run<'_> {
         })
     }
 
-    /// The time at which a point's window opens, as far as what has happened says.
+    /// Returns the opening time of a point's window, given the points that have happened.
     fn opens(&self, minimal: &Minimal<Rational>, node: NodeId) -> Option<Rational> {
         let happened = self.network.requirements().nodes().filter_map(|other| {
             let time = self.happened[other.index()].as_ref()?;
@@ -139,7 +141,7 @@ impl Run<'_> {
     }
 }
 
-/// The earliest of them; those without a time may happen now.
+/// Returns the earliest of them; those without a time may happen now.
 fn first(
     times: impl Iterator<Item = (NodeId, Option<Rational>)>,
     now: &Rational,

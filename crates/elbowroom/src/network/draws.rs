@@ -1,4 +1,4 @@
-//! How long the contingent links take, drawn from a seed.
+//! Random durations of contingent links, drawn from a seed.
 
 use elbowroom_network::{Correlation, Duration, NetworkFile};
 use elbowroom_num::Rational;
@@ -8,14 +8,15 @@ use rand_chacha::ChaCha8Rng;
 
 use super::simulate::{Durations, SimulationError};
 
-/// Drawn values are whole multiples of the width of their distribution divided by this.
+/// Minimum number of decimal units in the width of a distribution. Drawn values are multiples of the
+/// unit.
 const STEPS: i64 = 1000;
 
-/// Draws durations for runs.
+/// Source of random durations for runs.
 pub(super) struct Draws<'a> {
     file: &'a NetworkFile,
     seed: u64,
-    /// By link.
+    /// The sources by link.
     sources: Vec<Source>,
     groups: Vec<Group>,
 }
@@ -24,15 +25,15 @@ pub(super) struct Draws<'a> {
 struct Source {
     distribution: Distribution,
     resolution: Rational,
-    /// Drawn values stay between these.
+    /// Bounds on drawn values.
     least: Rational,
     most: Option<Rational>,
 }
 
-/// Normal durations that correlate: each is the mean and a combination of independent draws.
+/// Correlated normal durations: each is its mean plus a linear combination of independent draws.
 struct Group {
     links: Vec<LinkId>,
-    /// Lower triangular; row by row.
+    /// The Cholesky factor: lower triangular, by rows.
     factors: Vec<Vec<f64>>,
 }
 
@@ -58,7 +59,7 @@ impl<'a> Draws<'a> {
         })
     }
 
-    /// The durations in one run, by link.
+    /// Returns the durations in one run, by link.
     pub(super) fn run(&self, run: u64) -> Vec<Rational> {
         let mut drawn: Vec<Rational> = self
             .file
@@ -92,7 +93,7 @@ impl<'a> Draws<'a> {
         drawn
     }
 
-    /// Depends on the seed, on the link's end and on the run, and on nothing else.
+    /// Returns a generator that depends only on the seed, the link's end and the run.
     fn random(&self, id: LinkId, run: u64) -> ChaCha8Rng {
         let end = self.file.point(self.file.network.link(id).end);
         keyed(self.seed, end, run, Purpose::Duration)
@@ -158,7 +159,7 @@ impl Source {
         Ok(Self {
             distribution,
             resolution: fine(&width),
-            // Nothing takes less than no time.
+            // Durations are not negative.
             least: Rational::ZERO,
             most: None,
         })
@@ -173,7 +174,7 @@ impl Source {
     }
 }
 
-/// A decimal unit so small that the width has at least [`STEPS`] of it.
+/// Returns a decimal unit small enough that the width has at least [`STEPS`] units.
 fn fine(width: &Rational) -> Rational {
     let ten = Rational::from(10);
     let mut unit = Rational::ONE;
@@ -184,8 +185,8 @@ fn fine(width: &Rational) -> Rational {
 }
 
 impl Group {
-    /// Cholesky's decomposition. Where a matrix is none of correlations, what does not fit is left
-    /// independent.
+    /// Computes the Cholesky decomposition. If the matrix is not positive semidefinite, negative
+    /// diagonal entries count as 0, and correlations with them are dropped.
     #[allow(
         clippy::needless_range_loop,
         reason = "rows and columns of two matrices at once"

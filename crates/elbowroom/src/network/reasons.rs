@@ -1,4 +1,4 @@
-//! Why a promise cannot be made, in the file's own names.
+//! Explanations for failed controllability checks, with the names of the file.
 
 use elbowroom_network::weak::Given;
 use elbowroom_network::{NetworkFile, Weak, weak as find_weak};
@@ -8,7 +8,7 @@ use elbowroom_stn::{ConstraintId, NodeId};
 
 use super::answer::{LinkDuration, Number, Promise, Reason, Step, Time, Verdict};
 
-/// Whether there is a schedule if the world is kind.
+/// Checks whether there is a schedule for some durations of the links.
 pub(super) fn consistent(file: &NetworkFile) -> Promise {
     let network = file.kind_network();
     let Err(cycle) = network.consistency() else {
@@ -27,7 +27,7 @@ pub(super) fn consistent(file: &NetworkFile) -> Promise {
         steps.push(step(given, words));
         grounds.push(ground);
     }
-    // Upper bounds of links are taken as they are, lower ones too: nothing has to be at an end.
+    // All bounds of links are used as they are; no duration is at an end of its interval.
     Promise::no(Reason {
         by: Number::from(&-cycle.total),
         steps,
@@ -36,7 +36,8 @@ pub(super) fn consistent(file: &NetworkFile) -> Promise {
     })
 }
 
-/// The origin of a constraint of [`NetworkFile::kind_network`]: `Late` is a link's upper bound.
+/// Returns the origin of a constraint of [`NetworkFile::kind_network`]. `Late` is a link's upper
+/// bound.
 fn kind_ground(file: &NetworkFile, id: ConstraintId) -> Ground {
     let mut rest = id.index();
     let requirements = file.network.requirements().constraints().len();
@@ -58,7 +59,7 @@ fn kind_ground(file: &NetworkFile, id: ConstraintId) -> Ground {
     Ground::Requirement(id)
 }
 
-/// Whether there is a schedule for whatever the world does.
+/// Checks weak controllability.
 pub(super) fn weak(file: &NetworkFile, most_branches: usize) -> Promise {
     match find_weak(&file.network, most_branches) {
         Weak::Controllable => Promise::yes(),
@@ -88,7 +89,7 @@ pub(super) fn weak(file: &NetworkFile, most_branches: usize) -> Promise {
     }
 }
 
-/// Why an executor cannot be sure to find a schedule as it goes.
+/// Returns the answer for a network that is not dynamically controllable, with the conflict.
 pub(super) fn dynamic(file: &NetworkFile, conflict: &Conflict<Rational>) -> Promise {
     let grounds: Vec<Ground> = conflict.steps.iter().map(|step| step.ground).collect();
     let total = conflict.total.clone().into_finite();
@@ -100,7 +101,7 @@ pub(super) fn dynamic(file: &NetworkFile, conflict: &Conflict<Rational>) -> Prom
     })
 }
 
-/// Whether one schedule fits whatever the world does.
+/// Checks strong controllability.
 pub(super) fn strong(file: &NetworkFile) -> Promise {
     match file.network.strong() {
         Ok(schedule) => {
@@ -152,7 +153,7 @@ fn step(given: &str, words: String) -> Step {
     }
 }
 
-/// Which links matter, and at which end each is taken.
+/// Returns the links of a conflict, each with the end of its interval.
 fn ends(file: &NetworkFile, grounds: &[Ground]) -> Vec<LinkDuration> {
     let mut known: Vec<Ground> = Vec::new();
     let mut durations = Vec::new();

@@ -1,4 +1,4 @@
-//! How often dispatch satisfies a network.
+//! Simulation of dispatch: its success rate.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,31 +14,31 @@ use super::answer::{Broken, Simulated};
 use super::dispatch::{self, Executor};
 use super::draws::Draws;
 
-/// Requirements that are named as broken.
+/// Maximum number of reported violated requirements.
 const MOST_BROKEN: usize = 3;
 
-/// Runs to make.
+/// Settings of simulated runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Simulation {
     /// The number of runs.
     pub runs: u64,
-    /// The same seed gives the same runs.
+    /// The random seed.
     pub seed: u64,
-    /// How durations are drawn.
+    /// Distribution of durations.
     pub durations: Durations,
 }
 
-/// The distribution from which the durations of links are drawn.
+/// The distribution of the durations of links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Durations {
-    /// As the file says, and evenly between the bounds where it says nothing.
+    /// The distribution in the file, or uniform between the bounds if it has none.
     Given,
-    /// Evenly between the bounds.
+    /// Uniform between the bounds.
     Uniform,
 }
 
-/// A link has no upper bound, so its durations cannot be drawn evenly.
+/// A link has no upper bound, so its durations cannot be drawn uniformly.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the link from `{activation}` to `{end}` has no upper bound, so no duration can be drawn \
@@ -50,15 +50,15 @@ pub enum Durations {
     }
 )]
 pub struct SimulationError {
-    /// Where the link begins.
+    /// The activation point of the link.
     pub activation: String,
-    /// Where it ends.
+    /// The end point of the link.
     pub end: String,
-    /// Whether the file says how its duration is distributed.
+    /// `true` if the file has a distribution for its duration.
     pub is_given: bool,
 }
 
-/// Makes the runs; without a dispatchable form, as early as windows allow.
+/// Makes the runs. Without a dispatchable form, points happen as early as the windows allow.
 pub(super) fn run(
     file: &NetworkFile,
     form: Option<Arc<Dispatchable<Rational>>>,
@@ -79,7 +79,7 @@ pub(super) fn run(
     for number in 0..simulation.runs {
         let durations = draws.run(number);
         outside += u64::from(is_outside(file, &durations));
-        // Without any schedule at all there is nothing to try.
+        // Without a schedule there is nothing to execute.
         let schedule = executor
             .as_ref()
             .and_then(|executor| dispatch::run(&file.network, executor, &durations));

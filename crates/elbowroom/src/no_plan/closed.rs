@@ -1,5 +1,5 @@
-//! Closed sets of states: all that can be reached, by the checker's own rules, without times first, and
-//! with bounds on times where that is not enough.
+//! Closed sets of states: all states that are reachable by the checker's rules. They are computed
+//! first without times, and then, if necessary, with bounds on times.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -12,31 +12,33 @@ use elbowroom_verify::no_plan::{Instances, Reached};
 
 use super::{Effort, Spent};
 
-/// The most states.
+/// Maximum number of states.
 const MOST_STATES: usize = 5_000;
 
-/// The most states that are made.
+/// Maximum number of generated states.
 const MOST_MADE: usize = 200_000;
 
-/// The most actions under way at one time: where an action may overlap with itself, there is no end of them.
+/// Maximum number of running actions. Without it, an action that may overlap itself could run any
+/// number of times.
 const MOST_UNDER_WAY: usize = 6;
 
-/// Work that the expansion of a state, and each state that it makes, counts: see [`Effort`].
+/// Work for the expansion of a state, and for each generated state: see [`Effort`].
 const WORK_OF_A_STATE: u64 = 500;
 
-/// The same for each process whose condition is tested in an expansion, in the search for the set and when it is verified.
+/// Work for each process whose condition is tested in an expansion, both in the search and in the
+/// verification.
 const WORK_OF_A_PROCESS: u64 = 5;
 
-/// Why there is no closed set.
+/// Reasons for a missing closed set.
 pub(super) enum Failure {
     Unknown(String),
     TooMany,
-    /// The goal can be reached by the checker's rules.
+    /// The goal is reachable by the checker's rules.
     InReach,
     Stopped,
 }
 
-/// A closed set of states in none of which the goal holds.
+/// Computes a closed set of states without a goal state.
 pub(super) fn closed(
     task: &Task,
     instances: &Instances,
@@ -58,7 +60,8 @@ pub(super) fn closed(
     })
 }
 
-/// Classes of objects that can change places: each object joins the first whose last one it is like.
+/// Returns classes of interchangeable objects. Each object joins the first class whose last member
+/// is interchangeable with it.
 fn alike(
     task: &Task,
     instances: &Instances,
@@ -83,7 +86,7 @@ fn alike(
     Ok(classes)
 }
 
-/// The states that are reached, of which none stands for another.
+/// Returns the reachable states, without states that others cover.
 fn states(
     closure: &Closure<'_>,
     with_times: bool,
@@ -100,7 +103,7 @@ fn states(
         if node.under_way.len() > MOST_UNDER_WAY {
             return Err(Failure::TooMany);
         }
-        // As the verifier does: it compares states with the listed ones before bounds are widened.
+        // The verifier also compares states with the listed ones before bounds are widened.
         let mut node = closure.settled(node);
         node.zone = if with_times {
             widened(&node, closure.times().len(), last.as_ref())
@@ -157,8 +160,9 @@ fn states(
     Ok(nodes.into_iter().flatten().collect())
 }
 
-/// The bounds on times that matter for what may follow: those on time 0 until the last timed initial, and
-/// for how long something is under way up to what it has to be.
+/// Returns the zone with only the relevant bounds: those on the present time until the last timed
+/// initial, and those on the elapsed times of running actions up to the durations that they must
+/// have.
 fn widened(node: &Node, timed: usize, last: Option<&Rational>) -> Zone {
     let mut zone = node.zone.clone();
     let size = zone.size();
@@ -172,7 +176,8 @@ fn widened(node: &Node, timed: usize, last: Option<&Rational>) -> Zone {
         if own.most.is_some() {
             continue;
         }
-        // Without a greatest duration, it only counts whether the least one has passed.
+        // Without a maximum duration, the zone only records whether the minimum duration has
+        // passed.
         let start = FIRST_START + place;
         let has_passed = zone.get(start, NOW).is_some_and(|most| -most >= own.least);
         for time in ZERO..size {

@@ -8,11 +8,13 @@ use super::{Effort, no_plan_certificate_within};
 /// Limit on the number of conjuncts in a search for a conflict.
 const MOST_CONJUNCTS: usize = 12;
 
-/// Returns conjuncts of the goal that exclude each other, in words; none unless a certificate proves it.
+/// Returns conjuncts of the goal that exclude each other, in words; empty unless a certificate
+/// proves it.
 ///
-/// Conjuncts are left out one after the other, as long as a certificate for the others exists (deletion filter). So no
-/// proper subset of the result is known to be out of reach. Each of these certificates has the same share of `work`. The
-/// result is empty if a single conjunct is out of reach, or if `goes_on` returns `false`.
+/// Conjuncts are removed one after the other, as long as a certificate for the others exists
+/// (deletion filter). So no proper subset of the result is known to be unreachable. Each of these
+/// certificates has the same share of `work`. The result is empty if a single conjunct is
+/// unreachable, or if `goes_on` returns `false`.
 pub fn conflict(
     task: &Task,
     situation: &Situation,

@@ -1,29 +1,29 @@
-//! Times before which pairs of atoms are not true together: the least fixpoint of the checker's rules, and
-//! those of its bounds that a proof needs.
+//! Times before which pairs of atoms are not true together: the least fixpoint of the checker's
+//! rules, and the bounds of it that a proof needs.
 
 use elbowroom_num::Rational;
 use elbowroom_verify::no_plan::pairs::{Bounds, Claims, Earliest, Key, Structure};
 
 use super::{Effort, Spent};
 
-/// The most atoms, and the most actions.
+/// Maximum number of atoms, and of actions.
 const MOST: usize = 1_000;
 
-/// The most bounds that are looked up: some seconds.
+/// Maximum number of looked-up bounds (some seconds).
 const MOST_LOOKS: usize = 200_000_000;
 
-/// Bounds that are looked up in one unit of work: see [`Effort`].
+/// Number of looked-up bounds per unit of work: see [`Effort`].
 const LOOKS_OF_A_WORK: u64 = 10;
 
-/// What a proof by pairs lacks.
+/// Reasons for a missing proof by pairs.
 pub(super) enum Failure {
     TooMany,
-    /// By pairs, the goal can be reached.
+    /// The goal is reachable by the rules for pairs.
     InReach,
     Stopped,
 }
 
-/// Claims that exclude the goal and that follow from each other.
+/// Computes claims that exclude the goal and that follow from each other.
 pub(super) fn claims(
     structure: &Structure<'_>,
     effort: &mut Effort<'_>,
@@ -44,7 +44,7 @@ struct Table<'a> {
     started: Vec<Earliest>,
     meanwhile: Vec<Earliest>,
     begin: Vec<Earliest>,
-    /// In which round bounds of an atom, or of an action, were last lowered.
+    /// For each atom and each action, the round of the last decrease of one of its bounds.
     atom_round: Vec<u32>,
     action_round: Vec<u32>,
     round: u32,
@@ -64,7 +64,7 @@ impl Bounds for Table<'_> {
     }
 }
 
-/// The same, of a happening whose own time is asked for.
+/// The bounds without the present bound of a happening, whose time is being recomputed.
 struct Anew<'a>(&'a Table<'a>, usize);
 
 impl Bounds for Anew<'_> {
@@ -78,7 +78,7 @@ impl Bounds for Anew<'_> {
 }
 
 impl<'a> Table<'a> {
-    /// Nothing has happened.
+    /// Creates the table before any happening.
     fn of(structure: &'a Structure<'a>) -> Self {
         let (count, actions) = (structure.atom_count(), structure.action_count());
         let mut table = Self {
@@ -104,7 +104,7 @@ impl<'a> Table<'a> {
         table
     }
 
-    /// Lets everything happen until no bound is lowered any more.
+    /// Applies happenings until no bound is lowered any more.
     fn settle(&mut self, effort: &mut Effort<'_>) -> Result<(), Failure> {
         let happenings = self.structure.happening_count();
         let mut last = vec![0; happenings];
@@ -132,7 +132,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Whether something has changed, since that round, of what a happening reads.
+    /// Returns `true` if a bound that a happening reads was lowered since round `last`.
     fn is_due(&self, happening: usize, last: u32) -> bool {
         let [_, ended] = self.structure.start_or_end(happening);
         let mut needs = self.structure.needed_by(happening).peekable();
@@ -141,7 +141,7 @@ impl<'a> Table<'a> {
             || ended.is_some_and(|action| self.action_round[action] >= last)
     }
 
-    /// Lowers what a happening brings about. Whether anything changed.
+    /// Lowers the bounds on the effects of a happening. Returns `true` if a bound changed.
     fn fire(&mut self, happening: usize) -> bool {
         let structure = self.structure;
         let begin = structure.earliest(happening, &Anew(self, happening));
@@ -225,7 +225,8 @@ impl<'a> Table<'a> {
         true
     }
 
-    /// What the proof needs of the table: what excludes the goal, what that follows from, and so on.
+    /// Returns the claims of the proof: those that exclude the goal, those that imply them, and so
+    /// on.
     fn needed(&self) -> Result<Claims, Failure> {
         let mut wanted = Wanted::default();
         for goal in self.structure.goals() {
@@ -244,7 +245,8 @@ impl<'a> Table<'a> {
         Ok(wanted.claims)
     }
 
-    /// The bound on a pair by which it is late enough: that of the two, or of one alone.
+    /// Returns a bound of a pair that is late enough: that of one of the atoms alone, or that of
+    /// the pair.
     fn own(&self, one: usize, other: usize, is_enough: &dyn Fn(&Earliest) -> bool) -> Key {
         let alone = [Key::Pair(one, one), Key::Pair(other, other)];
         let enough = |key: &Key| self.get(*key).is_some_and(is_enough);
@@ -254,7 +256,7 @@ impl<'a> Table<'a> {
             .unwrap_or_else(|| Key::pair(one, other))
     }
 
-    /// Adds a bound from which it follows that a happening is not before that time.
+    /// Adds a bound that implies that a happening is not before `time`.
     fn justify(&self, happening: usize, with: Option<usize>, time: &Earliest, wanted: &mut Wanted) {
         let structure = self.structure;
         let is_enough = |known: Earliest| structure.when_possible(happening, known) >= *time;
@@ -295,14 +297,14 @@ impl<'a> Table<'a> {
         };
         let least = structure.least(action);
         if is_enough(structure.begun(action, self).plus(least)) {
-            // The start is as late as it is for some reason, which is enough for the end.
+            // The bounds that delay the start also delay the end.
             if let Some(start) = structure.start_of(action) {
                 self.justify(start, None, &self.begin[start], wanted);
             }
             return;
         }
         let Some(atom) = with else { return };
-        // Late whether the atom has been true since the start or not.
+        // Both cases are late: the atom has been true since the start, or it has become true later.
         wanted.add(Key::Meanwhile(action, atom), self);
         if structure.start_of(action).is_some() {
             wanted.add(Key::Started(action, atom), self);
@@ -310,7 +312,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Claims that are needed, and those of them that nothing has been found for so far.
+/// Needed claims, and those among them that are not justified yet.
 #[derive(Default)]
 struct Wanted {
     claims: Claims,

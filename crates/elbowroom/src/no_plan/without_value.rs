@@ -8,10 +8,10 @@ use super::{Effort, reached};
 /// Work limit for each of two lists of reachable facts: some tenths of a second.
 const WORK: u64 = 3_000_000;
 
-/// Returns the names of fluents that never have a value, because they have none initially and nothing
-/// assigns one, and whose values can decide whether a plan exists: the goal reads them, or an action does
-/// that contributes to the goal. No plan contains such an action. The result is empty if the goal would be
-/// out of reach with values as well, or if the work limit is reached.
+/// Returns the names of fluents that never have a value, because they have none initially and
+/// nothing assigns one, and whose values can decide whether a plan exists: the goal reads them, or
+/// an action that contributes to the goal does. No plan contains such an action. The result is
+/// empty if the goal would also be unreachable with values, or if the work limit is reached.
 pub fn fluents_without_value(task: &Task, situation: &Situation) -> Vec<String> {
     names(task, situation).unwrap_or_default()
 }

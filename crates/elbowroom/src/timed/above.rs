@@ -1,5 +1,6 @@
-//! The bound from above: the agent knows what this cell brings, and chooses the order. Where everything happens
-//! at known times, states are only where something does ([`stretched`](super::moments)).
+//! The upper bound: the agent knows the happenings of the present cell, and chooses their order. If
+//! everything happens at known times, states exist only at happenings
+//! ([`stretched`](super::moments)).
 
 use indexmap::IndexSet;
 
@@ -13,33 +14,33 @@ use super::world::TimedWorld;
 pub(super) struct Above<'a> {
     pub(super) world: &'a TimedWorld,
     pub(super) chances: &'a Chances,
-    /// The actions that end alike, where everything happens at known times.
+    /// The classes of actions with equal ends, if everything happens at known times.
     pub(super) by_moments: Option<Alike>,
 }
 
-/// A state within a cell, with the events that are still to come in it.
+/// A state within a cell, with the events that are still to happen in it.
 pub(super) type Moment = (State, Coming);
 
 /// The events of a cell, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Coming {
-    /// Those that still have to happen.
+    /// Events that still have to happen.
     pub(super) must: u32,
-    /// Those that may happen as often as one likes.
+    /// Events that may happen any number of times.
     may: u32,
 }
 
-/// How often an event happens in a cell.
+/// Number of occurrences of an event in a cell.
 #[derive(Clone, Copy, Debug)]
 enum Times {
     Never,
     Once,
-    /// More than once: as often as the agent likes, but once.
+    /// More than once: at least once, and as often as the agent chooses.
     Often,
 }
 
 impl Coming {
-    /// What is left when that event has happened once.
+    /// Returns the remaining events after one occurrence of `event`.
     pub(super) fn without(self, event: usize) -> Self {
         Self {
             must: self.must & !(1 << event),
@@ -48,12 +49,12 @@ impl Coming {
     }
 }
 
-/// What is being put together of one cell.
+/// A cell during its expansion.
 pub(super) struct Cell<'c> {
     pub(super) bound: &'c Above<'c>,
-    /// Its number.
+    /// The number of the cell.
     pub(super) number: usize,
-    /// After the nodes of the cell's beginning.
+    /// The moments within the cell; their nodes follow those of the cell's beginning.
     moments: IndexSet<Moment>,
     first: usize,
     pub(super) later: &'c mut Layers,
@@ -70,7 +71,8 @@ impl<'a> Above<'a> {
         }
     }
 
-    /// Where everything happens at [known times](super::moments), which may be earlier by less than a cell.
+    /// Creates the bound for worlds where everything happens at [known times](super::moments). In
+    /// it, happenings may be early by less than a cell.
     pub(super) fn by_moments(world: &'a TimedWorld, chances: &'a Chances) -> Self {
         Self {
             by_moments: Some(Alike::new(world, chances)),
@@ -79,10 +81,10 @@ impl<'a> Above<'a> {
     }
 }
 
-/// What the cell brings: which of the actions under way may end, and which events happen.
+/// Returns the possible happenings of the cell: the running actions that may end, and the events.
 ///
 /// # Errors
-/// When it is too much.
+/// When there are too many combinations.
 fn revealed(
     world: &TimedWorld,
     chances: &Chances,
@@ -130,7 +132,8 @@ fn revealed(
     Ok(moments)
 }
 
-/// Each moment in each way, with what then is different. Where there are too many already, they stay as they are.
+/// Splits each moment into the given ways, applying the change of each. If there are too many
+/// moments already, they are not split.
 fn split<T>(
     moments: Vec<(f64, Moment)>,
     ways: &[(f64, T)],
@@ -197,7 +200,7 @@ impl Expansion for Above<'_> {
     }
 
     fn last(&self, state: &State) -> f64 {
-        // Whoever may still get there, does.
+        // The goal counts as reached if it may still be reachable.
         f64::from(u8::from(self.world.is_hopeful(
             state.facts,
             state.under_way(),
@@ -262,7 +265,7 @@ impl Cell<'_> {
         for act in startable {
             choices.push(self.start(state, *coming, act));
         }
-        // Harm for good is best done last.
+        // Permanent deletions are best applied last.
         let (mut after, mut left) = (state.clone(), *coming);
         for event in 0..world.events.len() {
             if coming.must & (1 << event) != 0 && world.is_best_last(event) {
@@ -284,7 +287,7 @@ impl Cell<'_> {
         vec![(1.0, vec![self.target((after, *coming))])]
     }
 
-    /// An action starts, which may end in the very cell.
+    /// Returns the start of an action, which may end in the same cell.
     pub(super) fn start(&mut self, state: &State, coming: Coming, act: usize) -> Choice {
         let world = self.bound.world;
         let ways: Vec<_> = match world.acts[act].rest {
@@ -322,7 +325,7 @@ impl Cell<'_> {
     }
 }
 
-/// What is best done at once.
+/// Applies the happenings that are best at once.
 fn forced(world: &TimedWorld, mut moment: Moment) -> Moment {
     loop {
         let (state, coming) = &moment;

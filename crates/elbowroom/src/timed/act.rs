@@ -1,4 +1,4 @@
-//! What the world is made of: conditions, starts and ends, actions, and what happens by itself.
+//! Parts of the world: conditions, starts and ends, actions, and events.
 
 use std::sync::Arc;
 
@@ -25,11 +25,11 @@ pub(crate) struct Snap {
     pub(crate) needs: Needs,
     pub(crate) adds: Facts,
     pub(crate) deletes: Facts,
-    /// What becomes of numbers.
+    /// The changes of numbers.
     pub(crate) amounts: Vec<Amount>,
-    /// The comparisons that may come to hold by these.
+    /// The comparisons that may become true by these changes.
     pub(super) helps: Facts,
-    /// How the amounts may come out, with how likely each of the ways is; at least one.
+    /// The possible amounts, with their probabilities; at least one.
     pub(crate) draws: Vec<(f64, Vec<Span>)>,
 }
 
@@ -39,22 +39,22 @@ pub(crate) struct Act {
     pub(crate) name: String,
     pub(crate) action: Arc<Action>,
     pub(crate) start: Snap,
-    /// What is needed over all, and its end; `None` for instantaneous actions.
+    /// The over-all condition and the end; `None` for instantaneous actions.
     pub(crate) rest: Option<(Needs, Snap)>,
     pub(crate) planned: Rational,
-    /// P(it fails midway), given that it starts.
+    /// Probability that it fails midway, given that it starts.
     pub(crate) midway: f64,
-    /// P(it fails at its end), given that it starts.
+    /// Probability that it fails at its end, given that it starts.
     pub(crate) at_end: f64,
-    /// How things may stand when it has failed; the shares add up to 1.
+    /// The possible outcomes of a failure; the shares add up to 1.
     pub(crate) failures: Vec<Failed>,
-    /// Whether it may do any good to cancel it.
+    /// `true` if cancelling it may be useful.
     pub(crate) may_be_cancelled: bool,
-    /// Whether nothing is ever better than to start it as soon as one can.
+    /// `true` if starting it as soon as possible is always optimal.
     pub(crate) is_eager: bool,
 }
 
-/// Something that happens by itself.
+/// An event of the world.
 #[derive(Clone, Debug)]
 pub(crate) struct Event {
     pub(crate) adds: Facts,
@@ -62,12 +62,12 @@ pub(crate) struct Event {
     pub(crate) occurs: Occurs,
 }
 
-/// How often something happens by itself.
+/// Number of occurrences of an event.
 #[derive(Clone, Debug)]
 pub(crate) enum Occurs {
-    /// At most once: how likely, and when.
+    /// At most once, with this probability and this distribution of the time.
     Once { probability: f64, time: Rule },
-    /// Again and again, so many times per second, whatever has been before.
+    /// A Poisson process with this rate per second.
     Rate(f64),
 }
 
@@ -81,8 +81,8 @@ impl Needs {
         }
     }
 
-    /// What is left of them if these facts are as one would have them: such that the needs hold, or, if that is
-    /// what is wanted, do not.
+    /// Simplifies the condition with the facts fixed: to the values that help it to hold, or, with
+    /// `hold` false, to the values that help it to fail.
     pub(super) fn without(&self, facts: Facts, hold: bool) -> Self {
         let parts = |parts: &[Self]| parts.iter().map(|part| part.without(facts, hold)).collect();
         match self {
@@ -95,7 +95,7 @@ impl Needs {
         }
     }
 
-    /// Whether they may hold if more facts may be false than these.
+    /// Returns `true` if the condition may hold if some of the true facts are made false.
     pub(super) fn is_possible(&self, facts: Facts) -> bool {
         match self {
             Self::All(parts) => parts.iter().all(|part| part.is_possible(facts)),
@@ -105,7 +105,7 @@ impl Needs {
         }
     }
 
-    /// Whether they may be false if more facts may be false than these; any fact may be false.
+    /// Returns `true` if the condition may fail if some of the true facts are made false.
     fn may_fail(&self, facts: Facts) -> bool {
         match self {
             Self::All(parts) => parts.iter().any(|part| part.may_fail(facts)),
@@ -115,7 +115,7 @@ impl Needs {
         }
     }
 
-    /// The facts that must all be true, if that is all there is to it.
+    /// Returns the facts of the condition if it is a conjunction of facts.
     pub(super) fn conjunction(&self) -> Option<Facts> {
         match self {
             Self::All(parts) => parts
@@ -126,7 +126,7 @@ impl Needs {
         }
     }
 
-    /// The facts that it reads.
+    /// Returns the facts that it reads.
     pub(crate) fn mentions(&self) -> Facts {
         match self {
             Self::All(parts) | Self::Any(parts) => {
@@ -147,12 +147,12 @@ impl Needs {
 }
 
 impl Snap {
-    /// Whether nothing that matters changes.
+    /// Returns `true` if it changes no relevant fact or number.
     pub(super) fn does_nothing(&self) -> bool {
         self.adds | self.deletes == 0 && self.amounts.is_empty()
     }
 
-    /// Additions win over deletions of the same happening.
+    /// Applies the effects on facts; additions win over deletions.
     pub(super) fn apply(&self, facts: Facts) -> Facts {
         (facts & !self.deletes) | self.adds
     }
@@ -163,12 +163,13 @@ impl Event {
         (facts & !self.deletes) | self.adds
     }
 
-    /// Whether it happens again and again, so that nobody has to remember that it has.
+    /// Returns `true` if it may happen again, so that the state need not record its occurrence.
     pub(crate) fn is_recurrent(&self) -> bool {
         matches!(self.occurs, Occurs::Rate(_))
     }
 
-    /// How likely it is over at that time, in seconds; never for certain if it happens again.
+    /// Returns the probability that the event is over at a time, in seconds; 0 for recurrent
+    /// events.
     pub(super) fn is_over_by(&self, time: f64, side: Side, resolution: f64) -> Option<f64> {
         match &self.occurs {
             Occurs::Once {
@@ -182,42 +183,42 @@ impl Event {
         }
     }
 
-    /// Whether it only makes facts false.
+    /// Returns `true` if it only makes facts false.
     pub(super) fn is_harmful(&self) -> bool {
         self.adds == 0
     }
 }
 
 impl Act {
-    /// Whether its end alone is all that the goal asks for.
+    /// Returns `true` if its end alone satisfies the goal.
     pub(super) fn wins(&self, goal: &Needs) -> bool {
         self.rest.iter().any(|(_, end)| goal.hold(end.adds))
     }
 
-    /// Whether it may end in more than one way.
+    /// Returns `true` if it has several possible ends.
     pub(super) fn has_chances(&self) -> bool {
         let end = self.rest.as_ref();
         self.fails() || end.is_some_and(|(_, end)| end.draws.len() > 1)
     }
 
-    /// Whether it may fail once it has started.
+    /// Returns `true` if it may fail after its start.
     pub(super) fn fails(&self) -> bool {
         self.midway > 0.0 || self.at_end > 0.0
     }
 
-    /// Whether some comparison may come to hold by it.
+    /// Returns `true` if some comparison may become true by it.
     pub(super) fn helps(&self) -> bool {
         let end = self.rest.as_ref().map_or(0, |(_, end)| end.helps);
         self.start.helps | end != 0
     }
 
-    /// Whether it changes numbers.
+    /// Returns `true` if it changes numbers.
     pub(super) fn changes_numbers(&self) -> bool {
         let end = self.rest.as_ref();
         !self.start.amounts.is_empty() || end.is_some_and(|(_, end)| !end.amounts.is_empty())
     }
 
-    /// Whether it changes numbers, or goes on or ends by them.
+    /// Returns `true` if it changes numbers, or if its over-all or end condition compares numbers.
     pub(super) fn is_about_numbers(&self, tested: Facts) -> bool {
         let reads = |needs: &Needs| needs.mentions() & tested != 0;
         let rest = self.rest.as_ref();
@@ -225,7 +226,7 @@ impl Act {
             || rest.is_some_and(|(over_all, end)| reads(over_all) || reads(&end.needs))
     }
 
-    /// The facts that it reads.
+    /// Returns the facts that it reads.
     pub(super) fn mentions(&self) -> Facts {
         let rest = self.rest.as_ref();
         let later = rest.map_or(0, |(over_all, end)| {
@@ -241,27 +242,27 @@ impl Act {
                 .is_some_and(|(over_all, end)| over_all.has_negation() || end.needs.has_negation())
     }
 
-    /// All that it may make true.
+    /// Returns all facts that it may make true.
     pub(super) fn adds(&self) -> Facts {
         let end = self.rest.as_ref().map_or(0, |(_, end)| end.adds);
         self.start.adds | self.adds_by_failing() | end
     }
 
-    /// All that it may make false.
+    /// Returns all facts that it may make false.
     pub(super) fn deletes(&self) -> Facts {
         let end = self.rest.as_ref().map_or(0, |(_, end)| end.deletes);
         self.start.deletes | self.deletes_by_failing() | end
     }
 
-    /// Whether its end deletes nothing that matters.
+    /// Returns `true` if its end deletes no relevant fact.
     pub(super) fn ends_kindly(&self) -> bool {
         self.rest
             .as_ref()
             .is_some_and(|(_, end)| end.deletes & !end.adds == 0)
     }
 
-    /// Whether its end needs nothing but what it needs all the time anyway, so that no moment is
-    /// better for it to end than another.
+    /// Returns `true` if the conditions of its end are among its over-all conditions, so that it
+    /// can end at any time.
     pub(super) fn ends_safely(&self) -> bool {
         self.rest.as_ref().is_some_and(|(over_all, end)| {
             let always = over_all.conjunction().unwrap_or(0);
@@ -271,8 +272,8 @@ impl Act {
         })
     }
 
-    /// Whether there can be something in cancelling it where more facts are never worse: its end
-    /// may do harm, well or badly, or who begins anew may be done earlier than who goes on.
+    /// Returns `true` if cancelling it may be useful in a monotone world: its end or its failure
+    /// may delete facts, or a restarted action may end earlier than the running one.
     pub(super) fn may_gain_by_cancelling(&self, model: &WorldModel) -> bool {
         !self.ends_kindly()
             || !self.ends_safely()

@@ -1,4 +1,4 @@
-//! The actions that there are.
+//! The available actions.
 
 use std::collections::BTreeSet;
 
@@ -11,8 +11,8 @@ use elbowroom_sim::{Becoming, ExogenousChange, WorldModel};
 
 use super::{NotTabulated, Settings};
 
-/// All actions that can start, whatever happens by itself, or those that are asked for. One that
-/// can never end is in no plan, but what its start does may still be of use.
+/// Returns all requested actions that can start, under any events. An action that can never end is
+/// in no plan, but the effects of its start may be useful.
 pub(super) fn actions(
     task: &Task,
     model: &WorldModel,
@@ -62,7 +62,7 @@ pub(super) fn actions(
             *at_end = problem::Condition::TRUE;
         }
     }
-    // What failures leave behind may be what other actions need.
+    // Outcomes of failures may satisfy the conditions of other actions.
     let mut left: BTreeSet<(FactId, bool)> = BTreeSet::new();
     loop {
         let actions = grounded(task, &problem, settings)?;
@@ -90,7 +90,7 @@ pub(super) fn actions(
     }
 }
 
-/// The actions of a task that can start if the problem is this one.
+/// Returns the actions of a task that can start in this problem.
 fn grounded(
     task: &Task,
     problem: &problem::Problem,
@@ -121,7 +121,7 @@ fn grounded(
     Ok(actions)
 }
 
-/// The facts that failures of an action may change, and what they become.
+/// Returns the facts that failures of an action may change, with their new values.
 pub(super) fn left_by_failures(
     task: &Task,
     model: &WorldModel,

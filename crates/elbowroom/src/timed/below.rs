@@ -1,5 +1,5 @@
-//! The bound from below: the agent decides at the boundaries of cells, and what happens in between
-//! happens in the worst order.
+//! The lower bound: the agent decides at the boundaries of cells, and the happenings between them
+//! have the worst order.
 
 use indexmap::IndexSet;
 
@@ -10,18 +10,18 @@ use super::state::{Phase, State};
 use super::world::TimedWorld;
 use super::{Side, Stop};
 
-/// What more than so many happenings in one cell lead to is taken to be lost.
+/// Maximum number of happenings in one cell; beyond it, the state counts as lost.
 const MOST_ORDERED: usize = 5;
 
-/// When whoever decides does something, and what it looks at.
+/// Restrictions on the times and the moves of the agent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Manner {
-    /// Anything, at every boundary.
+    /// Any move at every boundary.
     Always,
-    /// Only when something has happened, and at time 0; then nothing is left undone.
+    /// Moves only after a happening, and at time 0. Useful actions must be started then.
     WhenSomethingHappens,
-    /// The same where everything happens at [known times](super::moments); nothing is let go. None of the actions
-    /// is left undone that are bits of this.
+    /// The same for worlds where everything happens at [known times](super::moments), without
+    /// cancelling. Only actions that are bits of this number must be started.
     ByMoments(u64),
 }
 
@@ -31,30 +31,29 @@ pub(super) struct Below<'a> {
     manner: Manner,
 }
 
-/// Something that happens in a cell.
+/// A happening within a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Happening {
-    /// An action ends, well or badly.
+    /// The end of an action, successful or not.
     End(u8, Ending),
     /// An event.
     Event(usize),
-    /// An event that happens several times, with whatever in between.
+    /// Several occurrences of an event, with other happenings between them.
     Often,
 }
 
-/// Something that the agent can do at a boundary.
+/// A move of the agent at a boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Move {
-    /// To start this action.
+    /// Starts this action.
     Start(usize),
-    /// To let the action at this place among those under way go.
+    /// Cancels the running action at this position.
     Cancel(usize),
-    /// To do nothing until the next boundary.
+    /// Waits until the next boundary.
     Wait,
 }
 
-/// All that is worth looking at in a state in which the goal does not hold, and in which there is
-/// hope.
+/// Returns the relevant moves in a state that does not satisfy the goal and is not hopeless.
 fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
     if !state.may_act {
         return vec![Move::Wait];
@@ -67,16 +66,16 @@ fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
     let running = state.running.iter().enumerate();
     let cancelled = running.filter_map(|(place, running)| {
         let act = &world.acts[usize::from(running.act)];
-        // Whether one that may hold things up can still be let go, nobody knows.
+        // An action with a delayed failure may have failed already, and can then not be cancelled.
         (act.may_be_cancelled && !act.may_hold_up()).then_some(Move::Cancel(place))
     });
     let started = startable.into_iter().map(Move::Start);
     cancelled.chain(started).chain([Move::Wait]).collect()
 }
 
-/// Who acts only when something has happened does not wait, or let anything go, while there is something to
-/// start that breaks nothing off that is under way, and starts nothing that does. Where not all actions are ones
-/// that have to be done, those that need not be may be started, too.
+/// Restricts the moves of an agent that acts only after a happening. It neither waits nor cancels
+/// while it can start an action that aborts no running action and is not aborted itself. It starts
+/// no other actions than these. Actions outside `must` may be started, but need not be.
 fn leave_nothing_undone(world: &TimedWorld, state: &State, must: u64, moves: &mut Vec<Move>) {
     let breaks_nothing = |choice: &Move| match choice {
         Move::Start(act) => {
@@ -86,7 +85,7 @@ fn leave_nothing_undone(world: &TimedWorld, state: &State, must: u64, moves: &mu
         }
         Move::Cancel(_) | Move::Wait => false,
     };
-    // What an action is done for may be there already.
+    // The effects of an action may be true already.
     let is_wanted = |act: usize| {
         let end = world.acts[act].rest.as_ref();
         must & (1 << act) != 0 && end.is_none_or(|(_, end)| end.adds & !state.facts != 0)
@@ -101,19 +100,19 @@ fn leave_nothing_undone(world: &TimedWorld, state: &State, must: u64, moves: &mu
     }
 }
 
-/// What is being put together of one cell.
+/// A cell during its expansion.
 struct Cell<'c> {
     bound: &'c Below<'c>,
-    /// Its number.
+    /// The number of the cell.
     number: usize,
-    /// The states in which the agent decides, those at the boundary first.
+    /// The decision states, those at the boundary first.
     moments: IndexSet<State>,
     later: &'c mut Layers,
     hopes: &'c mut Hopes,
 }
 
 impl<'a> Below<'a> {
-    /// Any manner is a way to act, and so bounds the best from below.
+    /// Creates the bound. Every manner is a policy, so it yields a lower bound.
     pub(super) fn new(world: &'a TimedWorld, chances: &'a Chances, manner: Manner) -> Self {
         Self {
             world,
@@ -122,7 +121,7 @@ impl<'a> Below<'a> {
         }
     }
 
-    /// All that whoever acts so looks at in a state, as [`moves`].
+    /// Returns the moves in a state that the manner allows, a part of [`moves`].
     pub(super) fn moves(&self, state: &State) -> Vec<Move> {
         let mut moves = moves(self.world, state);
         let must = match self.manner {
@@ -137,10 +136,10 @@ impl<'a> Below<'a> {
         moves
     }
 
-    /// What may happen in a cell, with how likely all of it is.
+    /// Returns the possible combinations of happenings in a cell, with their probabilities.
     ///
     /// # Errors
-    /// When it is too much.
+    /// When there are too many combinations.
     fn happenings(&self, cell: usize, state: &State) -> Result<Vec<(f64, Vec<Happening>)>, Stop> {
         let mut all = vec![(1.0, Vec::new())];
         let mut split = |ways: &[(f64, Option<Happening>)]| {
@@ -170,8 +169,8 @@ impl<'a> Below<'a> {
         for (event, hazards) in self.chances.events.iter().enumerate() {
             if state.happened & (1 << event) == 0 {
                 let p = hazards[cell];
-                // Where more facts are never worse, harm that comes both before and after all else
-                // is the worst that any number of times can do, and of gifts one is the least.
+                // In a monotone world, the worst case of a repeated event is a deletion both before
+                // and after all other happenings, or a single addition.
                 let often = if self.world.is_monotone {
                     0.0
                 } else {
@@ -190,7 +189,8 @@ impl<'a> Below<'a> {
         Ok(all)
     }
 
-    /// What a state may be after all of these, in whatever order; `None` if that is too much.
+    /// Returns the possible states after these happenings in any order; `None` if there are too
+    /// many orders.
     fn outcomes(&self, state: &State, happenings: &[Happening]) -> Option<Vec<State>> {
         let world = self.world;
         if happenings.contains(&Happening::Often) {
@@ -203,8 +203,8 @@ impl<'a> Below<'a> {
                 outcomes.into_iter().collect()
             });
         }
-        // Where more facts are never worse, nothing is worse than harm both before and after all
-        // else.
+        // In a monotone world, the worst case is a deletion both before and after all other
+        // happenings.
         let is_harm = |happening: &Happening| match happening {
             Happening::Event(event) => world.events[*event].is_harmful(),
             Happening::End(..) | Happening::Often => false,
@@ -240,11 +240,11 @@ impl<'a> Below<'a> {
         }
     }
 
-    /// An action that has failed before its end has no end.
+    /// Applies a happening. The end of an action that is no longer running has no effect.
     fn after(&self, state: &State, happening: Happening) -> State {
         match happening {
             Happening::Event(event) => state.changed(self.world, event),
-            // Such a cell is given up, whatever comes of it.
+            // Such a cell counts as lost anyway.
             Happening::Often => state.clone(),
             Happening::End(act, ending) => {
                 match state.running.iter().position(|running| running.act == act) {
@@ -263,7 +263,7 @@ impl Expansion for Below<'_> {
 
     fn initial(&self) -> Vec<(f64, State)> {
         let events = &self.world.events;
-        // With the events that have happened: nobody knows in which order.
+        // States after the events at time 0, whose order is unknown.
         let mut states = vec![(1.0, State::initial(self.world), Vec::<usize>::new())];
         for (event, p) in self.chances.before.iter().enumerate() {
             if *p <= 0.0 {
@@ -274,7 +274,7 @@ impl Expansion for Below<'_> {
                 let is_opposed = own.adds & other.deletes | own.deletes & other.adds != 0;
                 is_opposed && (own.is_recurrent() || other.is_recurrent())
             };
-            // Where the order matters, it is given up.
+            // Combinations whose order matters count as lost.
             let able = states
                 .iter()
                 .filter(|(_, _, with)| !with.iter().any(clashes));
@@ -347,7 +347,7 @@ impl Cell<'_> {
         moves.map(|choice| self.choice(state, choice)).collect()
     }
 
-    /// What comes of a move.
+    /// Returns the possible results of a move.
     fn choice(&mut self, state: &State, choice: Move) -> Result<Choice, Stop> {
         let world = self.bound.world;
         let after = match choice {
@@ -362,7 +362,8 @@ impl Cell<'_> {
         Ok(vec![(1.0, vec![self.target(after)])])
     }
 
-    /// What comes of doing nothing until the next boundary, or until something has happened.
+    /// Returns the possible results of waiting until the next boundary, or until the next
+    /// happening.
     fn wait(&mut self, state: &State) -> Result<Choice, Stop> {
         let world = self.bound.world;
         let chances = self.bound.chances;

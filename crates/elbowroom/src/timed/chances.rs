@@ -1,5 +1,4 @@
-//! In which cell what began in one ends, and in which cell what happens by itself does:
-//! [`Chances`].
+//! Probabilities of the ends of actions and of events in each cell: [`Chances`].
 
 use elbowroom_sim::{Side as Part, rounding_edge};
 
@@ -8,33 +7,35 @@ use super::failures::Ending;
 use super::world::{TimedWorld, unknown_shape};
 use super::{NotTabulated, Side};
 
-/// How likely it is that something happens in a cell, given that it has not before.
+/// Conditional probabilities of happenings in a cell, given that they have not taken place before.
 #[derive(Debug)]
 pub(crate) struct Chances {
     /// The number of cells.
     pub(crate) cells: usize,
-    /// By action and number of cells since it began: that it ends.
+    /// Ends of actions, by action and number of cells since the start.
     pub(crate) ends: Vec<Vec<Ends>>,
-    /// By event and cell: that it happens, if it can still.
+    /// Events, by event and cell.
     pub(crate) events: Vec<Vec<f64>>,
-    /// By event and cell: that it happens more than once there, if it happens there.
+    /// Conditional probability that an event happens more than once in a cell if it happens there,
+    /// by event and cell.
     pub(crate) again: Vec<Vec<f64>>,
-    /// By event: that it has happened before anybody could do something.
+    /// Probability that an event happens before the first decision, by event.
     pub(crate) before: Vec<f64>,
-    /// By action and number of cells since it began: after how many it may next end; and by event and
-    /// cell: in which it may next happen.
+    /// The next number of cells with a possible end, by action and number of cells since the start;
+    /// the next cell with a possible occurrence, by event and cell.
     pub(super) next_end: Vec<Vec<u32>>,
     pub(super) next_event: Vec<Vec<u32>>,
 }
 
-/// It may not happen any more.
+/// Marks that no further occurrence is possible.
 pub(super) const NEVER: u32 = u32::MAX;
 
-/// How likely an action ends in a cell, given that it has not before.
+/// Conditional probabilities of the ends of an action in a cell, given that it has not ended
+/// before.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Ends {
     pub(crate) well: f64,
-    /// In each of the ways in which it can fail.
+    /// The probability of each kind of failure.
     pub(crate) badly: Vec<f64>,
 }
 
@@ -43,12 +44,12 @@ impl Ends {
         self.well + self.badly()
     }
 
-    /// In whatever way.
+    /// Returns the probability of any failure.
     pub(crate) fn badly(&self) -> f64 {
         self.badly.iter().sum()
     }
 
-    /// That an action ends in each way, and that it does not.
+    /// Returns the possible ends with their probabilities, and that of no end.
     pub(super) fn ways(&self, act: &Act) -> impl Iterator<Item = (f64, Option<Ending>)> {
         let badly = (0_u8..).zip(&self.badly);
         let badly = badly.map(|(way, p)| (*p, Some(Ending::Badly(way))));
@@ -61,12 +62,13 @@ impl Ends {
     }
 }
 
-/// Into how many parts of a duration the moment of a failure is cut at most.
+/// Maximum number of parts of a duration that are distinguished for the time of a failure.
 const MOST_SHARES: f64 = 10_000.0;
 
 impl Chances {
-    /// Cells are closed at the left for a bound from above, and at the right for one from below:
-    /// what happens at a boundary counts as before it where the agent decides at boundaries only.
+    /// Computes the probabilities on a grid. Cells are closed at the left for an upper bound, and
+    /// at the right for a lower bound: if the agent decides only at boundaries, a happening at a
+    /// boundary comes before the decision.
     pub(super) fn new(
         world: &TimedWorld,
         step: f64,
@@ -114,7 +116,7 @@ impl Chances {
             again.push(vec![0.0; cells]);
             let by = |until: f64, part| {
                 let share = event.is_over_by(until, part, resolution);
-                // What is drawn below 0 happens at 0.
+                // Negative draws count as 0.
                 let is_there = until > 0.0 || part == Part::UpTo;
                 let share = if is_there { share } else { Some(0.0) };
                 share.ok_or_else(unknown_shape)
@@ -155,7 +157,7 @@ impl Chances {
     }
 }
 
-/// By place: the first from there on that is so.
+/// Returns, for each position, the first position from there on with `true`.
 fn next(is_so: impl DoubleEndedIterator<Item = bool> + ExactSizeIterator) -> Vec<u32> {
     let mut next = NEVER;
     let mut all = vec![NEVER; is_so.len()];
@@ -168,8 +170,8 @@ fn next(is_so: impl DoubleEndedIterator<Item = bool> + ExactSizeIterator) -> Vec
     all
 }
 
-/// How likely something happens that happens so many times on average, without a memory; and that
-/// it then happens more than once.
+/// Returns the probability of an occurrence in a Poisson process with this mean number of
+/// occurrences, and the conditional probability of more than one.
 fn occurs(mean: f64) -> (f64, f64) {
     let ever = -(-mean).exp_m1();
     if ever <= 0.0 {
@@ -178,7 +180,8 @@ fn occurs(mean: f64) -> (f64, f64) {
     (ever, (1.0 - mean * (-mean).exp() / ever).clamp(0.0, 1.0))
 }
 
-/// What has come since, as shares of what was left; where next to nothing is left, it happens now.
+/// Returns the probabilities since `before`, relative to the remaining probability. If almost
+/// nothing remains, the happening is certain.
 fn hazard(now: &Ends, before: &Ends) -> Ends {
     let badly = now.badly.iter().zip(&before.badly);
     let come = Ends {
@@ -198,8 +201,8 @@ fn hazard(now: &Ends, before: &Ends) -> Ends {
     }
 }
 
-/// The shares of its duration after which an action that fails midway may do so, with how likely
-/// each is: a uniform number, rounded to the resolution.
+/// Returns the shares of its duration after which an action may fail midway, with their
+/// probabilities: a uniform number, rounded to the resolution.
 fn shares(resolution: f64, midway: f64) -> Vec<(f64, f64)> {
     if midway <= 0.0 {
         return Vec::new();
@@ -218,7 +221,8 @@ fn shares(resolution: f64, midway: f64) -> Vec<(f64, f64)> {
     }
 }
 
-/// How likely an action has ended well, or failed in each way, on that side of a time after its start.
+/// Returns the probabilities that an action has succeeded, or failed in each way, by a time after
+/// its start.
 fn ended(
     act: &Act,
     world: &TimedWorld,
@@ -261,7 +265,7 @@ fn ended(
     })
 }
 
-/// So much earlier than a time; a multiple of the resolution stays one, whatever is rounded.
+/// Subtracts times. Multiples of the resolution remain multiples despite rounding.
 fn earlier(time: f64, by: f64, resolution: f64) -> f64 {
     let steps = (time - by) / resolution;
     let whole = steps.round();

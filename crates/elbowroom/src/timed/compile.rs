@@ -1,4 +1,4 @@
-//! From a task and a world file to facts as bits, actions and events.
+//! Compiles a task and a world file to facts as bits, actions and events.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -18,7 +18,7 @@ use super::available::left_by_failures;
 use super::numbers::{Amount, By, Changed, Number, Test, units};
 use super::world::Facts;
 
-/// The facts and numbers on which the goal depends, through whatever actions and their failures.
+/// Returns the facts and numbers that the goal depends on, through all actions and their failures.
 fn relevant(
     task: &Task,
     model: &WorldModel,
@@ -58,7 +58,7 @@ fn relevant(
     }
 }
 
-/// Enters what a condition reads.
+/// Adds the facts and fluents that a condition reads.
 fn read(condition: &Condition, facts: &mut BTreeSet<FactId>, numbers: &mut BTreeSet<FluentId>) {
     condition.visit_facts(&mut |fact| {
         facts.insert(fact);
@@ -68,7 +68,7 @@ fn read(condition: &Condition, facts: &mut BTreeSet<FactId>, numbers: &mut BTree
     });
 }
 
-/// The numbers that actions change.
+/// Returns the numbers that actions change.
 fn changing(actions: &[Action]) -> BTreeSet<FluentId> {
     let snaps = actions.iter().flat_map(snaps);
     let effects = snaps.flat_map(|snap| &snap.effects);
@@ -86,17 +86,17 @@ fn snaps(action: &Action) -> Vec<&SnapAction> {
     }
 }
 
-/// A task, with numbers for the facts that matter.
+/// A task, with bits for its relevant facts.
 pub(super) struct Compiler<'t> {
     pub(super) task: &'t Task,
     model: &'t WorldModel,
-    /// Sorted.
+    /// The relevant facts, sorted.
     pub(super) facts: Vec<FactId>,
-    /// The numbers that matter and change, sorted by fluent.
+    /// The relevant numbers that change, sorted by fluent.
     pub(super) numbers: Vec<Number>,
     /// All numbers that change.
     changing: BTreeSet<FluentId>,
-    /// The comparisons that have been met so far.
+    /// The comparisons found so far.
     pub(super) tests: RefCell<Vec<Test>>,
 }
 
@@ -135,7 +135,7 @@ impl<'t> Compiler<'t> {
         }
         Ok(compiler)
     }
-    /// 0 for what does not matter.
+    /// Returns the bit of a fact; 0 if it is irrelevant.
     pub(super) fn bit(&self, fact: FactId) -> Facts {
         self.facts
             .binary_search(&fact)
@@ -162,7 +162,7 @@ impl<'t> Compiler<'t> {
         })
     }
 
-    /// A comparison of known numbers, or of a number that changes with a known one.
+    /// Compiles a comparison of constants, or of a changing number with a constant.
     fn compare(
         &self,
         comparison: Comparison,
@@ -203,11 +203,11 @@ impl<'t> Compiler<'t> {
             tests.len() - 1
         });
         let bit = self.facts.len() + place;
-        // Of more than there are bits for nothing comes.
+        // The caller rejects worlds with more comparisons than bits.
         Ok(Needs::Fact(if bit < 128 { 1 << bit } else { 0 }))
     }
 
-    /// The place of a number that changes.
+    /// Returns the position of a changing number.
     fn number(&self, expression: &Expression) -> Option<usize> {
         match expression {
             Expression::Fluent(fluent) => {
@@ -218,7 +218,7 @@ impl<'t> Compiler<'t> {
         }
     }
 
-    /// What becomes of a number that matters.
+    /// Compiles an effect on a relevant number.
     fn amount(
         &self,
         name: &str,
@@ -299,7 +299,7 @@ impl<'t> Compiler<'t> {
         })
     }
 
-    /// Whether an action, or a failure of it, changes anything that matters.
+    /// Returns `true` if an action, or a failure of it, changes a relevant fact or number.
     fn matters(&self, action: &Action) -> bool {
         let snaps = snaps(action).into_iter();
         let mut effects = snaps.flat_map(|snap| &snap.effects);
@@ -314,7 +314,7 @@ impl<'t> Compiler<'t> {
         }) || left.any(|(fact, _)| self.bit(fact) != 0)
     }
 
-    /// `None` for what cannot matter, or never starts.
+    /// Compiles an action; `None` if it is irrelevant, or never starts.
     pub(super) fn act(
         &self,
         action: &Action,
@@ -352,7 +352,7 @@ impl<'t> Compiler<'t> {
             let is_at_start = failing.when == Failure::AtStart || rest.is_none();
             match failing.when {
                 _ if is_at_start && failing.probability >= 1.0 => return Ok(None),
-                // It can be tried again at once, until it starts.
+                // The start can be retried at once until it succeeds.
                 _ if is_at_start => {}
                 Failure::Midway => midway = failing.probability,
                 Failure::AtEnd | Failure::AtStart => at_end = failing.probability,
@@ -372,7 +372,7 @@ impl<'t> Compiler<'t> {
         }))
     }
 
-    /// The one duration that the domain allows.
+    /// Returns the only duration that the domain allows.
     fn duration(&self, body: &DurativeBody) -> Option<Rational> {
         let [only] = body.duration.as_slice() else {
             return None;
@@ -455,7 +455,7 @@ impl<'t> Compiler<'t> {
     }
 }
 
-/// The comparison with its sides exchanged.
+/// Returns the comparison with its sides exchanged.
 fn turned(comparison: Comparison) -> Comparison {
     match comparison {
         Comparison::Less => Comparison::Greater,

@@ -1,4 +1,4 @@
-//! How an action may end badly, and what is left then.
+//! Failures of actions, and their outcomes.
 
 use elbowroom_sim::{Becoming, Failing, Failure, Outcome, WorldModel};
 
@@ -7,24 +7,24 @@ use super::act::{Act, Snap};
 use super::compile::Compiler;
 use super::world::Facts;
 
-/// A way to fail.
+/// An outcome of a failure.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Failed {
-    /// How likely it is, given that the action fails.
+    /// Conditional probability of this outcome, given that the action fails.
     pub(crate) share: f64,
-    /// Apart from what it makes false.
+    /// The added facts, without deleted ones.
     pub(crate) adds: Facts,
     pub(crate) deletes: Facts,
-    /// For how many seconds more the action is under way, and cannot be cancelled.
+    /// Time for which the failed action is still running and cannot be cancelled, in seconds.
     pub(crate) delay: f64,
 }
 
-/// How an action ends.
+/// The end of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Ending {
-    /// With amounts that come out in that one of the ways in which they can.
+    /// Success, with this draw of the amounts.
     Well(u16),
-    /// In that one of the ways in which it can fail.
+    /// Failure, with this outcome.
     Badly(u8),
 }
 
@@ -35,19 +35,19 @@ impl Failed {
 }
 
 impl Act {
-    /// All that a failure may make true.
+    /// Returns all facts that a failure may make true.
     pub(super) fn adds_by_failing(&self) -> Facts {
         let failures = self.failures.iter();
         failures.fold(0, |all, failed| all | failed.adds)
     }
 
-    /// All that a failure may make false.
+    /// Returns all facts that a failure may make false.
     pub(super) fn deletes_by_failing(&self) -> Facts {
         let failures = self.failures.iter();
         failures.fold(0, |all, failed| all | failed.deletes)
     }
 
-    /// The way in which it fails, if it ends badly.
+    /// Returns the outcome of the failure, if it is one.
     pub(super) fn failed(&self, ending: Ending) -> Option<&Failed> {
         match ending {
             Ending::Well(_) => None,
@@ -55,17 +55,18 @@ impl Act {
         }
     }
 
-    /// Whether it may be that it can only fail any more, and nobody can let it go.
+    /// Returns `true` if it may have failed already while it is still running, so that it cannot be
+    /// cancelled.
     pub(super) fn may_hold_up(&self) -> bool {
         self.failures.iter().any(|failed| failed.delay > 0.0)
     }
 }
 
-/// The most ways to fail that an action has.
+/// Maximum number of outcomes of an action's failures.
 const MOST_WAYS: usize = 64;
 
 impl Compiler<'_> {
-    /// The ways in which an action may fail, each once.
+    /// Returns the distinct outcomes of an action's failures.
     pub(super) fn failures(
         &self,
         name: &str,
@@ -95,7 +96,7 @@ impl Compiler<'_> {
             add(&mut ways, outcome.probability, (adds, deletes), delay);
         }
         let undone = self.left(name, failing, None, start);
-        // Tenths do not add up to 1 in binary.
+        // Decimal fractions may not add up to exactly 1 in binary.
         if rest > 1e-9 {
             add(&mut ways, rest, undone.unwrap_or_default(), 0.0);
         }
@@ -112,7 +113,7 @@ impl Compiler<'_> {
         Ok(ways)
     }
 
-    /// What a failure makes true and false; `None` if it changes numbers.
+    /// Returns the facts that a failure makes true and false; `None` if it changes numbers.
     fn left(
         &self,
         name: &str,

@@ -1,4 +1,4 @@
-//! What both bounds have in common: states, cell by cell, and their values backwards.
+//! Backward induction for both bounds: states, cell by cell, and their values.
 
 use std::collections::BTreeMap;
 
@@ -9,47 +9,48 @@ use super::Stop;
 use super::state::State;
 use super::world::Facts;
 
-/// Where something leads.
+/// A target of a transition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Target {
-    /// To a state at the beginning of a later cell.
+    /// A state at the beginning of a later cell.
     Later {
         /// The cell.
         cell: u32,
-        /// The place of the state among those of the cell.
+        /// The position of the state among those of the cell.
         state: u32,
     },
-    /// To another node of this cell.
+    /// Another node of the same cell.
     Here(u32),
-    /// To the goal.
+    /// The goal.
     Won,
-    /// To where there is no hope.
+    /// A hopeless state: the goal is unreachable.
     Lost,
 }
 
-/// Something that the agent can do: what then comes about, with which probability. Where there is
-/// more than one target, the worst counts.
+/// A choice of the agent: the probabilities of its results, with their targets. If a result has
+/// several targets, the worst one counts.
 pub(super) type Choice = Vec<(f64, Vec<Target>)>;
 
-/// The nodes of one cell, the states at its beginning first, with all choices of each. There are
-/// millions of them, so they are kept one after the other.
+/// The nodes of one cell, with all choices of each; the states at its beginning come first. There
+/// may be millions of nodes, so they are stored in flat vectors.
 #[derive(Debug, Default)]
 pub(super) struct Nodes {
-    /// The cell that they are of.
+    /// The cell of the nodes.
     cell: u32,
-    /// By node: where its choices end.
+    /// By node: the end of its choices.
     ends: Vec<u32>,
-    /// By choice: where its ways end.
+    /// By choice: the end of its ways.
     choices: Vec<u32>,
-    /// By way: how likely it is, and where its targets end.
+    /// By way: its probability, and the end of its targets.
     ways: Vec<(f64, u32)>,
     targets: Vec<Target>,
 }
 
-/// The states at the beginnings of cells; those of the end of the last cell come after it.
+/// The states at the beginnings of cells; those at the end of the last cell have its number plus
+/// one.
 pub(super) type Layers = BTreeMap<u32, IndexSet<State>>;
 
-/// One of the two bounds.
+/// The expansion of states for one of the two bounds.
 pub(super) trait Expansion {
     /// The number of cells.
     fn cells(&self) -> usize;
@@ -57,11 +58,11 @@ pub(super) trait Expansion {
     /// The states at time 0, with their probabilities.
     fn initial(&self) -> Vec<(f64, State)>;
 
-    /// The nodes of a cell, which depend on nothing but these states; those to which they lead are
-    /// entered into the layers of later cells.
+    /// Returns the nodes of a cell, which depend only on these states. Adds the target states to
+    /// the layers of later cells.
     ///
     /// # Errors
-    /// Beyond the limits.
+    /// When a limit is exceeded.
     fn expand(
         &self,
         cell: usize,
@@ -71,20 +72,20 @@ pub(super) trait Expansion {
         limits: &Limits<'_>,
     ) -> Result<Nodes, Stop>;
 
-    /// What a state is worth when the last cell is over.
+    /// Returns the value of a state after the last cell.
     fn last(&self, state: &State) -> f64;
 }
 
 /// Limits of an expansion.
 pub(super) struct Limits<'l> {
-    /// The number of nodes of a cell.
+    /// Maximum number of nodes of a cell.
     pub(super) nodes: usize,
-    /// Asked before each node.
+    /// Called before each node; returns `false` to stop the expansion.
     pub(super) goes_on: &'l dyn Fn() -> bool,
 }
 
 impl Limits<'static> {
-    /// None.
+    /// No limits.
     pub(super) const NONE: Self = Self {
         nodes: usize::MAX,
         goes_on: &|| true,
@@ -95,7 +96,7 @@ impl Limits<'_> {
     /// Checks that one more node can be added.
     ///
     /// # Errors
-    /// Otherwise, with the reason.
+    /// The reason, if it cannot.
     pub(super) fn check(&self, nodes: &Nodes) -> Result<(), Stop> {
         if !(self.goes_on)() {
             return Err(Stop::Interrupted);
@@ -108,32 +109,33 @@ impl Limits<'_> {
     }
 }
 
-/// The average number of ways of a node at most, once there are as many nodes as there may be.
+/// Maximum average number of ways of a node, when the maximum number of nodes is reached.
 const WAYS: usize = 16;
 
 /// Limit on the combinations of events of one state in a cell. It is needed because each running action
 /// may end or not, so their number grows exponentially.
 pub(super) const MOST_WAYS: usize = 1 << 16;
 
-/// Work that is counted for each node and each of its ways, in units of [`elbowroom_num::work`].
+/// Work for each node and each of its ways, in units of [`elbowroom_num::work`].
 const NODE_WORK: u64 = 500;
 const WAY_WORK: u64 = 300;
 
-/// Where there is hope, as far as that has been looked at.
+/// Cache of reachability checks of the goal.
 pub(super) type Hopes = IndexMap<(Facts, u64, u32), bool>;
 
-/// There are fewer than 2^32 of anything: that many have no room.
+/// Converts a count; memory is too small for 2^32 elements.
 fn small(count: usize) -> u32 {
     u32::try_from(count).expect("fewer than 2^32")
 }
 
 impl Target {
-    /// That node of this cell.
+    /// Returns the target for a node of this cell.
     pub(super) fn here(node: usize) -> Self {
         Self::Here(small(node))
     }
 
-    /// A state at the beginning of a later cell, which is entered there.
+    /// Returns the target for a state at the beginning of a later cell, and adds the state to its
+    /// layer.
     pub(super) fn later(layers: &mut Layers, cell: usize, state: State) -> Self {
         let cell = small(cell);
         let layer = layers.entry(cell).or_default();
@@ -154,7 +156,7 @@ impl Nodes {
         self.ends.len()
     }
 
-    /// One more node, with its choices.
+    /// Appends a node with its choices.
     pub(super) fn push(&mut self, choices: Vec<Choice>) {
         let ways: usize = choices.iter().map(Vec::len).sum();
         work::spend(NODE_WORK + WAY_WORK.saturating_mul(ways as u64));
@@ -168,7 +170,8 @@ impl Nodes {
         self.ends.push(small(self.choices.len()));
     }
 
-    /// What each choice of a node is worth, given the values of the cell's nodes and of later states.
+    /// Returns the value of each choice of a node, given the values of the cell's nodes and of
+    /// later states.
     pub(super) fn worths<'n>(
         &'n self,
         node: usize,
@@ -206,17 +209,17 @@ impl Nodes {
     }
 }
 
-/// From where to where the parts of one thing are, if those are where the parts of each end.
+/// Returns the range of the parts of an element, given the ends of all elements.
 fn span(ends: &[u32], place: usize) -> std::ops::Range<usize> {
     let first = place.checked_sub(1).map_or(0, |before| ends[before]);
     first as usize..ends[place] as usize
 }
 
-/// What states at the beginnings of cells are worth, by cell.
+/// Values of states at the beginnings of cells, by cell.
 #[derive(Debug, Default)]
 pub(super) struct Values(pub(super) BTreeMap<u32, Vec<f64>>);
 
-/// The value at time 0. `left` is how many states there may still be.
+/// Computes the value at time 0. `left` is the remaining number of states.
 pub(super) fn value(
     bound: &impl Expansion,
     left: &mut usize,
@@ -234,7 +237,7 @@ pub(super) fn value(
     Ok(parts.sum())
 }
 
-/// All states, and what each is worth, from the last to the first.
+/// Computes all states and their values, from the last cell to the first.
 pub(super) fn backwards(
     bound: &impl Expansion,
     left: &mut usize,
@@ -268,11 +271,11 @@ pub(super) fn backwards(
     Ok((layers, found))
 }
 
-/// A cell may have so many nodes for each state that there may be in all cells together: within a cell
-/// much can happen in many orders.
+/// A cell may have this many times as many nodes as the remaining number of states, because its
+/// happenings may have many orders.
 const NODES: usize = 4;
 
-/// The states at the beginning of each cell, and at the end of the last.
+/// Returns the states at the beginning of each cell, and at the end of the last.
 fn explored(
     bound: &impl Expansion,
     hopes: &mut Hopes,
@@ -308,24 +311,23 @@ fn explored(
     }
 }
 
-/// By which factors a value shrinks on the way, so that of two ways that are equally likely to
-/// reach the goal the shorter one is worth more.
+/// Discount factors. They make the shorter of two equally likely ways more valuable.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tolls {
-    /// For each cell that passes.
+    /// Factor per cell.
     pub(super) cell: f64,
-    /// For each thing that the agent does.
+    /// Factor per move of the agent.
     pub(super) step: f64,
 }
 
 impl Tolls {
-    /// A value is a probability.
+    /// No discount: values are probabilities.
     pub(super) const NONE: Self = Self {
         cell: 1.0,
         step: 1.0,
     };
 
-    /// For so many cells.
+    /// Returns the factor for `cells` cells.
     fn of_cells(self, cells: u32) -> f64 {
         match cells {
             1 => self.cell,
@@ -334,9 +336,9 @@ impl Tolls {
     }
 }
 
-/// The values of a cell's nodes. Nodes lead to later ones, or back through instantaneous actions
-/// and such as take less than a cell; so they are gone through from the last to the first, until
-/// nothing changes any more.
+/// Computes the values of a cell's nodes. Nodes lead to later ones, or back through instantaneous
+/// actions and actions shorter than a cell. So they are processed from the last to the first, until
+/// no value changes any more.
 pub(super) fn settled(nodes: &Nodes, later: &Values, tolls: Tolls) -> Vec<f64> {
     let mut values = vec![0.0_f64; nodes.len()];
     loop {

@@ -1,4 +1,4 @@
-//! A bound from above in a world with fewer mishaps.
+//! Upper bounds from a world with fewer harmful events.
 
 use elbowroom_sim::Distribution;
 
@@ -7,11 +7,11 @@ use super::world::TimedWorld;
 use super::{Event, NotTabulated, Settings, Side, bound};
 
 impl TimedWorld {
-    /// The world without what may or may not happen, or at one time or another, and only makes facts
-    /// false; `None` if there is no such thing, or if fewer facts may be better.
+    /// Returns the world without uncertain events that only make facts false. `None` if there are
+    /// no such events, or if fewer facts may be better.
     ///
-    /// What happens for certain at a known time stays: it multiplies no states, and deadlines are of
-    /// this kind.
+    /// Certain events at known times are kept: they do not multiply states, and deadlines are such
+    /// events.
     pub(super) fn without_chances_of_harm(&self) -> Option<Self> {
         let is_chance_of_harm = |event: &Event| event.is_harmful() && !event.is_certain();
         if !self.is_monotone || !self.events.iter().any(is_chance_of_harm) {
@@ -25,7 +25,7 @@ impl TimedWorld {
 }
 
 impl Event {
-    /// Whether it happens for certain, at a known time.
+    /// Returns `true` if it happens for certain, at a known time.
     fn is_certain(&self) -> bool {
         match &self.occurs {
             Occurs::Once { probability, time } => {
@@ -36,7 +36,7 @@ impl Event {
     }
 }
 
-/// The least bound from above on this grid and finer ones; 1 if none is finished.
+/// Returns the least upper bound on this grid and finer ones; 1 if none is finished.
 pub(super) fn bound_from(
     world: &TimedWorld,
     first_cells: usize,

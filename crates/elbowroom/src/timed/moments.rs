@@ -1,19 +1,20 @@
-//! Worlds in which everything happens at known times, if it happens: durations are known, and so is when
-//! something may happen by itself. What is not known is whether it does, whether actions fail, and
-//! what they draw.
+//! Worlds where happenings take place at known times only: durations are known, and so are the
+//! possible times of events. It is unknown whether events occur, whether actions fail, and which
+//! amounts are drawn.
 //!
-//! There whoever acts only when something happens, or gets ready to happen, loses nothing. Take any way to
-//! act, and keep the order of all that happens, but let each thing come as early as the order allows, where
-//! an action may last longer than it has to. What is after something that happens at a known time is not before
-//! that time; what is before it stays before. So everything comes at a time at which something
-//! happens by itself, or some action has lasted as long as it has to; nothing comes later than
-//! it did, and whoever decides knows as much as before.
+//! In such a world, an agent loses nothing if it acts only when something happens or becomes ready
+//! to happen. Take any policy, keep the order of its happenings, and let each happening come as
+//! early as this order allows, where actions may last longer than their durations. Happenings after
+//! an event at a known time stay after that time; happenings before it stay before. So each
+//! happening comes at the time of an event, or when the duration of some action is over. No
+//! happening is later than before, and the agent has the same knowledge at each decision.
 //!
-//! So the bound from above has a state only where something gets ready, and an action that is ready may end there
-//! or at any later such time. The bound from below acts when something has happened, and nothing lasts longer
-//! there. Cells are as long as all known times divide; between two states there may be any number of them.
-//! From above they may be longer: what begins in a cell and takes n whole cells and something is ready n cells later,
-//! which is no later than it is, and may end at any time from then on. There are far fewer states then.
+//! Therefore the upper bound has states only when something becomes ready, and an action that is
+//! ready may end then or at any later such time. In the lower bound, the agent acts after
+//! happenings, and actions end on time. All known times are multiples of the length of a cell;
+//! there may be any number of cells between two states. In the upper bound, cells may be longer: an
+//! action that starts in a cell and takes between n and n + 1 cells is ready n cells later, which
+//! is no later than in reality, and may end at any time from then on. This needs far fewer states.
 
 mod search;
 mod stretched;
@@ -31,8 +32,8 @@ use super::world::{Facts, TimedWorld};
 pub(super) use search::{Effort, Keeping, bounds};
 pub(super) use stretched::{Alike, Reasons};
 
-/// How many cells there are if all known times are whole numbers of cells; `None` if something may
-/// happen at any time, or if that takes too many.
+/// Returns the number of cells such that all known times are multiples of a cell; `None` if
+/// something may happen at any time, or if there are too many cells.
 pub(super) fn cells(world: &TimedWorld) -> Option<usize> {
     let resolution = world.model.resolution.to_f64();
     let whole = |time: f64| {
@@ -82,7 +83,8 @@ fn gcd(one: u64, other: u64) -> u64 {
 }
 
 impl Chances {
-    /// The first cell from that one on in which something may happen, or get ready to.
+    /// Returns the first cell from `cell` on with a possible happening, or with an end that becomes
+    /// ready.
     pub(super) fn next(&self, state: &State, cell: usize) -> Option<usize> {
         let ends = state.running.iter().filter_map(|running| {
             let age = cell - usize::from(running.since);
@@ -102,8 +104,8 @@ impl Chances {
         ends.chain(events).min().filter(|next| *next < self.cells)
     }
 
-    /// Whether the goal can be reached in time from a state at the beginning of a cell, as far as that is
-    /// [easily seen](Self::soonest).
+    /// Returns `true` if the goal may be reachable in time from a state at the beginning of a cell,
+    /// by the relaxation of [`soonest`](Self::soonest).
     pub(super) fn is_in_time(
         &self,
         world: &TimedWorld,
@@ -114,9 +116,9 @@ impl Chances {
         self.soonest(world, state, cell, side).is_some()
     }
 
-    /// The first cell at whose beginning the goal may hold, from a state at the beginning of one, if nothing is made
-    /// false but by what happens for certain, and is never made true again; `None` if it is
-    /// never.
+    /// Returns the first cell at whose beginning the goal may hold, from a state at the beginning
+    /// of `cell`, in a relaxation: facts become false only by certain events, and only if they
+    /// never become true again. `None` if the goal is unreachable.
     pub(super) fn soonest(
         &self,
         world: &TimedWorld,
@@ -124,7 +126,8 @@ impl Chances {
         cell: usize,
         side: Side,
     ) -> Option<usize> {
-        // What ends in a cell is over at its beginning, seen from above, and at its end, seen from below.
+        // An end in a cell takes effect at the cell's beginning in the upper bound, and at its end
+        // in the lower bound.
         let wait = usize::from(side == Side::Below);
         let mut now = cell;
         let mut facts = state.may_hold(world);
@@ -154,7 +157,7 @@ impl Chances {
             }
         }
         loop {
-            // All that can be done by now.
+            // Apply everything that is possible by now.
             loop {
                 let before = (facts, started);
                 coming.retain(|(ready, what)| match what {
@@ -200,7 +203,7 @@ impl Chances {
                     break;
                 }
             }
-            // What happens last at this time.
+            // Deletions come last at this time.
             let mut lost: Facts = 0;
             coming.retain(|(ready, what)| match what {
                 Coming::Event(event) if *ready <= now => {
@@ -216,7 +219,7 @@ impl Chances {
     }
 }
 
-/// What will come about.
+/// A future happening.
 #[derive(Clone, Copy, Debug)]
 enum Coming {
     End(usize),

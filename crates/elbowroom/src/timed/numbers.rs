@@ -1,8 +1,8 @@
-//! Numbers that actions change: what is known of each is between which values it lies.
+//! Numbers that actions change, represented by intervals of their values.
 //!
-//! A condition that compares a number counts as one more fact. Seen from above it holds if some of the
-//! values meet it, seen from below if all do. What is drawn at an action's end is cut where that decides a
-//! condition ([`cuts`]).
+//! A condition that compares a number is an additional fact. In the upper bound it holds if some of
+//! the values satisfy it, in the lower bound if all do. Amounts drawn at an action's end are
+//! divided into intervals where they decide a condition ([`cuts`]).
 
 mod cuts;
 
@@ -15,13 +15,13 @@ use super::act::Snap;
 use super::world::Facts;
 use super::{Side, TimedWorld};
 
-/// Numbers are counted in millionths.
+/// Units per 1: numbers are stored in millionths.
 const UNIT: i64 = 1_000_000;
 
-/// Beyond this, in millionths, a number counts as infinite.
+/// Bound, in millionths, beyond which a number counts as infinite.
 const FAR: i64 = 1 << 60;
 
-/// The values between which a number lies, both included, in millionths.
+/// A closed interval of values, in millionths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct Span {
     pub(super) low: i64,
@@ -33,22 +33,22 @@ pub(crate) struct Span {
 pub(crate) struct Number {
     pub(super) fluent: FluentId,
     pub(super) initial: Span,
-    /// Values of which each is told from those above it, in order.
+    /// Values that are distinguished from larger ones, in order.
     edges: Vec<i64>,
-    /// Values from which nothing but known amounts lead to those that are known.
+    /// Values that are represented exactly: only constant amounts lead to them.
     known: Vec<i64>,
 }
 
-/// A comparison, which is a fact.
+/// A comparison, represented as a fact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Test {
     pub(super) number: usize,
     pub(super) comparison: Compared,
-    /// In millionths.
+    /// The bound in millionths.
     pub(super) bound: i64,
 }
 
-/// How a number compares with a bound.
+/// Comparison of a number with a bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Compared {
     AtMost,
@@ -57,7 +57,7 @@ pub(super) enum Compared {
     Unequal,
 }
 
-/// What a happening does to a number.
+/// Change of a number by a happening.
 #[derive(Clone, Debug)]
 pub(crate) struct Amount {
     pub(super) number: usize,
@@ -65,27 +65,27 @@ pub(crate) struct Amount {
     pub(super) by: By,
 }
 
-/// In which way a number changes.
+/// The operator of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Changed {
-    /// It becomes that.
+    /// The value is assigned.
     Set,
-    /// So much is added.
+    /// The value is added.
     Added,
-    /// So much is taken away.
+    /// The value is subtracted.
     Taken,
 }
 
-/// By how much a number changes.
+/// The value of a change.
 #[derive(Clone, Debug)]
 pub(super) enum By {
-    /// In millionths.
+    /// A constant, in millionths.
     Known(i64),
-    /// A value that is drawn for one that is planned.
+    /// A random value, drawn by a rule for a planned one.
     Drawn { rule: Rule, planned: f64 },
 }
 
-/// A number in millionths, if it is a whole number of them.
+/// Returns a number in millionths, if it is a whole number of them.
 pub(super) fn units(value: &Rational) -> Option<i64> {
     let (whole, one) = (value * &Rational::from(UNIT)).as_small()?;
     (one == 1 && whole.abs() < FAR).then_some(whole)
@@ -99,7 +99,8 @@ impl Span {
         }
     }
 
-    /// A value that may lie between two whole numbers of millionths.
+    /// Returns the smallest interval around a value that may lie between two whole numbers of
+    /// millionths.
     fn around(value: &Rational) -> Option<Self> {
         let all = value * &Rational::from(UNIT);
         let (low, _) = all.floor().as_small()?;
@@ -122,7 +123,7 @@ impl Span {
     }
 }
 
-/// The sum of two lower or two upper ends; what is beyond is infinite.
+/// Adds two lower or two upper ends; values beyond [`FAR`] are infinite.
 fn sum(left: i64, right: i64) -> i64 {
     if left.abs() >= FAR {
         left
@@ -132,10 +133,10 @@ fn sum(left: i64, right: i64) -> i64 {
 }
 
 impl Test {
-    /// The comparison of a number with a bound in millionths, which are whole numbers.
+    /// Creates a comparison with a bound in millionths.
     pub(super) fn new(number: usize, comparison: Comparison, bound: i64) -> Self {
         let (comparison, bound) = match comparison {
-            // What is counted in millionths is below a bound if it is at most a millionth less.
+            // In whole millionths, a value is below a bound if it is at most the bound minus 1.
             Comparison::Less => (Compared::AtMost, bound - 1),
             Comparison::AtMost => (Compared::AtMost, bound),
             Comparison::Equal => (Compared::Equal, bound),
@@ -149,7 +150,7 @@ impl Test {
         }
     }
 
-    /// The comparison that holds where this one does not.
+    /// Returns the complementary comparison.
     pub(super) fn negated(self) -> Self {
         let (comparison, bound) = match self.comparison {
             Compared::AtMost => (Compared::AtLeast, self.bound + 1),
@@ -164,7 +165,7 @@ impl Test {
         }
     }
 
-    /// Whether it holds for some of the values (from above), or for all (from below).
+    /// Returns `true` if it holds for some of the values (above), or for all (below).
     fn holds(self, span: Span, side: Side) -> bool {
         let bound = self.bound;
         match side {
@@ -178,7 +179,7 @@ impl Test {
         }
     }
 
-    /// The values after which it changes.
+    /// Returns the values after which its truth changes.
     fn edges(self) -> Vec<i64> {
         match self.comparison {
             Compared::AtMost => vec![self.bound],
@@ -198,8 +199,8 @@ impl Number {
         }
     }
 
-    /// All values that need not be told from some of these. A single one stays what it is where it is
-    /// known how one comes to it.
+    /// Widens an interval to all values that need not be distinguished from it. A single value that
+    /// is represented exactly stays.
     fn widened(&self, span: Span) -> Span {
         if span.low == span.high && self.known.binary_search(&span.low).is_ok() {
             return span;
@@ -216,12 +217,12 @@ impl Number {
 }
 
 impl Amount {
-    /// The place of the number.
+    /// Returns the position of the number.
     pub(super) fn number(&self) -> usize {
         self.number
     }
 
-    /// Whether that comparison may hold because of it, where it does not.
+    /// Returns `true` if the change may make a false comparison true.
     pub(super) fn may_help(&self, test: &Test) -> bool {
         let rises = match (self.change, &self.by) {
             (Changed::Set, _) | (_, By::Drawn { .. }) => None,
@@ -236,7 +237,7 @@ impl Amount {
         self.number == test.number && (rises.is_none() || wanted.is_none() || rises == wanted)
     }
 
-    /// Whether the number becomes that, whatever it was.
+    /// Returns `true` if it assigns the number.
     pub(super) fn sets(&self) -> bool {
         self.change == Changed::Set
     }
@@ -256,7 +257,7 @@ impl Amount {
 }
 
 impl TimedWorld {
-    /// Facts, with the comparisons that hold for numbers as this side sees them.
+    /// Returns the facts together with the comparisons that hold for the numbers, for this side.
     pub(super) fn with_tests(&self, facts: Facts, numbers: &[Span], side: Side) -> Facts {
         let tests = self.tests.iter().enumerate();
         let holding = tests.filter(|(_, test)| test.holds(numbers[test.number], side));
@@ -266,7 +267,7 @@ impl TimedWorld {
         })
     }
 
-    /// Numbers after a happening, if that is what is drawn.
+    /// Applies the changes of a happening to numbers, with the given draw.
     pub(super) fn changed(&self, numbers: &mut [Span], snap: &Snap, draw: usize) {
         for (amount, by) in snap.amounts.iter().zip(&snap.draws[draw].1) {
             let number = amount.number;
@@ -274,7 +275,8 @@ impl TimedWorld {
         }
     }
 
-    /// The spans in which numbers with these values may lie in a state, the most exact first.
+    /// Returns the possible intervals of numbers with these values in a state, the most exact
+    /// first.
     pub(super) fn spans_of(&self, values: &[Rational]) -> Option<Vec<Vec<Span>>> {
         let mut all = vec![Vec::new()];
         for (number, value) in self.numbers.iter().zip(values) {

@@ -1,4 +1,4 @@
-//! The policy that reaches the bound from below: [`Policy`].
+//! The policy that attains the lower bound: [`Policy`].
 
 use std::collections::BTreeMap;
 
@@ -19,49 +19,49 @@ use super::{
     Grid, NotTabulated, QUICK_SHARE, Settings, Side, TimedOptimum, grid, moments, refined,
 };
 
-/// The values of all states on the grid of the bound from below, by which each move can be weighed.
+/// Table of the values of all states on the grid of the lower bound, for evaluating each move.
 ///
-/// Whoever always makes the move of most worth at the boundaries of cells succeeds at least with
-/// the probability [`TimedOptimum::lower`], but for the ten-thousandth that it gives at most for
-/// being earlier, and for the ε that happenings are kept apart.
+/// An agent that always makes the most valuable move at the boundaries of cells succeeds with a
+/// probability of at least [`TimedOptimum::lower`], except for the ten-thousandth that is traded
+/// for being earlier, and for the separation of happenings by ε.
 #[derive(Debug)]
 pub struct Policy {
     world: TimedWorld,
     chances: Chances,
     step: Rational,
-    /// By cell: what its states are worth.
+    /// The values of states, by cell.
     values: BTreeMap<u32, IndexMap<State, f64>>,
     manner: Manner,
     tolls: Tolls,
     optimum: TimedOptimum,
 }
 
-/// How far from 1 the bound within the actions of a plan may be for nothing better to be looked for.
+/// Distance from 1 within which the bound of a plan's actions is good enough to end the search.
 const SURE: f64 = 0.005;
 
-/// How far apart the bounds may be for the policy to be as good as the best within what counts.
+/// Difference of the bounds within which the policy counts as optimal.
 const CLOSE: f64 = 0.02;
 
-/// How much of a probability is given at most for being earlier.
+/// Maximum probability that the policy trades for being earlier.
 const HASTE: f64 = 1e-4;
 
-/// How many times the states of a grid one of half as long cells has, where nothing else is known: what
-/// is under way may have begun in twice as many cells, in each of twice as many.
+/// Default growth of the number of states when cells are halved: twice as many cells, with twice as
+/// many possible start cells of running actions.
 const GROWTH: f64 = 4.0;
 
-/// Of the states that there may be, the first grid may have one in so many. It hardly ever is the last,
-/// and to find that one does not get far takes the longer the more states it has.
+/// Divisor of the maximum number of states for the first grid. The first grid is rarely the last,
+/// and detecting that refinement is hopeless takes longer with more states.
 const FIRST_SHARE: usize = 32;
 
-/// How long one of so many cells is.
+/// Returns the exact length of a cell.
 fn exact_step(world: &TimedWorld, cells: usize) -> Rational {
-    // The horizon is a number that somebody wrote, or a multiple of the resolution.
+    // The horizon is a number in a file, or a multiple of the resolution.
     let horizon = Rational::from_f64_as_written(world.horizon).unwrap_or_default();
     horizon / Rational::from(i64::try_from(cells).unwrap_or(i64::MAX))
 }
 
-/// Whether the bounds may get close before there are too many states, if each further grid halves what
-/// is between them, and has as many times the states of the one before as the last one has.
+/// Extrapolates whether the bounds become close before there are too many states: each further grid
+/// halves their difference, and multiplies the number of states as the last one did.
 fn may_get_close(grids: &[Grid], most_states: usize) -> bool {
     #[allow(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
     let states = |grid: &Grid| grid.states.max(1) as f64;
@@ -81,11 +81,11 @@ fn may_get_close(grids: &[Grid], most_states: usize) -> bool {
 }
 
 impl Policy {
-    /// The policy on the finest grid that [`optimum`](super::optimum) finishes; `None` if that is none, or
-    /// `goes_on` says so.
+    /// Computes the policy on the finest grid that [`optimum`](super::optimum) finishes; `None` if
+    /// there is none, or if `goes_on` returns `false`.
     ///
     /// # Errors
-    /// When there is something in the task or in the world that the process does not know.
+    /// When the task or the world has a feature that the process does not support.
     pub fn new(
         task: &Task,
         model: &WorldModel,
@@ -103,13 +103,14 @@ impl Policy {
         Self::on_finest(world, optimum, settings, goes_on)
     }
 
-    /// The same, where the bounds are at most two points apart: close enough to go by the policy, which
-    /// on a coarse grid loses much that others do not, because it decides only at the boundaries of
-    /// cells. It gives up early where finer grids will hardly bring the bounds so close.
+    /// Computes the policy if the bounds are at most two percentage points apart. On a coarse grid,
+    /// a policy loses much compared with other executors, because it decides only at the boundaries
+    /// of cells. The computation stops early if finer grids are unlikely to bring the bounds this
+    /// close.
     ///
-    /// Where whoever does nothing but the actions of one of the [plans](Settings::plans) nearly always
-    /// succeeds, the policy is that one's: in half a point of certainty before anything else is looked
-    /// at, in two points where the whole process is too large.
+    /// If an agent that uses only the actions of one of the [plans](Settings::plans) almost always
+    /// succeeds, its policy is used: if it fails in at most half a percent before the whole process
+    /// is examined, or in at most two percent if the whole process is too large.
     ///
     /// # Errors
     /// As for [`new`](Self::new).
@@ -140,7 +141,7 @@ impl Policy {
         whole
     }
 
-    /// The policy where everything happens at known times, if the bounds get close.
+    /// Computes the policy for worlds with known times, if the bounds are close.
     fn by_moments(
         world: &TimedWorld,
         settings: &Settings,
@@ -166,7 +167,7 @@ impl Policy {
         Ok(Self::of(world, chances, optimum, step, acts).filled(settings, goes_on))
     }
 
-    /// The policy in the whole process, if the bounds get close.
+    /// Computes the policy in the whole process, if the bounds become close.
     fn close_in(
         world: TimedWorld,
         settings: &Settings,
@@ -193,8 +194,8 @@ impl Policy {
         Self::on_finest(world, optimum, settings, goes_on)
     }
 
-    /// The policy of whoever keeps to a plan's actions and acts when something has happened, where that
-    /// one's bound is best.
+    /// Computes the policy of the best agent that uses only a plan's actions and acts after
+    /// happenings.
     fn within(
         search: Search,
         settings: &Settings,
@@ -236,7 +237,7 @@ impl Policy {
         )
     }
 
-    /// Without its values yet.
+    /// Creates the policy without its values.
     fn of(
         world: TimedWorld,
         chances: Chances,
@@ -271,13 +272,12 @@ impl Policy {
         Some(self)
     }
 
-    /// The bounds between which the best of all executors lies, and the grids that were tried for
-    /// them.
+    /// Returns the bounds on the best value, and the grids that were examined.
     pub fn optimum(&self) -> &TimedOptimum {
         &self.optimum
     }
 
-    /// What each move is worth in a state at the beginning of a cell.
+    /// Returns the moves in a state at the beginning of a cell, with their values.
     fn values(&self, cell: usize, state: &State) -> Vec<(Move, f64)> {
         let world = &self.world;
         let mut hopes = Hopes::new();
@@ -299,7 +299,7 @@ impl Policy {
         bound.moves(state).into_iter().zip(worths).collect()
     }
 
-    /// What a state is worth at the beginning of a cell; one that nobody reckoned with, nothing.
+    /// Returns the value of a state at the beginning of a cell; 0 if the table does not contain it.
     fn value(&self, cell: u32, state: &State) -> f64 {
         let table = self.values.get(&cell);
         table
@@ -308,7 +308,7 @@ impl Policy {
             .unwrap_or(0.0)
     }
 
-    /// The state that someone stands in, if those events have happened.
+    /// Converts the situation of an executor to a state with the past events `happened`.
     fn state(
         &self,
         standing: &Standing<'_>,
@@ -342,7 +342,7 @@ impl Policy {
         }
     }
 
-    /// The spans in which the numbers may lie; `None` if one has no value.
+    /// Returns the possible intervals of the numbers; `None` if a number has no value.
     fn spans(&self, standing: &Standing<'_>) -> Option<Vec<Vec<Span>>> {
         let numbers = self.world.numbers.iter();
         let values = numbers.map(|number| standing.belief.value(number.fluent).cloned());
@@ -350,7 +350,7 @@ impl Policy {
         self.world.spans_of(&values)
     }
 
-    /// The events that have happened for certain, or as the changes that were seen tell.
+    /// Returns the events that are over for certain, or according to the observed changes.
     fn happened(&self, standing: &Standing<'_>) -> u32 {
         let now =
             (&self.step * &Rational::from(i64::try_from(standing.period).unwrap_or(0))).to_f64();
@@ -382,8 +382,8 @@ impl Policy {
         happened
     }
 
-    /// Makes actions that should be over by now count as started later, as late as it takes for
-    /// them to be under way still. Whether there were any.
+    /// Moves the starts of overdue actions to later times, just late enough that they can still be
+    /// running. Returns `true` if there are overdue actions.
     fn rejuvenate(&self, cell: usize, state: &mut State) -> bool {
         let mut is_overdue = false;
         for running in &mut state.running {
@@ -415,7 +415,7 @@ impl Outlook for Policy {
         if cell >= self.chances.cells {
             return None;
         }
-        // Of what is none of the plan's actions nothing is known.
+        // The table knows nothing about actions outside the plan.
         let knows = |name: &str| self.world.acts.iter().any(|act| act.name == name);
         if self.manner != Manner::Always && !standing.started.is_none_or(knows) {
             return None;
@@ -425,7 +425,7 @@ impl Outlook for Policy {
             all | (Facts::from(standing.belief.fact(*fact)) << place)
         });
         let happened = self.happened(standing);
-        // Something may have happened that has changed nothing, and so was not seen.
+        // An event without an effect on the present facts may have happened unobserved.
         let events = self.world.events.iter().enumerate();
         let silent = events.fold(0_u32, |all, (index, event)| {
             let changes_nothing = event.adds & !facts == 0 && event.deletes & facts == 0;
@@ -446,7 +446,7 @@ impl Outlook for Policy {
             }
             let is_overdue = self.rejuvenate(cell, &mut state);
             let mut values = self.values(cell, &state);
-            // The order of equals is that of the problem's actions.
+            // A stable sort: moves of equal value keep the order of the problem's actions.
             values.sort_by(|(_, a), (_, b)| b.total_cmp(a));
             if values.first().is_some_and(|(_, value)| *value > 0.0) {
                 let choice = |(choice, value)| (self.choice(&state, choice), value);
@@ -455,7 +455,7 @@ impl Outlook for Policy {
                     is_overdue,
                 });
             }
-            // Its end, a moment late, may be all that is missing.
+            // The state may only lack the end of the overdue action.
             if is_overdue {
                 overdue = Some(Weighed {
                     moves: Vec::new(),

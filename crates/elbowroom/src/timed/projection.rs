@@ -1,9 +1,9 @@
-//! A world of which some facts are left out, as if they were always as one would have them: whoever succeeds
-//! in the world itself does so in it, and it has fewer states.
+//! Projections of a world: facts are omitted as if they always had the best values. Every agent
+//! that succeeds in the world also succeeds in its projection, which has fewer states.
 //!
-//! What is left out is what comes for certain beside the quickest way to the goal: facts that have to hold at
-//! starts and ends only, and that nothing gives but starts, and ends without chances of actions that take nothing
-//! but such facts, as long as the goal is reached no sooner without them.
+//! Omitted are facts that can be made true for certain without a delay of the goal. Such a fact is
+//! read only by conditions at starts and ends. It is added only by starts, and by certain ends of
+//! actions that delete only such facts. Without it, the earliest time of the goal is the same.
 
 use super::Side;
 use super::act::{Act, Event};
@@ -12,11 +12,11 @@ use super::state::State;
 use super::world::{Facts, TimedWorld};
 
 impl TimedWorld {
-    /// The world without what comes for certain beside the quickest way to the goal; `None` if there is
-    /// nothing of the kind, or if fewer facts may be better.
+    /// Returns the projection without facts that can be made true for certain without a delay of
+    /// the goal. `None` if there are none, or if fewer facts may be better.
     ///
-    /// `chances` are those of this world, seen from above, on a grid on which everything happens at
-    /// [known times](super::moments).
+    /// `chances` are those of this world for the upper bound, on a grid with [known
+    /// times](super::moments).
     pub(super) fn without_certainties(&self, chances: &Chances) -> Option<Self> {
         if !self.is_monotone {
             return None;
@@ -44,7 +44,7 @@ impl TimedWorld {
         Some(leaner)
     }
 
-    /// The facts that come for certain, if somebody wants them to.
+    /// Returns the facts that an agent can make true for certain.
     fn certain(&self) -> Facts {
         let by_chance = |event: &Event| event.adds | event.deletes;
         let events = self
@@ -61,7 +61,7 @@ impl TimedWorld {
             {
                 certain &= !end.adds;
             }
-            // What has to last keeps actions apart that take it.
+            // Over-all conditions exclude actions that delete their facts.
             if let Some((over_all, _)) = &act.rest {
                 certain &= !over_all.mentions();
             }
@@ -79,8 +79,9 @@ impl TimedWorld {
         }
     }
 
-    /// The facts without which actions with chances cannot start, or others that lead to these: nobody has more
-    /// chances if they stay. When the goal is reached it is over.
+    /// Returns the facts in the start conditions of actions with random results, and of actions
+    /// that lead to these. Omitting them would allow more attempts. Actions that reach the goal are
+    /// ignored.
     fn leads_to_chances(&self) -> Facts {
         let mut leading: Facts = 0;
         loop {
@@ -97,7 +98,7 @@ impl TimedWorld {
         }
     }
 
-    /// The same world, in which these facts are always as one would have them.
+    /// Returns the world where these facts always have the best values.
     fn without_facts(&self, facts: Facts) -> Self {
         let mut leaner = self.clone();
         let snaps = leaner.acts.iter_mut().flat_map(|act| {

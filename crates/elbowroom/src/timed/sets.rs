@@ -1,4 +1,5 @@
-//! Sets of actions: what one needs of another before it can begin, and the worlds of those who keep to one.
+//! Sets of actions: the supporting actions that a set requires, and the worlds of agents restricted
+//! to a set.
 
 use elbowroom_model::Task;
 use elbowroom_sim::WorldModel;
@@ -7,11 +8,12 @@ use super::act::Act;
 use super::world::{Facts, TimedWorld};
 use super::{NotTabulated, Settings};
 
-/// Actions, and as few of others as make possible from the beginning what all of them together would, as far as that
-/// is easily seen: nothing is made false, and numbers are what it takes.
+/// Returns `actions` with as few of `others` as possible, such that all actions stay reachable from
+/// the initial state that are reachable with all `others`. Reachability is relaxed: no fact becomes
+/// false, and comparisons of numbers hold.
 ///
 /// # Errors
-/// When there is something in the task or in the world that the process does not know.
+/// When the task or the world has a feature that the process does not support.
 pub fn supported(
     task: &Task,
     model: &WorldModel,
@@ -40,7 +42,7 @@ pub fn supported(
 }
 
 impl TimedWorld {
-    /// The actions that are in one of these sets, as bits.
+    /// Returns the actions that are in one of these sets, as bits.
     pub(super) fn in_sets(&self, sets: &[Vec<String>]) -> u64 {
         let acts = self.acts.iter().enumerate();
         let is_asked_for = |act: &Act| sets.iter().flatten().any(|name| *name == act.name);
@@ -48,8 +50,9 @@ impl TimedWorld {
         asked_for.fold(0, |all, (index, _)| all | 1 << index)
     }
 
-    /// For each of some sets of actions, and once each: the world of these actions, and of those that are in none of the
-    /// sets and in none of `others`, as far as they are [detours](Self::with_detours).
+    /// Returns, for each distinct set, the world of its actions and of their
+    /// [detours](Self::with_detours). Detours are chosen among the actions that are neither in the
+    /// sets nor in `others`.
     pub(super) fn keeping_to(&self, sets: &[Vec<String>], others: &[Vec<String>]) -> Vec<Self> {
         let of_any = self.in_sets(sets) | self.in_sets(others);
         let mut own: Vec<u64> = Vec::new();
@@ -63,8 +66,8 @@ impl TimedWorld {
         kept.map(|own| self.with_detours(own, !of_any)).collect()
     }
 
-    /// The world of the `own` actions, and of those others that can start from what these make true, and make
-    /// true what these need.
+    /// Returns the world of the actions `own` and of their detours: the actions in `others` that
+    /// can start from facts that `own` actions add, and that add facts that `own` actions read.
     fn with_detours(&self, own: u64, others: u64) -> Self {
         let is_among = |acts: u64, index: usize| acts & (1 << index) != 0;
         let events = self.events.iter();
@@ -93,7 +96,8 @@ impl TimedWorld {
         keeping
     }
 
-    /// Those of these actions that may start if nothing is made false and numbers are what it takes.
+    /// Returns the given actions that are reachable if no fact becomes false and comparisons of
+    /// numbers hold.
     fn reachable(&self, names: &[String]) -> Vec<String> {
         let events = self.events.iter();
         let mut facts: Facts = events.fold(self.initial | self.tested, |facts, event| {

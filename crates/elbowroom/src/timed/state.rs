@@ -1,4 +1,4 @@
-//! What the process may be in: [`State`].
+//! States of the process: [`State`].
 
 use super::Side;
 use super::act::Snap;
@@ -10,33 +10,33 @@ use super::world::{Facts, TimedWorld};
 /// A state at the beginning of a cell.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct State {
-    /// With the comparisons that hold of the numbers.
+    /// The true facts, and the comparisons that hold.
     pub(super) facts: Facts,
     pub(super) numbers: Vec<Span>,
-    /// Whether nobody knows whether something has been broken off or has failed, because of a
-    /// number. Seen from below, that is given up.
+    /// `true` if it is undecided whether an action was aborted or has failed, because of an
+    /// interval of a number. Such a state counts as lost in the lower bound.
     pub(super) is_doubtful: bool,
-    /// Which events have happened, as bits; not those that happen again and again.
+    /// Past events, as bits, without recurrent ones.
     pub(super) happened: u32,
-    /// Sorted by action.
+    /// The running actions, sorted by action.
     pub(super) running: Vec<Running>,
-    /// Whether the agent may do something before anything more happens.
+    /// `true` if the agent may act before the next happening.
     pub(super) may_act: bool,
 }
 
-/// An action under way.
+/// A running action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct Running {
     pub(super) act: u8,
-    /// The cell in which it began.
+    /// The cell of its start.
     pub(super) since: u16,
     pub(super) phase: Phase,
 }
 
-/// What is known of an action's end.
+/// Knowledge about the end of a running action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Phase {
-    /// Nothing yet.
+    /// The end is unknown.
     Goes,
     /// It may end in this cell, or in the next one.
     Ready(Ending),
@@ -45,7 +45,7 @@ pub(super) enum Phase {
 }
 
 impl State {
-    /// The state before anything has been done, or has happened by itself.
+    /// Returns the initial state, before any move or event.
     pub(super) fn initial(world: &TimedWorld) -> Self {
         let numbers: Vec<Span> = world.numbers.iter().map(|number| number.initial).collect();
         Self {
@@ -75,7 +75,7 @@ impl State {
             .or_insert_with(|| world.is_hopeful(facts, set, happened))
     }
 
-    /// Actions whose condition over all no longer holds fail.
+    /// Aborts the actions whose over-all conditions no longer hold.
     pub(super) fn settle(&mut self, world: &TimedWorld) {
         let facts = self.facts;
         let may_hold = self.may_hold(world);
@@ -91,7 +91,7 @@ impl State {
         self.is_doubtful |= is_doubtful;
     }
 
-    /// The facts that hold for some of the values that numbers may have.
+    /// Returns the facts, and the comparisons that hold for some of the possible values of numbers.
     pub(super) fn may_hold(&self, world: &TimedWorld) -> Facts {
         if self.numbers.is_empty() {
             return self.facts;
@@ -99,7 +99,7 @@ impl State {
         world.with_tests(self.facts, &self.numbers, Side::Above)
     }
 
-    /// What a happening does, if that is what is drawn.
+    /// Applies the effects of a happening, with the given draw.
     fn apply(&mut self, world: &TimedWorld, snap: &Snap, draw: usize) {
         self.facts = snap.apply(self.facts);
         if !snap.amounts.is_empty() {
@@ -108,8 +108,8 @@ impl State {
         }
     }
 
-    /// An action starts, and is under way as that one, from that cell on, with what is known of its end; an
-    /// instantaneous one is over.
+    /// Returns the state after the start of an action. A durative action is then running as
+    /// `as_act`, since the cell `since`, with the given phase.
     pub(super) fn started(
         &self,
         world: &TimedWorld,
@@ -131,15 +131,15 @@ impl State {
         after
     }
 
-    /// Whether the goal is reached for good: it holds, and nothing is under way that nobody might be
-    /// able to let go, and that could spoil it.
+    /// Returns `true` if the goal is reached: it holds, and no action is running whose delayed
+    /// failure could still violate it.
     pub(super) fn is_won(&self, world: &TimedWorld) -> bool {
         let holds_up = |running: &Running| world.acts[usize::from(running.act)].may_hold_up();
         world.goal.hold(self.facts) && !self.is_doubtful && !self.running.iter().any(holds_up)
     }
 
-    /// The action at that place in the list ends, well or badly. It fails, too, if what its end
-    /// needs does not hold; then nothing is left behind or undone, nor is it where it breaks off.
+    /// Returns the state after the end of the running action at `place`. An end whose condition
+    /// does not hold fails without any effect, as does an aborted action.
     pub(super) fn ended(&self, world: &TimedWorld, place: usize, ending: Ending) -> Self {
         let mut after = self.clone();
         let running = after.running.remove(place);
@@ -158,7 +158,7 @@ impl State {
         after
     }
 
-    /// An event happens.
+    /// Returns the state after an event.
     pub(super) fn changed(&self, world: &TimedWorld, event: usize) -> Self {
         let mut after = self.clone();
         if !world.events[event].is_recurrent() {
@@ -169,8 +169,8 @@ impl State {
         after
     }
 
-    /// The actions that can start and may do any good; the only one that needs looking at, where
-    /// nothing is ever better than to start it at once.
+    /// Returns the useful actions that can start. If starting one of them at once is always
+    /// optimal, returns only this one.
     pub(super) fn startable(
         &self,
         world: &TimedWorld,
@@ -196,7 +196,8 @@ impl State {
         }
     }
 
-    /// Whether what an action needs over all does not hold right after its start: nobody starts it then.
+    /// Returns `true` if the over-all condition of an action fails right after its start, which
+    /// makes the start useless.
     fn breaks_off_at_once(&self, world: &TimedWorld, act: usize) -> bool {
         let act = &world.acts[act];
         let Some((over_all, _)) = &act.rest else {
@@ -210,7 +211,7 @@ impl State {
         !over_all.hold(after.facts)
     }
 
-    /// Whether the agent has nothing to think about but to start the first of these.
+    /// Returns `true` if the only startable action is optimal to start at once.
     pub(super) fn must_start(&self, world: &TimedWorld, startable: &[usize]) -> bool {
         matches!(startable, [only] if world.acts[*only].is_eager && {
             let facts = world.acts[*only].start.apply(self.facts);

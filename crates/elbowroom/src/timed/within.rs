@@ -1,11 +1,11 @@
-//! Bounds from below by agents that allow themselves less than they may.
+//! Lower bounds from restricted policies: only some actions, started or cancelled only after
+//! happenings.
 //!
-//! Whoever does nothing but certain actions, and begins or cancels something only when something has
-//! just happened, is one of all executors, so the best of all is at least as good. It also leaves
-//! nothing undone that breaks nothing off which is under way. The process of
-//! such an agent has far fewer states: of what is under way at the same time, most has begun at the
-//! same time. So its grids are fine where those of the whole process have too many states. Where the
-//! best nearly always reaches the goal, that is all that has to be known: 1 is a bound from above.
+//! Such an agent is one of all executors, so its success probability is a lower bound for the best.
+//! The agent also starts every action that aborts no running action. Its process has far fewer
+//! states, because most running actions have the same start time. So its grids can be fine where
+//! those of the whole process have too many states. If the bound is close to 1, no upper bound is
+//! needed.
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -17,45 +17,45 @@ use super::below::{Below, Manner};
 use super::chances::Chances;
 use super::{SLACK, Settings, Side, TimedWorld, graph};
 
-/// A bound from below, by whoever does nothing but certain actions, each when something has happened.
+/// A lower bound from a set of actions, each started after a happening.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Within {
-    /// It succeeds at least with this probability.
+    /// The lower bound.
     pub lower: f64,
-    /// The length of a cell of the grid that says so, in seconds.
+    /// The length of a cell of its grid, in seconds.
     pub step: f64,
-    /// How many states there were at the beginnings of cells.
+    /// Number of states at the beginnings of cells.
     pub states: usize,
     /// The actions, `(name object …)`.
     pub actions: Vec<String>,
 }
 
-/// Looks for bounds within several sets of actions.
+/// Search for bounds from several sets of actions.
 pub(super) struct Search {
     sets: Vec<Set>,
-    /// The best so far.
+    /// The best bound so far.
     pub(super) best: Option<Within>,
-    /// The number of its set, and its grid.
+    /// The position of its set, and its grid.
     best_on: Option<(usize, Fit)>,
 }
 
-/// A grid whose cells fit the times that are known.
+/// A grid whose cells fit known times.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
-    /// A time, in so many cells.
+    /// A cell is `time` divided by `parts`.
     time: f64,
     parts: f64,
-    /// How many cells there are.
+    /// Number of cells.
     pub(super) cells: usize,
 }
 
 impl Fit {
-    /// The length of a cell, in seconds.
+    /// Returns the length of a cell, in seconds.
     pub(super) fn step(&self) -> f64 {
         self.time / self.parts
     }
 
-    /// The same, exactly.
+    /// Returns the exact length of a cell, in seconds.
     pub(super) fn exact_step(&self) -> Option<Rational> {
         let time = Rational::from_f64_as_written(self.time)?;
         Some(time / Rational::from_f64_as_written(self.parts)?)
@@ -65,13 +65,13 @@ impl Fit {
 struct Set {
     world: TimedWorld,
     actions: Vec<String>,
-    /// How many cells the next grid is to have, about.
+    /// Approximate number of cells of the next grid.
     cells: usize,
 }
 
 impl Search {
-    /// Within each of the [plans](Settings::plans), and within all of them together. Runs end at
-    /// `horizon`, in seconds, if nothing else is known to end them.
+    /// Creates a search within each of the [plans](Settings::plans), and within all of them
+    /// together. Runs end at `horizon`, in seconds, unless the settings have another one.
     pub(super) fn new(
         task: &Task,
         model: &WorldModel,
@@ -120,19 +120,19 @@ impl Search {
         }
     }
 
-    /// The best, with the world of its actions and its grid.
+    /// Returns the best bound, with the world of its actions and its grid.
     pub(super) fn into_best(mut self) -> Option<(TimedWorld, Fit, Within)> {
         let (place, fit) = self.best_on?;
         Some((self.sets.swap_remove(place).world, fit, self.best?))
     }
 
-    /// The best value found, 0 if there is none.
+    /// Returns the best lower bound; 0 if there is none.
     pub(super) fn lower(&self) -> f64 {
         self.best.as_ref().map_or(0.0, |best| best.lower)
     }
 
-    /// Finer and finer grids, one of each set after the other, until the bound is close to `upper`, or
-    /// they have more states than `most_states`.
+    /// Refines the grids of all sets alternately, until the bound is close to `upper`, or the grids
+    /// have more than `most_states` states.
     pub(super) fn refine(
         &mut self,
         upper: f64,
@@ -161,7 +161,8 @@ impl Search {
 }
 
 impl Set {
-    /// The next grid; `None` if it has too many states, or nobody wants it.
+    /// Computes the bound on the next grid; `None` if it has too many states, or `goes_on` returns
+    /// `false`.
     fn next(&mut self, most_states: usize, goes_on: &dyn Fn() -> bool) -> Option<(Within, Fit)> {
         let fit = fitting(&self.world, self.cells, Side::Below)?;
         let step = fit.step();
@@ -181,13 +182,13 @@ impl Set {
     }
 }
 
-/// The grid of so many cells up to twice as many that fits the times that are known best.
+/// Returns the grid with `cells` to twice as many cells that fits known times best.
 ///
-/// Seen from below, whoever acts at the boundaries of cells loses what is missing to a whole number of them for each
-/// such time, a duration or a deadline. It may end before the horizon: that is a loss, too. Seen from above, what
-/// durations are more than a whole number of cells is given away.
+/// In the lower bound, each duration or deadline that is not a whole number of cells causes a loss,
+/// because the agent acts only at boundaries; so does a grid that ends before the horizon. In the
+/// upper bound, durations are rounded down to whole numbers of cells.
 pub(super) fn fitting(world: &TimedWorld, cells: usize, side: Side) -> Option<Fit> {
-    // Later times do not matter, however many cells fit into them.
+    // Times after the horizon are irrelevant.
     let is_within = |time: &f64| *time <= world.horizon;
     let lasting = world.acts.iter().filter_map(|act| constant(world, act));
     let lasting: Vec<f64> = lasting.filter(is_within).collect();
@@ -235,7 +236,7 @@ pub(super) fn fitting(world: &TimedWorld, cells: usize, side: Side) -> Option<Fi
     Some(Fit { time, parts, cells })
 }
 
-/// How long an action takes, if that is known.
+/// Returns the duration of an action, if it is constant.
 pub(super) fn constant(world: &TimedWorld, act: &super::act::Act) -> Option<f64> {
     act.rest.as_ref()?;
     let planned = act.planned.to_f64();

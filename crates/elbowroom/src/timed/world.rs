@@ -11,41 +11,41 @@ use super::failures::Ending;
 use super::numbers::{Number, Span, Test};
 use super::{NotTabulated, Settings, Side as Bounding};
 
-/// Which facts are true.
+/// A set of true facts.
 pub(crate) type Facts = u128;
 
 /// See [`timed`](super).
 #[derive(Clone, Debug)]
 pub(crate) struct TimedWorld {
     pub(crate) model: WorldModel,
-    /// The facts that matter; the place of each is its bit.
+    /// The relevant facts; the position of each is its bit.
     pub(crate) facts: Vec<FactId>,
     pub(crate) numbers: Vec<Number>,
     /// Comparisons of numbers; their bits come after those of the facts.
     pub(super) tests: Vec<Test>,
-    /// Their bits.
+    /// The bits of all comparisons.
     pub(super) tested: Facts,
-    /// From which side comparisons are seen that may or may not hold.
+    /// The side of the bound, which decides on comparisons that hold for some values only.
     side: Bounding,
     pub(crate) acts: Vec<Act>,
     pub(crate) events: Vec<Event>,
     pub(crate) initial: Facts,
     pub(crate) goal: Needs,
-    /// Whether more facts are never worse: no condition asks for something to be false.
+    /// `true` if more facts are never worse: no condition requires a fact to be false.
     pub(crate) is_monotone: bool,
-    /// The facts that something may make false.
+    /// The facts that an action or event may make false.
     deletable: Facts,
-    /// The facts that something may make true.
+    /// The facts that an action or event may make true.
     addable: Facts,
-    /// In seconds.
+    /// The latest end of a run, in seconds.
     pub(crate) horizon: f64,
 }
 
-/// The most actions and events: they are bits of numbers.
+/// Maximum number of actions and events, which are bits.
 const MOST_ACTS: usize = 64;
 const MOST_EVENTS: usize = 32;
 
-/// The most facts, and comparisons of numbers, which count as facts.
+/// Maximum number of facts and comparisons of numbers together.
 const MOST_FACTS: usize = 128;
 
 impl TimedWorld {
@@ -125,7 +125,7 @@ impl TimedWorld {
         Ok(world)
     }
 
-    /// Enters which comparisons may come to hold by what happenings do to numbers.
+    /// Computes the comparisons that each happening may make true.
     fn see_what_helps(&mut self) {
         let first = self.facts.len();
         for act in &mut self.acts {
@@ -139,7 +139,7 @@ impl TimedWorld {
         }
     }
 
-    /// Enters what follows from the actions and events that there are.
+    /// Computes the data that depends on the set of actions and events.
     pub(super) fn see_what_changes(&mut self) {
         let acts = &self.acts;
         let events = &self.events;
@@ -151,8 +151,8 @@ impl TimedWorld {
             for act in &mut self.acts {
                 act.may_be_cancelled =
                     act.may_gain_by_cancelling(&self.model) || act.is_about_numbers(self.tested);
-                // It takes nothing away, and what it gives stays. Whoever starts it later could as
-                // well have it over earlier.
+                // It deletes nothing, and its added facts stay true. So an earlier start is never
+                // worse.
                 act.is_eager = act.ends_safely()
                     && !act.is_about_numbers(self.tested)
                     && !act.may_hold_up()
@@ -162,10 +162,10 @@ impl TimedWorld {
         }
     }
 
-    /// Whether the goal can be reached if deletions do nothing, from these facts, with what may
-    /// still come about by itself and by what is under way.
+    /// Returns `true` if the goal is reachable from these facts in the delete relaxation, with the
+    /// remaining events and the running actions.
     pub(super) fn is_hopeful(&self, facts: Facts, under_way: u64, happened: u32) -> bool {
-        // Numbers are what it takes.
+        // All comparisons of numbers are assumed to hold.
         let mut facts = facts | self.tested;
         for (index, event) in self.events.iter().enumerate() {
             if happened & (1 << index) == 0 {
@@ -203,8 +203,8 @@ impl TimedWorld {
 }
 
 impl TimedWorld {
-    /// Whether it may do any good to do this: not if more facts are never worse, and all that it
-    /// makes true is true and stays so.
+    /// Returns `true` if an action may be useful. In a monotone world, it is useless if all facts
+    /// that it adds are true and stay true.
     pub(super) fn is_useful(&self, act: usize, facts: Facts) -> bool {
         let adds = self.acts[act].adds();
         !self.is_monotone
@@ -213,7 +213,7 @@ impl TimedWorld {
             || self.acts[act].changes_numbers()
     }
 
-    /// The same world, as a bound from that side sees comparisons that may or may not hold.
+    /// Returns the same world for a bound of this side.
     pub(super) fn seen_from(&self, side: Bounding) -> Self {
         Self {
             side,
@@ -221,7 +221,8 @@ impl TimedWorld {
         }
     }
 
-    /// The same world, in which no action is broken off because of a number.
+    /// Returns the same world without numeric over-all conditions, so that no action is aborted
+    /// because of a number.
     pub(super) fn without_numbers_over_all(&self) -> Result<Self, NotTabulated> {
         let mut kinder = self.clone();
         for act in &mut kinder.acts {
@@ -234,12 +235,12 @@ impl TimedWorld {
         Ok(kinder)
     }
 
-    /// Facts, with the comparisons that hold of numbers.
+    /// Returns the facts together with the comparisons that hold for the numbers.
     pub(super) fn tested(&self, facts: Facts, numbers: &[Span]) -> Facts {
         self.with_tests(facts, numbers, self.side)
     }
 
-    /// What an event makes false for certain, and nothing makes true.
+    /// Returns the facts that a certain event deletes and that never become true again.
     pub(super) fn lost_for_good(&self, event: usize) -> Facts {
         let event = &self.events[event];
         match event.occurs {
@@ -248,21 +249,22 @@ impl TimedWorld {
         }
     }
 
-    /// Whether an event is best over at once: more facts are never worse, and what it gives nothing
-    /// takes away. What can be taken away is better given after that.
+    /// Returns `true` if an event is best applied at once: the world is monotone, and the event
+    /// only adds facts that stay true. If a fact can be deleted, a later addition may be better.
     pub(super) fn is_best_at_once(&self, event: usize) -> bool {
         let event = &self.events[event];
         self.is_monotone && event.deletes == 0 && event.adds & self.deletable == 0
     }
 
-    /// Whether an event is best over last: more facts are never worse, and what it takes away
-    /// nothing gives back. What can be given back is better taken before that.
+    /// Returns `true` if an event is best applied last: the world is monotone, and the event only
+    /// deletes facts that stay false. If a fact can be added again, an earlier deletion may be
+    /// better.
     pub(super) fn is_best_last(&self, event: usize) -> bool {
         let event = &self.events[event];
         self.is_monotone && event.adds == 0 && event.deletes & self.addable == 0
     }
 
-    /// Whether an action that is about to end, well or badly, had best do so at once.
+    /// Returns `true` if the pending end of an action is best applied at once.
     pub(super) fn ends_best_at_once(&self, act: usize, ending: Ending, facts: Facts) -> bool {
         let act = &self.acts[act];
         let Some((_, end)) = &act.rest else {
@@ -278,8 +280,9 @@ impl TimedWorld {
         self.is_monotone && does_no_harm && gives & self.deletable == 0
     }
 
-    /// Whether there can be something in cancelling an action for who may do so at any moment:
-    /// besides what [`Act::may_be_cancelled`] says, what its end gives may be better given later.
+    /// Returns `true` if cancelling an action may be useful for an agent that can do so at any
+    /// time: by [`Act::may_be_cancelled`], or because a later end may be better for facts that can
+    /// be deleted.
     pub(super) fn may_gain_by_cancelling(&self, act: usize) -> bool {
         let act = &self.acts[act];
         let gives = act.rest.as_ref().map_or(0, |(_, end)| end.adds);
@@ -287,7 +290,7 @@ impl TimedWorld {
     }
 }
 
-/// When all that happens at most once has happened, if it ever does.
+/// Returns a time after all events that happen at most once.
 fn latest(events: &[Event], model: &WorldModel) -> Result<f64, NotTabulated> {
     let mut latest: f64 = 0.0;
     for event in events {
@@ -316,7 +319,7 @@ fn latest(events: &[Event], model: &WorldModel) -> Result<f64, NotTabulated> {
                 late = middle;
             }
         }
-        // Up to the resolution, so that boundaries of cells are round numbers.
+        // Rounded up to the resolution, so that boundaries of cells are round numbers.
         let resolution = model.resolution.to_f64();
         latest = latest.max((late / resolution - 1e-6).ceil() * resolution);
     }
@@ -324,12 +327,13 @@ fn latest(events: &[Event], model: &WorldModel) -> Result<f64, NotTabulated> {
 }
 
 impl TimedWorld {
-    /// When a run ends at the latest: when it is asked to, or when nothing more happens by itself.
+    /// Returns the latest end of a run: the given horizon, or the time of the last event.
     ///
-    /// Where facts change at a rate that is never, unless all hope is gone with the last of what
-    /// happens once. So there it is a time after which little is left to happen. Both bounds hold
-    /// whatever it is: who has not reached the goal by then counts as lost from below, and as
-    /// somebody who may yet reach it from above.
+    /// If facts change at a rate, there is no last event, unless the goal becomes unreachable after
+    /// the last single event. Then the horizon is a time after which little is likely to happen.
+    /// Both bounds hold for any horizon: a run that has not reached the goal by then counts as
+    /// failed in the lower bound, and as successful in the upper bound if the goal is still
+    /// reachable.
     fn end_of_runs(&self, settings: &Settings) -> Result<f64, NotTabulated> {
         if let Some(horizon) = &settings.horizon {
             return Ok(horizon.to_f64());
@@ -352,7 +356,7 @@ impl TimedWorld {
         Ok(self.horizon)
     }
 
-    /// Whether there may be hope when all that happens at most once has happened.
+    /// Returns `true` if the goal may be reachable after all events that happen at most once.
     fn may_go_on(&self) -> bool {
         let mut gone = 0;
         for event in &self.events {

@@ -1,4 +1,4 @@
-//! When a plan reaches each part of the goal.
+//! Times at which a plan reaches the parts of the goal.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,25 +11,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::answers::exact;
 
-/// A part of the goal, and when the plan reaches it.
+/// A part of the goal, and the time at which the plan reaches it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GoalReached {
-    /// The condition, as PDDL writes it.
+    /// The condition, in PDDL.
     pub goal: String,
-    /// The first time at which it holds: 0 if it does so at the beginning.
+    /// The first time at which it holds; 0 if it holds initially.
     #[serde(with = "exact")]
     pub time: Rational,
 }
 
-/// What happens at a time: which steps start, and which end.
+/// The steps that end and start at one time.
 #[derive(Default)]
 struct Group {
     ends: Vec<usize>,
     starts: Vec<usize>,
 }
 
-/// The parts of the goal in the order in which a valid plan reaches them. Parts that are never seen to
-/// hold at a happening are left out: there are none but those that hold by time alone, after it.
+/// Returns the parts of the goal, by the time at which a valid plan reaches them. Parts that do not
+/// hold right after any happening are omitted: their truth depends on time alone.
 pub(super) fn reached(task: &Task, plan: &TimeTriggeredPlan) -> Vec<GoalReached> {
     let mut groups: BTreeMap<Rational, Group> = BTreeMap::new();
     for (index, step) in plan.steps.iter().enumerate() {
@@ -47,7 +47,7 @@ pub(super) fn reached(task: &Task, plan: &TimeTriggeredPlan) -> Vec<GoalReached>
     let mut state = Progression::new(Arc::new(task.clone()));
     note(task, &state, &Rational::ZERO, &mut open, &mut reached);
     for (time, group) in &groups {
-        // The judge has accepted the plan: what cannot be computed here is no part of why.
+        // The validator has accepted the plan, so errors here do not matter.
         let _ = state.arrive(time);
         for index in &group.ends {
             let _ = state.end(ticket(*index), &[]);

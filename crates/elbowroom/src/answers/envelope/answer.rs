@@ -14,9 +14,9 @@ use crate::execute::as_text;
 /// A robustness envelope, or the reason why there is none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnvelopeAnswer {
-    /// Always the same.
+    /// Format of the document.
     pub format: EnvelopeFormat,
-    /// Always the same.
+    /// Version of the document.
     pub version: Version,
     /// The domain's name.
     pub domain: String,
@@ -24,36 +24,35 @@ pub struct EnvelopeAnswer {
     pub problem: String,
     /// The name of the plan, as the request gives it.
     pub plan: String,
-    /// How the answer was found.
+    /// The settings used.
     pub settings: EnvelopeSettings,
     /// The answer itself.
     #[serde(flatten)]
     pub finding: EnvelopeFinding,
 }
 
-/// The name of the document.
+/// Format of a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum EnvelopeFormat {
-    /// The only one.
+    /// The name `elbowroom-envelope`.
     #[default]
     #[serde(rename = "elbowroom-envelope")]
     Envelope,
 }
 
-/// The settings with which an envelope was computed.
+/// Settings of the computation of an envelope.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnvelopeSettings {
-    /// How boxes were looked for.
+    /// The algorithm of the search.
     pub method: Method,
     /// The guarantee inside the envelope.
     pub guarantee: Guarantee,
-    /// How steps changed after a success.
+    /// Change of step sizes after a success.
     pub growth: Growth,
-    /// The search ends when all steps are below this.
+    /// Step size below which the search ended.
     #[serde(with = "exact")]
     pub precision: Rational,
-    /// If there is one, the precision of each parameter was this share of its nominal value
-    /// instead.
+    /// Alternative to `precision`: the precision of each parameter as a share of its nominal value.
     #[serde(
         with = "exact::option",
         default,
@@ -63,10 +62,10 @@ pub struct EnvelopeSettings {
     /// The least separation of interfering happenings (ε).
     #[serde(with = "exact")]
     pub epsilon: Rational,
-    /// Whether ends were moved onto their limits.
+    /// `true` if ends were moved onto their limits.
     pub sharpen: bool,
     /// The rule that sets the time-out of each action: `10x,600` is 10 times the planned duration,
-    /// at least 600; `none` in answers that say nothing of it.
+    /// at least 600; `none` in answers without this member.
     #[serde(with = "as_text", default = "off")]
     pub timeout: TimeoutRule,
 }
@@ -81,12 +80,12 @@ fn off() -> TimeoutRule {
 pub enum EnvelopeFinding {
     /// There is an envelope.
     Envelope {
-        /// The parameters, and how far each may deviate.
+        /// The parameters, with their intervals and limits.
         parameters: Vec<Room>,
         /// Durations that the domain leaves to the executor, and that do not vary.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         chosen: Vec<Chosen>,
-        /// Why the search ended.
+        /// Reason for the end of the search.
         stop: Stop,
         /// The number of boxes checked.
         checks: usize,
@@ -94,22 +93,22 @@ pub enum EnvelopeFinding {
         seconds: f64,
         /// Each box found to be inside, in order.
         widenings: Vec<Widened>,
-        /// By how much everything may deviate at once, if that is known.
+        /// Deviations of all quantities at once, if they are known.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         balance: Option<Balance>,
-        /// The objective of the box, if the largest one was asked for.
+        /// The objective of the box, if the largest one was requested.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         best: Option<Best>,
-        /// How the conditions that the plan has to meet are met.
+        /// Counts of the plan's conditions, by what enforces them.
         #[serde(default)]
         conditions: Conditions,
-        /// The worth of knowing values in advance, if there is any.
+        /// The gain of knowing values in advance, if there is any.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         foresight: Option<Foresight>,
-        /// When each action happens, as planned and anywhere in the envelope.
+        /// The times of each action, as planned and anywhere in the envelope.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         timeline: Option<Timeline>,
-        /// What every schedule has to satisfy, written out; only of plans that are not too large.
+        /// The inequalities that every schedule satisfies; only for plans that are not too large.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         inequalities: Option<Inequalities>,
         /// The makespan of the plan. Not in the document.
@@ -118,21 +117,21 @@ pub enum EnvelopeFinding {
     },
     /// The plan fails even if everything goes as planned.
     Fails(Failing),
-    /// The box asked about lies inside the envelope.
+    /// The given box lies inside the envelope.
     Inside {
         /// The parameters and their intervals.
         parameters: Vec<Range>,
     },
-    /// It does not.
+    /// The box lies outside, at least in part.
     Outside {
         /// The parameters and their intervals.
         parameters: Vec<Range>,
         /// A counterexample inside the box.
         counterexample: Counterexample,
     },
-    /// Nothing is known yet.
+    /// The search ended before it found a box.
     None {
-        /// Why the search ended before it began.
+        /// Reason for the end of the search.
         stop: Stop,
     },
 }
@@ -141,12 +140,12 @@ pub enum EnvelopeFinding {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Failing {
-    /// The judge rejects it as it stands.
+    /// The validator rejects the plan as it is.
     Invalid {
         /// The reason.
         violation: ViolationAnswer,
     },
-    /// It has no schedule, or one that breaks it.
+    /// The plan has no schedule, or a schedule that violates a condition.
     AsPlanned {
         /// The parameters.
         parameters: Vec<Quantity>,
@@ -158,20 +157,20 @@ pub enum Failing {
 /// A quantity that is left open.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quantity {
-    /// Unique in its plan.
+    /// The parameter's name, unique in the plan.
     pub name: String,
-    /// In plain words: `duration of (drive rover depot shelf)`.
+    /// The quantity in words: `duration of (drive rover depot shelf)`.
     pub quantity: String,
-    /// Which sort of quantity it is.
+    /// Kind of the quantity.
     pub kind: QuantityKind,
-    /// The action whose duration or number it is: `(drive rover depot shelf)`; `None` if it belongs
-    /// to no single action.
+    /// The action that the duration or number belongs to: `(drive rover depot shelf)`; `None` if
+    /// there is no single action.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub action: Option<String>,
     /// The value in the original plan.
     #[serde(with = "exact")]
     pub nominal: Rational,
-    /// How strongly the search favours it.
+    /// Weight of the quantity in the search.
     #[serde(with = "exact")]
     pub weight: Rational,
 }
@@ -198,7 +197,7 @@ pub struct Range {
     pub timeout: Option<Rational>,
 }
 
-/// A quantity that is left open, how far it may deviate, and what keeps it from deviating further.
+/// A quantity that is left open, with its interval and the limits of the interval's ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Room {
     /// The quantity and its interval.
@@ -218,14 +217,14 @@ pub struct Chosen {
     pub instance: String,
     /// The action.
     pub action: String,
-    /// How long it takes as planned.
+    /// Planned duration.
     pub duration: Exact,
     /// Its time-out; `None` if time-outs are off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timeout: Option<Exact>,
 }
 
-/// The kind of quantity that a parameter stands for.
+/// The kind of the quantity behind a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum QuantityKind {
@@ -243,7 +242,7 @@ pub enum QuantityKind {
     Bound,
 }
 
-/// Why a search for an envelope ended.
+/// Reasons for the end of a search for an envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Stop {
     /// No end can be moved by the precision.
@@ -252,27 +251,27 @@ pub enum Stop {
     /// The limit on box checks was reached.
     #[serde(rename = "check limit")]
     CheckLimit,
-    /// The watcher said that time is up.
+    /// The watcher stopped the search at its time limit.
     #[serde(rename = "time limit")]
     TimeLimit,
-    /// The watcher wanted no more.
+    /// The watcher cancelled the search.
     #[serde(rename = "cancelled")]
     Cancelled,
-    /// Of some wider boxes nothing could be told: too many cases to tell apart.
+    /// Some wider boxes are undecided: there are too many cases to distinguish.
     #[serde(rename = "too many cases")]
     Undecided,
 }
 
-/// The box has grown.
+/// A widening of the box.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Widened {
-    /// After that long.
+    /// Time since the start of the search, in seconds.
     pub seconds: f64,
-    /// After that many checks.
+    /// Number of box checks before it.
     pub checks: usize,
     /// The name of the parameter whose interval has grown.
     pub parameter: String,
-    /// Which end has moved, and where it is now.
+    /// The end that has moved, with its new value.
     #[serde(flatten)]
     pub end: MovedEnd,
 }
@@ -294,17 +293,17 @@ pub enum MovedEnd {
 pub struct Counterexample {
     /// The failure in words.
     pub message: String,
-    /// By how much, where that is one number.
+    /// Size of the violation, if it is a single number.
     #[serde(with = "exact::option")]
     pub shortfall: Option<Rational>,
-    /// The judge's verdict on the schedule, if it was asked.
+    /// The validator's verdict on the schedule, if it was computed.
     pub verdict: Option<String>,
     /// The parameters' values, by name.
     pub values: IndexMap<String, Exact>,
     /// The time of each event; empty if there is no schedule for these values.
     pub schedule: Vec<Happening>,
-    /// How the world beats an executor that cannot know in advance what it learns too late: one
-    /// that starts everything early, and one that starts everything late.
+    /// Strategies of the world against two executors that learn some values too late: one that
+    /// starts everything as early as possible, and one that starts everything as late as possible.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub plays: Vec<String>,
 }
@@ -316,7 +315,7 @@ pub struct Happening {
     pub instance: String,
     /// The action.
     pub action: String,
-    /// When it starts, or happens.
+    /// The start time.
     pub start: Exact,
     /// The end time; `None` for an instantaneous action.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -369,8 +368,8 @@ impl EnvelopeAnswer {
         }
     }
 
-    /// What limits the ends of the envelope, the ends with one reason together, in the order in
-    /// which the reasons first occur; empty if there is no envelope.
+    /// Returns the limits of the envelope's ends, grouped by reason, by first occurrence; empty if
+    /// there is no envelope.
     pub fn limits(&self) -> Vec<LimitGroup> {
         let EnvelopeFinding::Envelope { parameters, .. } = &self.finding else {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! By how much everything may deviate at once.
+//! Deviation of all open quantities at once.
 
 use elbowroom_envelope::{Oracle, Share, balance as shares};
 use elbowroom_num::Rational;
@@ -7,26 +7,25 @@ use serde::{Deserialize, Serialize};
 use super::search::flow;
 use crate::answers::{Watcher, exact};
 
-/// By how much everything that is left open may deviate from its nominal value at once, as shares
-/// of these.
+/// Deviations that all open quantities may have at once, as shares of their nominal values.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Balance {
     /// Upwards.
     pub more: Deviation,
-    /// Downwards, as far as each can.
+    /// Downwards, each quantity at most to the end of its range.
     pub less: Deviation,
     /// Each upwards or downwards.
     pub either: Deviation,
 }
 
-/// A share of the nominal values by which all may deviate at once.
+/// Bounds on the share of the nominal values that all quantities may deviate at once.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Deviation {
-    /// By so much they may.
+    /// A deviation by this share is safe.
     #[serde(with = "exact")]
     pub share: Rational,
-    /// By more than this they may not: the same as `share` where that is known exactly. `None` if
-    /// nobody asked about more than `share`.
+    /// A deviation by more than this share is not safe. Equals `share` if the limit is known
+    /// exactly; `None` if no larger share was examined.
     #[serde(with = "exact::option")]
     pub limit: Option<Rational>,
 }
@@ -40,8 +39,9 @@ impl From<Share> for Deviation {
     }
 }
 
-/// By how much everything may deviate at once, unless the watcher wants no more or there are too
-/// many cases to tell apart. The oracle brings the proofs that it has found for other boxes.
+/// Computes the deviations that all quantities may have at once; `None` if the watcher ends the
+/// work or there are too many cases to distinguish. `oracle` reuses the proofs that it has found
+/// for other boxes.
 pub(super) fn balance(mut oracle: Oracle, watcher: &mut dyn Watcher) -> Option<Balance> {
     let shares = shares(&mut oracle, &mut || flow(watcher));
     shares.unwrap_or_default().map(|shares| Balance {

@@ -1,4 +1,4 @@
-//! The largest box, and how good it is.
+//! The largest box, and its objective.
 
 use elbowroom_envelope::{BestRun, BestSettings, NEVER, Objective, Oracle, Reasons};
 use elbowroom_num::{End, Rational, enclosed};
@@ -10,14 +10,14 @@ use super::certificate::certificate;
 use super::worth::{Worth, worths};
 use crate::answers::exact;
 
-/// The objective of a box, and how much better another box could be.
+/// The objective of a box, and a bound on that of all other boxes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Best {
     /// The objective.
     pub objective: Objective,
-    /// Whether both ends of an interval had to be equally far from the nominal value.
+    /// `true` if both ends of an interval had to be equally far from the nominal value.
     pub symmetric: bool,
-    /// Ends counted up to a deviation of so many times the nominal value.
+    /// Cap on the deviations of ends, as a multiple of the nominal value.
     #[serde(with = "exact")]
     pub most: Rational,
     /// The value of the objective: the least deviation, as a share of the nominal value, or the sum
@@ -27,43 +27,44 @@ pub struct Best {
     /// An upper bound on the objective of all boxes.
     #[serde(with = "exact")]
     pub bound: Rational,
-    /// Whether it is proved that there is no better box.
+    /// `true` if it is proved that there is no better box.
     #[serde(rename = "proved")]
     pub is_proved: bool,
-    /// Why the box is inside the envelope, and no box has more than `bound`, for [`elbowroom_verify`] to
-    /// check; `None` if the search
-    /// was ended before it was done, or if that could not be told of all ends.
+    /// Proof that the box is inside the envelope and that no box exceeds `bound`, in the form that
+    /// [`elbowroom_verify`] checks. `None` if the search was interrupted, or if some end is
+    /// undecided.
     ///
-    /// In a browser it is written and not read: answers are read there to be drawn, and what reads
-    /// certificates would be a thirtieth of the module.
+    /// The WebAssembly build serializes it but does not deserialize it: pages only draw answers,
+    /// and the code that reads certificates would be a thirtieth of the module.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(target_family = "wasm", serde(skip_deserializing))]
     pub certificate: Option<Certificate>,
-    /// How likely all durations stay inside, if that is the objective.
+    /// Probability that all durations stay inside, if that is the objective.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub probability: Option<Probability>,
-    /// With that, how each parameter is distributed; `None` for one that always is as planned.
+    /// For that objective, the distribution of each parameter; `None` for a parameter that is
+    /// always as planned.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub chances: Vec<Option<Chance>>,
-    /// What it would be worth to relax bounds of the plan, the most first.
+    /// Gains from relaxing bounds of the plan, largest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub worth: Vec<Worth>,
 }
 
-/// How likely all durations stay inside a box, as a simulation rounds them.
+/// Probability that all durations, rounded as in a simulation, stay inside a box.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Probability {
-    /// For the box of the answer: at least this, rounded down to a billionth.
+    /// Lower bound for the box of the answer, rounded down to a billionth.
     #[serde(with = "exact")]
     pub least: Rational,
-    /// For all boxes: at most this, rounded up to a billionth.
+    /// Upper bound for all boxes, rounded up to a billionth.
     #[serde(with = "exact")]
     pub most: Rational,
 }
 
 impl Probability {
     fn new(subject: &Subject<'_>, settings: &BestSettings, run: &BestRun) -> Self {
-        /// Longer than anything lasts, for ends that are infinite.
+        /// Replacement for infinite ends, beyond any duration.
         const EVER: i64 = 1_000_000_000_000;
         let resolution = subject.request.world.as_ref();
         let resolution = resolution.map_or(Rational::ONE, |world| world.resolution.clone());
@@ -100,7 +101,7 @@ pub(super) fn best(
     settings: &BestSettings,
     run: BestRun,
 ) -> Best {
-    // Where no box has any probability, there are no logarithms to prove anything of.
+    // If no box has a positive probability, there are no logarithms to prove anything about.
     let is_possible =
         settings.objective != Objective::Probability || run.bound > Rational::from(NEVER);
     let has_certificate = is_possible

@@ -1,4 +1,4 @@
-//! The proof that a box is inside the envelope and the largest there, in the form that
+//! The proof that a box is inside the envelope and no other box there is larger, in the form that
 //! `elbowroom-verify` checks.
 
 mod inside;
@@ -21,8 +21,9 @@ use elbowroom_verify::{
 use super::Subject;
 use network::{constraints, used_constraints};
 
-/// The certificate of a proof that a box is the best one, with those of its cuts that are used; and of
-/// the plan's constraints those that are used, or all, where it is told why the box is inside.
+/// Returns the certificate that a box is the best one. It contains the cuts that the proof uses. It
+/// contains all constraints of the plan if it also proves that the box is inside the envelope;
+/// otherwise only those that are used.
 pub(super) fn certificate(
     subject: &Subject<'_>,
     settings: &BestSettings,
@@ -80,14 +81,14 @@ pub(super) fn certificate(
         })
     });
     let certificate = Certificate {
-        // Filled in with the sums.
+        // Filled in later, with the sums.
         proves: String::new(),
         assumes: Vec::new(),
         guarantee: match guarantee {
             Guarantee::Weak => elbowroom_verify::Guarantee::Weak,
             Guarantee::Dynamic => elbowroom_verify::Guarantee::Dynamic,
             Guarantee::Strong => elbowroom_verify::Guarantee::Strong,
-            // A guarantee that the checker does not know.
+            // The checker does not know this guarantee.
             _ => return None,
         },
         parameters: parameters.collect::<Option<_>>()?,
@@ -111,7 +112,7 @@ pub(super) fn certificate(
     added_up(certificate).ok()
 }
 
-/// How it follows from the cuts that no box is better.
+/// Returns the derivation, from the cuts, that no box is better.
 fn reasons(settings: &BestSettings, proof: &BestProof, cuts: &mut Cuts) -> Reasons {
     match &proof.reasons {
         KnownReasons::Levels(levels) => {
@@ -139,8 +140,8 @@ fn reasons(settings: &BestSettings, proof: &BestProof, cuts: &mut Cuts) -> Reaso
     }
 }
 
-/// How far out an end of the variable can gain anything; `None` without limit. Where more gains nothing,
-/// that is what limits it.
+/// Returns the largest deviation at which an end of the variable still increases the objective, or
+/// `None` if there is no limit. If it is the smaller one, it limits the variable instead of `most`.
 fn greatest_gain(
     plan: &ParametrizedPlan,
     settings: &BestSettings,
@@ -163,7 +164,7 @@ fn greatest_gain(
     gains.and_then(|own| own.into_iter().max())
 }
 
-/// Which variables the reasons need to know a limit of.
+/// Returns, for each variable, `true` if the reasons use its limit.
 fn used_limits(reasons: &Reasons, variables: usize) -> Vec<bool> {
     let mut is_used = vec![false; variables];
     if let Reasons::LeastSlack(stopped) = reasons {
@@ -183,7 +184,7 @@ fn used_limits(reasons: &Reasons, variables: usize) -> Vec<bool> {
     is_used
 }
 
-/// Fills in which points come at 0 or later: those at which what comes before ends.
+/// Fills in the points that are at time 0 or later: each is the end point of the part before it.
 fn begin(proof: &mut Proof, constraints: &[Constraint]) {
     match proof {
         Proof::Cycle(parts) => {
@@ -193,7 +194,7 @@ fn begin(proof: &mut Proof, constraints: &[Constraint]) {
             begin_parts(parts, last, &[], constraints);
         }
         Proof::Fixed(parts) => {
-            // The point that the executor chooses, and from which the time of this one counts.
+            // The executor chooses this point; the time of `point` is measured from it.
             let root = |mut point: usize| {
                 let ending = |point: usize| {
                     let ends = |own: &&Constraint| own.observed && own.to == point;
@@ -218,7 +219,7 @@ fn begin(proof: &mut Proof, constraints: &[Constraint]) {
             let mut at = cycle
                 .last()
                 .map_or(0, |way| end_of(&Part::Way(*way), ways, constraints));
-            // Where each way begins, the later ones first, as these mention earlier ones.
+            // Start points of the ways. Later ways come first, because they mention earlier ones.
             let mut begins = vec![0; ways.len()];
             for &way in cycle.iter() {
                 begins[way] = at;
@@ -236,7 +237,8 @@ fn begin(proof: &mut Proof, constraints: &[Constraint]) {
     }
 }
 
-/// The same of parts that begin at a point; where the ways that they mention begin.
+/// Does the same for parts that begin at point `at`. Returns the ways that they mention, with their
+/// start points.
 fn begin_parts(
     parts: &mut [Part],
     mut at: usize,
@@ -255,7 +257,7 @@ fn begin_parts(
     mentioned
 }
 
-/// Where a part of a proof leads to.
+/// Returns the end point of a part of a proof.
 fn end_of(part: &Part, ways: &[Way], constraints: &[Constraint]) -> usize {
     match part {
         Part::Beginning(_) => 0,
@@ -268,7 +270,7 @@ fn end_of(part: &Part, ways: &[Way], constraints: &[Constraint]) -> usize {
     }
 }
 
-/// The cuts that are used, in the order in which they first are.
+/// The cuts that are used, by first use.
 #[derive(Default)]
 struct Cuts {
     used: Vec<usize>,
@@ -276,7 +278,7 @@ struct Cuts {
 }
 
 impl Cuts {
-    /// The place of a cut among those that are used.
+    /// Returns the position of a cut among those that are used, and appends it if it is new.
     fn place(&mut self, cut: usize) -> usize {
         let used = &mut self.used;
         *self.places.entry(cut).or_insert_with(|| {
@@ -332,7 +334,7 @@ impl Cuts {
     }
 }
 
-/// Why one of the rows of a cut holds in every box inside the envelope.
+/// Returns the proof that one of the rows of a cut holds in every box inside the envelope.
 fn proof_of(subject: &Subject<'_>, cut: &Cut) -> Proof {
     match &cut.ground {
         Ground::Cycle(origins) => Proof::Cycle(origins.iter().map(bound).collect()),
@@ -364,14 +366,14 @@ fn proof_of(subject: &Subject<'_>, cut: &Cut) -> Proof {
 
 fn bound(origin: &Origin) -> Part {
     match *origin {
-        // Which point it is follows from what comes before it.
+        // `begin` sets the point: it follows from the part before.
         Origin::Beginning => Part::Beginning(0),
         Origin::AtLeast(index) => Part::Least(index),
         Origin::AtMost(index) => Part::Most(index),
     }
 }
 
-/// A part of a way, after those ways that it mentions.
+/// Converts a part of a way, after the ways that it mentions.
 fn part(part: &ProofPart, ways: &mut Vec<Way>) -> Part {
     match part {
         ProofPart::Bound(origin) => bound(origin),
@@ -381,7 +383,7 @@ fn part(part: &ProofPart, ways: &mut Vec<Way>) -> Part {
     }
 }
 
-/// Appends a way, and before it those that it mentions; its position.
+/// Appends a way after the ways that it mentions, and returns its position.
 fn told(way: &ProofWay, ways: &mut Vec<Way>) -> usize {
     let parts = way.parts.iter().map(|inner| part(inner, ways)).collect();
     ways.push(Way {
@@ -391,7 +393,7 @@ fn told(way: &ProofWay, ways: &mut Vec<Way>) -> usize {
     ways.len() - 1
 }
 
-/// The rows of a cut as sums that are not negative.
+/// Returns the rows of a cut as sums that are not negative.
 fn sums(cut: &Cut) -> Vec<Sum> {
     let sum = |row: &elbowroom_envelope::Row| Sum {
         constant: row.bound.clone(),
@@ -404,7 +406,7 @@ fn sums(cut: &Cut) -> Vec<Sum> {
                     Side::Lower => End::Lower,
                     Side::Upper => End::Upper,
                 },
-                // A lower end reaches out as it gets less.
+                // A lower end is measured as a deviation, which grows as the end decreases.
                 factor: match end.side {
                     Side::Lower => factor.clone(),
                     Side::Upper => &Rational::ZERO - factor,

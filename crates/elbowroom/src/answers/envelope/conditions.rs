@@ -1,4 +1,4 @@
-//! How the conditions that a plan has to meet are met.
+//! Enforcement of the conditions of a plan.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,15 +8,15 @@ pub struct Conditions {
     /// Bounds on the difference of two times: the plan's network implies them.
     pub differences: usize,
     /// Conditions on numbers, and on several differences at once: every schedule of the network
-    /// meets them.
+    /// satisfies them.
     pub all_schedules: usize,
-    /// Bounds that were added to the network for the dispatcher to keep to
+    /// Bounds added to the network for the dispatcher to enforce
     /// ([`EnvelopeRequest::enforce`](super::EnvelopeRequest::enforce)).
     pub enforced: usize,
 }
 
 impl Conditions {
-    /// What the oracle says, and how many bounds were added.
+    /// Combines the oracle's counts with the number of added bounds.
     pub(super) fn new(met: elbowroom_envelope::soundness::Conditions, enforced: usize) -> Self {
         Self {
             differences: met.differences,

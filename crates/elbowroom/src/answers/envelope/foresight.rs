@@ -1,4 +1,4 @@
-//! What knowing values in advance would be worth.
+//! The gain of knowing values in advance.
 
 use std::ops::ControlFlow;
 
@@ -12,15 +12,15 @@ use super::search::flow;
 use crate::answers::{Exact, RequestError, Watcher};
 use crate::flow::FlowError;
 
-/// How often the step is doubled to see what stops an end.
+/// Number of times that the step is doubled to find the limit of an end.
 const FARTHER: usize = 3;
-/// In sums of widths an end counts up to that many times the nominal value.
+/// In sums of widths, ends count up to this multiple of the nominal value.
 const CAP: i64 = 10;
 
 /// The gain of knowing values in advance: the weak envelope compared with the dynamic one.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Foresight {
-    /// The quantities that one would have to know in advance, by name.
+    /// Names of the quantities that an executor would have to know in advance.
     pub unknown: Vec<String>,
     /// The sum of the widths of all intervals, ends counted up to ten times the nominal value.
     pub width: Exact,
@@ -28,7 +28,7 @@ pub struct Foresight {
     pub weak_width: Exact,
 }
 
-/// The worth of foresight, if a need for it is what keeps an end of the box where it is.
+/// Computes the gain of foresight, if the lack of it limits an end of the box.
 pub(super) fn foresight(
     subject: &Subject<'_>,
     oracle: &mut Oracle,
@@ -67,7 +67,8 @@ pub(super) fn foresight(
     }))
 }
 
-/// The quantities whose values would have to be known in advance for some end to move further.
+/// Returns the quantities that an executor would have to know in advance for some end to move
+/// further.
 fn unknown(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
@@ -87,12 +88,12 @@ fn unknown(
             let Some(reach) = end.reach(envelope) else {
                 continue;
             };
-            // Where its range ends, nothing else stops it.
+            // The end is at the limit of the parameter's range.
             let border = side.reach(&oracle.plan().parameters[index].range);
             if border.is_some_and(|border| reach >= border) {
                 continue;
             }
-            // An end that has room for one step may still be stopped by the next larger one.
+            // An end that can move by one step may still be stopped by a larger step.
             let mut distance = step.clone();
             for _ in 0..=FARTHER {
                 let farther = oracle.objection_beside(envelope, end, Some(&reach + &distance));
@@ -112,7 +113,7 @@ fn unknown(
     Ok(unknown)
 }
 
-/// The sum of the widths of all intervals.
+/// Returns the sum of the widths of all intervals.
 fn width(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Rational {
     let cap = Rational::from(CAP);
     let widths = plan.parameters.iter().zip(envelope.intervals());

@@ -26,7 +26,7 @@ pub(crate) enum Step<'a> {
 
 /// The result of a search.
 pub(crate) struct Grown {
-    /// The box, or the reason why the plan does not even work as planned.
+    /// The box, or the reason why the plan fails as planned.
     pub(crate) envelope: Result<DecoupledEnvelope, Objection>,
     /// The reason for the end of IRR.
     pub(crate) stop: StopReason,
@@ -49,7 +49,7 @@ pub(crate) fn grow(
         on_step(&Step::Irr(widening))
     })
     .map_err(FlowError::Refused)?;
-    // Where nothing may deviate, there is no box to be the largest.
+    // Without parameters there is no largest box.
     let is_to_be_best =
         method == Method::Best && run.stop == StopReason::Converged && !plan.parameters.is_empty();
     let mut grown = Grown {

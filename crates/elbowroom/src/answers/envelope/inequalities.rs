@@ -1,5 +1,5 @@
-//! What every schedule of a plan has to satisfy, written out so that others can check values: the
-//! sliders of a page do.
+//! The inequalities that every schedule of a plan satisfies, written as text so that other programs
+//! can check values (such as the sliders of a page).
 
 use std::fmt::Write as _;
 
@@ -13,19 +13,19 @@ use serde::{Deserialize, Serialize};
 use crate::explain::Explainer;
 use crate::linear_form::{LinearForm, NetworkBound, inequality};
 
-/// Larger plans are not written out: too many nodes.
+/// Largest number of nodes of a plan whose inequalities are written.
 const MOST_TIMES: usize = 400;
-/// Larger plans are not written out: too many inequalities.
+/// Largest number of inequalities that are written.
 const MOST_ROWS: usize = 5_000;
-/// How many places of a moment inside an action are told apart.
+/// Largest number of positions that are distinguished for a moment inside an action.
 const MOST_PLACES: usize = 64;
 
-/// The times and parameters of a plan, and what they must satisfy.
+/// The times and parameters of a plan, and the inequalities that they satisfy.
 ///
-/// With values for the parameters, the plan works exactly if the network has a schedule and no
-/// requirement can be broken in any of its schedules. Rows are texts such as
-/// `t3 + -1*t1 + -1*p0 <= 0`: a sum of products of numbers, times (`t3` is the fourth of
-/// [`times`](Self::times)) and parameters (`p0` is the first of the answer's), and `<=` or `<`.
+/// For given values of the parameters, the plan works exactly if the network has a schedule and no
+/// schedule violates a requirement. Rows are texts such as `t3 + -1*t1 + -1*p0 <= 0`: a sum of
+/// products of numbers, times (`t3` is the fourth of [`times`](Self::times)) and parameters (`p0`
+/// is the first of the answer's), and `<=` or `<`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Inequalities {
     /// The labels of the time points, as in STN plan files. The first is time zero. Requirements
@@ -33,7 +33,7 @@ pub struct Inequalities {
     pub times: Vec<String>,
     /// Bounds on differences of times.
     pub network: Vec<NetworkRow>,
-    /// What must hold in every schedule.
+    /// Requirements on every schedule.
     pub requirements: Vec<RequirementRow>,
 }
 
@@ -42,26 +42,27 @@ pub struct Inequalities {
 pub struct NetworkRow {
     /// The inequality.
     pub row: String,
-    /// Whether it says that something takes at least so long.
+    /// `true` if it is a lower bound: something takes at least this long.
     pub is_need: bool,
-    /// What takes so long, or what it must fit into; `None` for mere orderings.
+    /// The bound in words; `None` for mere orderings.
     pub words: Option<String>,
 }
 
-/// A requirement, with all the ways in which it can be broken.
+/// A requirement, with all ways to violate it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RequirementRow {
-    /// What is required.
+    /// The requirement in words.
     pub words: String,
-    /// Whether it is the order of two happenings. If that is broken, nothing follows from the rest:
-    /// in another order the plan may work, too.
+    /// `true` if it is the order of two happenings. A violation of it is no proof that the plan
+    /// fails: the plan may also work in another order.
     pub is_order: bool,
-    /// Broken if, for one of these, all inequalities hold at once.
+    /// The cases of a violation: it is violated if all inequalities of one of them hold.
     pub broken_if: Vec<Vec<String>>,
 }
 
 impl Inequalities {
-    /// Those of a plan; `None` if they are too many, or beyond writing out.
+    /// Returns the inequalities of a plan; `None` if there are too many, or if they cannot be
+    /// written as rows.
     pub fn of(explainer: &Explainer<'_>) -> Option<Self> {
         let (task, plan) = (explainer.task, explainer.plan);
         if plan.plan.nodes.len() > MOST_TIMES {
@@ -107,7 +108,7 @@ fn requirement(task: &Task, plan: &ParametrizedPlan, obligation: &Obligation) ->
     }
 }
 
-/// A bound, in words where it is more than an ordering.
+/// Converts a bound to a row, with a description unless it is a mere ordering.
 fn network_row(explainer: &Explainer<'_>, bound: &NetworkBound) -> NetworkRow {
     let constraint = |index: usize| &explainer.plan.plan.constraints[index];
     NetworkRow {
@@ -119,7 +120,7 @@ fn network_row(explainer: &Explainer<'_>, bound: &NetworkBound) -> NetworkRow {
     }
 }
 
-/// `expression <= 0`, or `< 0`.
+/// Formats `expression <= 0`, or `< 0`.
 fn row(inequality: &Inequality) -> String {
     let Inequality {
         expression,

@@ -1,4 +1,4 @@
-//! What keeps each end of a box where it is, in words.
+//! The limits of the ends of a box, in words.
 
 use elbowroom_envelope::{Limit, Method, Oracle, limits};
 use elbowroom_num::Rational;
@@ -9,15 +9,16 @@ use super::search::flow;
 use crate::answers::Watcher;
 use crate::explain::Seen;
 
-/// By what part of the precision a sharpened end is moved to see what it touches.
+/// A sharpened end is moved by the precision divided by this number to find its limit.
 const SHARP: i64 = 1_000_000_000;
-/// How often the step is doubled to see what stops an end: the search has tried no end further.
+/// Number of times that the step is doubled to find the limit of an end. The search itself has not
+/// tried larger steps.
 const FARTHER: usize = 1;
-/// Reasons further out than this share of the nominal value do not limit an end.
+/// Reasons further out than this share of the nominal value are not reported as limits.
 const NEAR: (i64, i64) = (1, 4);
 
-/// For each parameter, what keeps the lower and the upper end of its interval; `None` if nothing
-/// does, or if there is no time left to ask.
+/// Returns the limits of the lower and the upper end of each parameter's interval; `None` if there
+/// is none, or if time ran out.
 pub(super) fn what_limits(
     subject: &Subject<'_>,
     oracle: &mut Oracle,
@@ -29,10 +30,11 @@ pub(super) fn what_limits(
     for (distance, parameter) in distances.iter_mut().zip(&subject.plan.parameters) {
         let nominal = parameter.nominal.abs();
         if how.sharpen || subject.request.method() == Method::Best {
-            // A sharpened end has no room at all, so the smallest step tells what it touches.
+            // A sharpened end touches its limit, so the smallest step finds it.
             *distance = &*distance * &Rational::new(1, SHARP);
         } else if how.relative.is_none() && !nominal.is_zero() {
-            // Of an end that was tried in large steps only it is not known what stops it first.
+            // The search may have tried this end in large steps only; a smaller step finds the
+            // nearest limit.
             let near = &nominal * &Rational::new(NEAR.0, NEAR.1);
             *distance = near.min(distance.clone());
         }
@@ -40,7 +42,7 @@ pub(super) fn what_limits(
     let mut words = vec![[None, None]; subject.plan.parameters.len()];
     let mut seen = Seen::default();
     for _ in 0..=FARTHER {
-        // An end that has room for this step may still be stopped by the next larger one.
+        // An end that can move by this step may still be stopped by a larger step.
         let is_open = |end: &BoxEnd| words[end.parameter.index()][end.side.index()].is_none();
         let open: Vec<BoxEnd> = BoxEnd::all(words.len()).filter(is_open).collect();
         let mut tell = |end: BoxEnd, limit: &Limit| {

@@ -1,4 +1,4 @@
-//! The search for an envelope, from the nominal values to what limits each end.
+//! The search for an envelope, from the nominal values to the limits of each end.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -18,7 +18,7 @@ use super::{EnvelopeOutcome, Inequalities, Subject};
 use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher};
 use crate::flow::FlowError;
 
-/// Searches, moves the ends onto their limits if that is wanted, and asks what limits them.
+/// Searches for a box, moves its ends onto their limits if requested, and computes these limits.
 pub(super) fn search(
     subject: &Subject<'_>,
     mut oracle: Oracle,
@@ -100,7 +100,7 @@ pub(super) fn search(
     Ok(outcome)
 }
 
-/// What a watcher says, for those who need not know why.
+/// Returns the watcher's decision to continue or stop, without the reason.
 pub(super) fn flow(watcher: &mut dyn Watcher) -> ControlFlow<()> {
     match watcher.flow() {
         ControlFlow::Continue(()) => ControlFlow::Continue(()),
@@ -108,7 +108,7 @@ pub(super) fn flow(watcher: &mut dyn Watcher) -> ControlFlow<()> {
     }
 }
 
-/// Keeps a list of widenings, and tells the watcher.
+/// Records the widenings, and notifies the watcher.
 struct History<'a> {
     subject: &'a Subject<'a>,
     watcher: &'a mut dyn Watcher,
@@ -122,7 +122,7 @@ struct History<'a> {
     best_steps: usize,
     /// The number of boxes checked when the box grew last.
     checks: usize,
-    /// Why the watcher wanted no more.
+    /// The watcher's reason to stop.
     halt: Option<Halt>,
 }
 

@@ -1,4 +1,4 @@
-//! When each action of a plan happens, as planned and anywhere in its envelope.
+//! The times of each action of a plan, as planned and anywhere in its envelope.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use crate::answers::Exact;
 use crate::linear_form::relaxed;
 use crate::makespan::as_told;
 
-/// The plan in time: what a chart of it shows.
+/// The times of a plan, for a chart.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Timeline {
     /// The actions, in the order of the plan.
@@ -28,17 +28,16 @@ pub struct Timeline {
     pub types: IndexMap<String, String>,
 }
 
-/// An action, and when it happens.
+/// An action and its times.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimedAction {
     /// The label of the action's instance.
     pub instance: String,
     /// The action: `(drive rover depot shelf)`.
     pub action: String,
-    /// When it starts, or happens, if everything is started as early as possible and takes as long
-    /// as planned.
+    /// The start time if everything starts as early as possible and takes as long as planned.
     pub start: Exact,
-    /// When it ends then; `None` for an instantaneous action.
+    /// The end time in that schedule; `None` for an instantaneous action.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end: Option<Exact>,
     /// The times of its start, for all values in the envelope and all schedules.
@@ -46,7 +45,7 @@ pub struct TimedAction {
     /// The same for its end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end_window: Option<WindowAnswer>,
-    /// The parameter that its duration is, if it is one.
+    /// The parameter for its duration, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parameter: Option<String>,
 }
@@ -63,19 +62,20 @@ pub struct WindowAnswer {
 /// Timed initials that happen together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimedFacts {
-    /// As planned.
+    /// The planned time.
     pub time: Exact,
     /// The times anywhere in the envelope.
     pub window: WindowAnswer,
     /// The changes, such as `(open office) becomes false`.
     pub changes: Vec<String>,
-    /// The parameter that its time is, if it is one.
+    /// The parameter for its time, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parameter: Option<String>,
 }
 
 impl Timeline {
-    /// The times of a plan, in a box around its planned values; `None` if it has no schedule there.
+    /// Computes the times of a plan, in a box around its planned values; `None` if it has no
+    /// schedule there.
     pub fn of(task: &Task, plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Self> {
         let zero = network_node(NodeId::ZERO);
         let nominal = as_told(plan, plan.plan.network(&plan.nominal()))?;
@@ -132,8 +132,8 @@ impl Timeline {
     }
 }
 
-/// The declared types of the objects that these actions mention; of an object with several types,
-/// the first.
+/// Returns the declared types of the objects that these actions mention; for an object with several
+/// types, the first.
 pub fn types<'a>(
     task: &Task,
     actions: impl IntoIterator<Item = &'a str>,
@@ -180,7 +180,7 @@ impl Times<'_> {
     }
 }
 
-/// The changes of a group of timed initials, in words.
+/// Describes the changes of a group of timed initials.
 pub fn changes(task: &Task, timed: usize) -> Vec<String> {
     let words = |change: &Change| match change {
         Change::Add(fact) => format!("{} becomes true", task.fact_name(*fact)),

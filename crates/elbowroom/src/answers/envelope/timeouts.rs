@@ -1,5 +1,5 @@
-//! Time-outs in an envelope's answer: inside the box *and* before its time-out, no action is
-//! cancelled.
+//! Time-outs in an envelope's answer. An action is not cancelled if its duration is inside the box
+//! *and* below its time-out.
 
 use elbowroom_execution::run::TimeoutRule;
 use elbowroom_model::problem::Problem;

@@ -1,4 +1,4 @@
-//! The parts of an answer, from what the search and the explainer found.
+//! Conversion of the results of the search and the explainer into the parts of an answer.
 
 use elbowroom_envelope::Widening;
 use elbowroom_num::{Interval, Rational};
@@ -21,7 +21,7 @@ impl From<Halt> for Stop {
     fn from(halt: Halt) -> Self {
         match halt {
             Halt::TimeLimit => Self::TimeLimit,
-            // Only searches for plans have a limit of memory.
+            // Only searches for plans have a memory limit.
             Halt::MemoryLimit | Halt::Cancelled => Self::Cancelled,
         }
     }
@@ -41,7 +41,7 @@ impl From<ParameterKind> for QuantityKind {
 }
 
 impl Range {
-    /// The interval.
+    /// Returns the interval.
     pub fn interval(&self) -> Interval {
         Interval {
             lower: self.lower.clone(),
@@ -84,7 +84,7 @@ impl Makespans {
     }
 }
 
-/// The parameters of a plan.
+/// Returns the parameters of a plan.
 pub(crate) fn quantities(explainer: &Explainer<'_>) -> Vec<Quantity> {
     let parameters = explainer.plan.parameters.iter().enumerate();
     parameters
@@ -105,12 +105,12 @@ pub(crate) fn quantities(explainer: &Explainer<'_>) -> Vec<Quantity> {
 }
 
 impl Subject<'_> {
-    /// The parameters.
+    /// Returns the parameters.
     pub(super) fn quantities(&self) -> Vec<Quantity> {
         quantities(&self.explainer)
     }
 
-    /// The parameters, each with its interval in a box.
+    /// Returns the parameters, each with its interval in a box.
     pub(super) fn ranges(&self, envelope: &DecoupledEnvelope) -> Vec<Range> {
         let quantities = self.quantities().into_iter().zip(envelope.intervals());
         let timeouts = timeouts(self.plan, &self.request.timeout);
@@ -125,7 +125,7 @@ impl Subject<'_> {
             .collect()
     }
 
-    /// The durations that the executor chooses.
+    /// Returns the durations that the executor chooses.
     pub(super) fn chosen(&self) -> Vec<Chosen> {
         let told = self.plan.told.iter();
         told.map(|(id, duration)| {
@@ -141,7 +141,7 @@ impl Subject<'_> {
         .collect()
     }
 
-    /// The same with what limits it.
+    /// The parameters, each with its interval and its limits.
     pub(super) fn rooms(
         &self,
         envelope: &DecoupledEnvelope,
@@ -157,7 +157,7 @@ impl Subject<'_> {
             .collect()
     }
 
-    /// The example of an explanation.
+    /// The counterexample of an explanation.
     pub(super) fn counterexample(&self, explanation: &Explanation) -> Counterexample {
         let names = self.plan.parameters.iter().map(|p| p.name.clone());
         let values = explanation.valuation.iter().cloned().map(Exact);

@@ -1,4 +1,4 @@
-//! What it would be worth to relax a bound of the plan: the duals of the largest box.
+//! Gains from relaxing bounds of the plan: the duals of the largest box.
 
 use std::collections::BTreeMap;
 
@@ -10,30 +10,30 @@ use serde::{Deserialize, Serialize};
 use super::Subject;
 use crate::answers::exact;
 
-/// What the objective gains for each unit by which a bound of the plan is relaxed, as long as
-/// nothing else comes to limit it.
+/// Gain of the objective per unit of relaxation of a bound of the plan, as long as no other bound
+/// becomes the limit.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Worth {
     /// The bound, in words.
     pub bound: String,
-    /// Whether there is more room with more or with less of it.
+    /// Direction of the relaxation.
     pub relax: Relax,
-    /// How much the objective gains.
+    /// Gain of the objective per unit.
     #[serde(with = "exact")]
     pub gain: Rational,
 }
 
-/// The direction in which a bound is relaxed.
+/// Direction in a relaxation of a bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Relax {
-    /// An upper bound.
+    /// An upper bound is increased.
     More,
-    /// A lower bound.
+    /// A lower bound is decreased.
     Less,
 }
 
-/// What each bound is worth, the most first; nothing where the best box is one of several cases.
+/// Returns the gains of the bounds, largest first; empty if the best box is one of several cases.
 pub(super) fn worths(subject: &Subject<'_>, proof: &BestProof) -> Vec<Worth> {
     let mut gains: BTreeMap<(usize, Relax), Rational> = BTreeMap::new();
     for (cut, multiplier) in multipliers(proof) {
@@ -49,7 +49,7 @@ pub(super) fn worths(subject: &Subject<'_>, proof: &BestProof) -> Vec<Worth> {
     let plan = subject.plan;
     let is_somebodys = |index: usize| {
         let constraint = &plan.plan.constraints[index];
-        // Orders follow from the domain, and what is open has no number to relax.
+        // Orderings follow from the domain, and open bounds have no number to relax.
         let is_bound = matches!(
             constraint.reason,
             Reason::Given | Reason::Duration(_) | Reason::Timed(_)
@@ -69,7 +69,8 @@ pub(super) fn worths(subject: &Subject<'_>, proof: &BestProof) -> Vec<Worth> {
     worths
 }
 
-/// The cuts that limit the objective, with what the objective gains when their bound grows by 1.
+/// Returns the cuts that limit the objective, each with the gain of the objective when the cut's
+/// bound grows by 1.
 fn multipliers(proof: &BestProof) -> Vec<(&Cut, Rational)> {
     let single = |cut: usize| Some(&proof.cuts[cut]).filter(|cut| cut.rows.len() == 1);
     match &proof.reasons {
@@ -86,7 +87,7 @@ fn multipliers(proof: &BestProof) -> Vec<(&Cut, Rational)> {
             used.collect()
         }
         Reasons::Levels(levels) => {
-            // The least slack is that of the first one stopped.
+            // The least slack is that of the first stopped level.
             let Some(first) = levels.first() else {
                 return Vec::new();
             };
@@ -107,7 +108,7 @@ fn multipliers(proof: &BestProof) -> Vec<(&Cut, Rational)> {
     }
 }
 
-/// The bounds that a cut is made of, and how often each counts.
+/// Returns the bounds that a cut consists of, with their multiplicities.
 fn bounds(cut: &Cut) -> Vec<(Origin, i64)> {
     fn of_part(part: &ProofPart, found: &mut Vec<(Origin, i64)>) {
         match part {

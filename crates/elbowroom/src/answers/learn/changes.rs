@@ -1,4 +1,4 @@
-//! How often facts change by themselves, as an answer.
+//! Rates of facts that change by themselves, as an answer.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,49 +9,47 @@ use serde::{Deserialize, Serialize};
 use super::super::RequestError;
 use super::{Course, Log};
 
-/// How often the facts of a predicate become true, or false, by themselves.
+/// Rates at which the facts of a predicate become true, or false, by themselves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChangesLearnt {
     /// The predicate: `open`.
     pub predicate: String,
-    /// What its facts become.
+    /// The new value of the facts.
     pub becomes: bool,
-    /// All of them together.
+    /// The rate of all facts together.
     pub all: RateLearnt,
-    /// Each fact by itself, `(open office)`, where they differ more than chance explains; otherwise
-    /// none.
+    /// The rate of each fact, `(open office)`, if they differ significantly; otherwise empty.
     pub apart: Vec<(String, RateLearnt)>,
 }
 
-/// A rate, and on what it rests.
+/// A rate and the observations that it is based on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RateLearnt {
-    /// How often that was seen.
+    /// Number of observed changes.
     pub changes: u64,
-    /// For how many seconds facts were the opposite, all together.
+    /// Total time for which the facts had the opposite value, in seconds.
     pub seconds: f64,
-    /// How often it comes about per second; `None` where there was no time.
+    /// Changes per second; `None` if that time is 0.
     pub per_second: Option<f64>,
-    /// Garwood's 95 % interval of that.
+    /// Garwood's 95 % interval of the rate.
     pub interval: Option<(f64, f64)>,
-    /// How many changes the world file that was expected lets expect in these seconds; `None` where
-    /// none was given.
+    /// Number of changes in this time according to the expected world file; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expected: Option<f64>,
 }
 
-/// How often facts were expected to change by themselves in the logs.
+/// Expected numbers of changes by themselves in the logs.
 #[derive(Debug)]
 pub(super) struct Expected {
     /// The predicates whose facts have rates.
     predicates: BTreeSet<String>,
-    /// By fact and what it becomes: how many changes, and in how many seconds it could have become
-    /// so.
+    /// By fact and new value: the expected number of changes, and the seconds for which the fact
+    /// had the opposite value.
     changes: BTreeMap<(String, bool), (f64, f64)>,
 }
 
 impl Expected {
-    /// By the rates of a world file, `[[hazard]]`.
+    /// Computes them from the rates of a world file, `[[hazard]]`.
     pub(super) fn new(logs: &[Log], world: &Source) -> Result<Self, RequestError> {
         let mut expected = Self {
             predicates: BTreeSet::new(),
@@ -85,7 +83,7 @@ impl Expected {
         found.map_or(0.0, |(changes, _)| *changes)
     }
 
-    /// The predicates of which changes were expected, and none was seen.
+    /// Returns the predicates with expected changes, but without observed ones.
     pub(super) fn unseen(&self, seen: &[Changes]) -> Vec<ChangesLearnt> {
         let is_seen = |predicate: &str| seen.iter().any(|it| it.predicate == predicate);
         let unseen = self.predicates.iter().filter(|it| !is_seen(it));
@@ -114,13 +112,14 @@ impl Expected {
     }
 }
 
-/// `open` of `(open office)`.
+/// Returns the predicate of a fact: `open` for `(open office)`.
 fn predicate_of(fact: &str) -> &str {
     let name = fact.trim_matches(['(', ')']);
     name.split_whitespace().next().unwrap_or_default()
 }
 
-/// What all logs say that have a course: of predicates of which a fact has changed by itself.
+/// Learns rates from all logs that have a course, for predicates with a fact that has changed by
+/// itself.
 pub(super) fn of(logs: &[Log]) -> Vec<Changes> {
     let courses = || logs.iter().filter_map(|log| log.course.as_ref());
     let predicates: BTreeSet<String> = courses().flat_map(Course::changing).collect();

@@ -1,4 +1,4 @@
-//! What became of the facts in a run, and which of it nobody did: [`Course`].
+//! Changes of facts in a run, by actions and by themselves: [`Course`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -17,29 +17,29 @@ use elbowroom_text::Source;
 use super::super::RequestError;
 use crate::execute::RunSpec;
 
-/// The facts of one run, as its trace tells: what was true at the beginning, what the actions and
-/// timed initials have done, and what was reported besides.
+/// The facts of one run, from its trace: the initial facts, the effects of actions and timed
+/// initials, and the facts reported as changed otherwise.
 #[derive(Clone, Debug)]
 pub struct Course {
     task: Arc<Task>,
     flips: Vec<Flip>,
-    /// How long the run took, in seconds.
+    /// Duration of the run, in seconds.
     lasted: f64,
     /// Failures of actions whose start had changed facts.
     failures: Vec<Failed>,
 }
 
-/// A failure.
+/// A failure of an action.
 #[derive(Clone, Debug)]
 struct Failed {
     /// The name of the action, without its objects.
     name: String,
     at: Rational,
-    /// What the start had changed, and is not as it was before.
+    /// The facts that the start had changed and the failure did not restore.
     left: Vec<(FactId, bool)>,
 }
 
-/// A fact has changed.
+/// A change of a fact.
 #[derive(Clone, Copy, Debug)]
 struct Flip {
     fact: FactId,
@@ -49,7 +49,7 @@ struct Flip {
 }
 
 impl Course {
-    /// `None` where the trace does not say what was executed.
+    /// Returns `None` if the trace does not contain the problem and the executed actions.
     pub(super) fn of(trace: &Stored) -> Option<Self> {
         let spec: RunSpec = trace.header().ok()?;
         let source = |text: &str| Source::new("trace", text);
@@ -92,14 +92,14 @@ impl Course {
         WorldModel::read(world, self.task.problem()).ok()
     }
 
-    /// For each failure of an action whose start had changed facts: the action's name, and whether all of
-    /// this was undone when it failed.
+    /// Returns, for each failure of an action whose start had changed facts, the action's name, and
+    /// `true` if all these changes were undone at the failure.
     pub(super) fn undone(&self) -> impl Iterator<Item = (&str, bool)> {
         let failures = self.failures.iter();
         failures.map(|failed| (failed.name.as_str(), failed.left.is_empty()))
     }
 
-    /// The predicates of which a fact has changed by itself.
+    /// Returns the predicates with a fact that has changed by itself.
     pub(super) fn changing(&self) -> impl Iterator<Item = String> {
         let flips = self.flips.iter().filter(|flip| flip.is_by_itself);
         flips.map(|flip| {
@@ -110,8 +110,8 @@ impl Course {
         })
     }
 
-    /// For how long all facts of a predicate were true and false, and how often they changed by
-    /// themselves. Nothing of a predicate with more facts than a world file may have rates for.
+    /// Returns how long all facts of a predicate were true and false, and how often they changed by
+    /// themselves. Empty for a predicate with more facts than a world file may have rates for.
     pub(super) fn exposures(&self, predicate: &str) -> Vec<Exposure> {
         let all = format!(
             "format = \"elbowroom-world\"\nversion = 1\n[[hazard]]\nfact = \"{predicate}\"\n\
@@ -128,8 +128,7 @@ impl Course {
             .collect()
     }
 
-    /// The facts that change by themselves in a world, as above, each with the rate at which it
-    /// does.
+    /// Returns the exposures of the facts that change by themselves in `world`, each with its rate.
     pub(super) fn expected(&self, world: &Source) -> Result<Vec<(Exposure, f64)>, RequestError> {
         let problem = self.task.problem();
         let model = WorldModel::read(world.clone(), problem).map_err(|mistakes| {
@@ -160,7 +159,7 @@ impl Course {
         let mut truth = self.task.initial().facts.contains(&fact);
         let mut since = 0.0;
         for flip in self.flips.iter().filter(|flip| flip.fact == fact) {
-            // While it is true it can become false.
+            // A fact that is true can become false.
             both[usize::from(!truth)].seconds += flip.at - since;
             both[usize::from(flip.becomes)].changes += u64::from(flip.is_by_itself);
             (truth, since) = (flip.becomes, flip.at);
@@ -170,17 +169,17 @@ impl Course {
     }
 }
 
-/// A state that follows a trace.
+/// A state that is progressed along a trace.
 struct Follower {
     task: Arc<Task>,
     state: Progression,
     flips: Vec<Flip>,
     commanded: BTreeMap<u64, (Arc<Action>, Option<Rational>)>,
-    /// By ticket: the facts that a start has changed, as they were before.
+    /// By ticket: the facts that a start has changed, with their previous values.
     started: BTreeMap<u64, Vec<(FactId, bool)>>,
     failures: Vec<Failed>,
-    /// When an action has failed last, and the facts that its start has changed: what is undone has
-    /// not changed by itself.
+    /// The time of the last failure, and the facts that the start of this action had changed. A
+    /// fact that the failure restores has not changed by itself.
     failed: (Rational, BTreeSet<FactId>),
 }
 
@@ -294,13 +293,13 @@ impl Follower {
         }
     }
 
-    /// Those of these facts that are not as they were.
+    /// Returns the facts whose values differ from those in `before`.
     fn not_as(&self, mut before: Vec<(FactId, bool)>) -> Vec<(FactId, bool)> {
         before.retain(|(fact, before)| self.state.fact(*fact) != *before);
         before
     }
 
-    /// Time passes, and with it timed initials. A report that comes late counts as of now.
+    /// Advances to `time` and applies timed initials. A late report counts as of now.
     fn pass(&mut self, time: &Rational) {
         while let Some(timed) = self.task.timed().get(self.state.timed_past())
             && timed.time <= *time
@@ -321,7 +320,7 @@ impl Follower {
         self.doing_at(facts, &now, what);
     }
 
-    /// Notes which of these facts something changes.
+    /// Runs `what`, and records which of these facts it changes.
     fn doing_at(&mut self, facts: &[FactId], at: &Rational, what: impl FnOnce(&mut Progression)) {
         let before: Vec<bool> = facts.iter().map(|fact| self.state.fact(*fact)).collect();
         what(&mut self.state);
@@ -343,7 +342,7 @@ impl Follower {
     }
 }
 
-/// The facts that an action's start or end may change, each once.
+/// Returns the facts that an action's start or end may change, each once.
 fn changed(action: &Action, is_start: bool) -> Vec<FactId> {
     let effects: &[Effect] = match &action.body {
         Body::Instantaneous(snap) if is_start => &snap.effects,

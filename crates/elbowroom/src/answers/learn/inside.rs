@@ -1,4 +1,5 @@
-//! Will the next run stay inside the plan's envelope? Intervals by split conformal prediction.
+//! Predictions whether the next run stays inside the plan's envelope, by split conformal
+//! prediction.
 
 use std::sync::Arc;
 
@@ -17,8 +18,8 @@ use crate::answers::{RequestError, Watcher, exact};
 use crate::explain::Explainer;
 use crate::flow::FlowError;
 
-/// Asks for intervals that hold all durations of the next execution of a plan at once, with a
-/// probability of at least `probability`, and whether they lie inside what the plan survives.
+/// Requests intervals that contain all durations of the next execution of a plan at once, with a
+/// probability of at least `probability`, and compares them with the plan's envelope.
 #[derive(Clone, Debug)]
 pub struct InsideRequest {
     /// The problem.
@@ -31,35 +32,36 @@ pub struct InsideRequest {
     pub probability: f64,
 }
 
-/// The intervals, and what they are worth.
+/// The intervals, and a verdict on the plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConformalBox {
-    /// The probability that was asked for.
+    /// The requested probability.
     pub probability: f64,
-    /// Whether the plan survives whatever lies in the intervals.
+    /// Verdict on the plan for durations in the intervals.
     pub verdict: Verdict,
-    /// Why the plan does not survive everything in the intervals, or why that is not known.
+    /// The reason why the plan fails somewhere in the intervals, or why this is undecided.
     #[serde(default)]
     pub reason: Option<String>,
     /// The intervals, in the order of the plan's parameters.
     pub intervals: Vec<ConformalInterval>,
 }
 
-/// The use of the intervals for the plan.
+/// Verdict on a plan for durations in the intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// All durations of the next run lie in the intervals with the probability that was asked for,
-    /// and the plan survives all that lies in them.
+    /// All durations of the next run lie in the intervals with the requested probability, and the
+    /// plan works for all durations in them.
     Inside,
-    /// The first holds, but the plan does not survive everything in the intervals.
+    /// All durations lie in the intervals with the requested probability, but the plan fails for
+    /// some durations in them.
     Outside,
-    /// The first holds, but the course of processes and events may become another one in the
-    /// intervals, and whether the plan survives that is not known.
+    /// All durations lie in the intervals with the requested probability. There, processes and
+    /// events may take another course, and it is not known whether the plan works with it.
     Undecided,
     /// There are too few samples for some action.
     TooFew,
-    /// The plan does not work even as planned.
+    /// The plan fails as planned.
     NoEnvelope,
 }
 
@@ -79,18 +81,18 @@ pub struct ConformalInterval {
     /// The upper end.
     #[serde(with = "exact::upper")]
     pub upper: End,
-    /// With which probability the duration may lie outside.
+    /// Probability that the duration lies outside the interval.
     pub miss: f64,
-    /// How far the envelope's interval was stretched around the planned duration: up to 1, the
-    /// interval lies inside the envelope. `None` if no stretching is enough.
+    /// Factor of the stretching of the envelope's interval around the planned duration. Up to 1,
+    /// the interval lies inside the envelope. `None` if no factor is sufficient.
     pub factor: Option<f64>,
-    /// How many samples were used for it.
+    /// Number of samples used.
     pub samples: usize,
-    /// How many would be needed, where these are too few.
+    /// Number of samples needed, if there are too few.
     pub needed: Option<usize>,
 }
 
-/// A duration of the plan, its room, and its samples in two halves.
+/// A duration of the plan, its interval in the envelope, and its samples in two halves.
 struct Duration<'a> {
     index: usize,
     action: &'a str,
@@ -148,7 +150,7 @@ pub(super) fn answer(
             miss,
             factor: stretching.is_finite().then_some(stretching),
             samples: duration.training.len() + duration.calibration.len(),
-            // As many again for the other half.
+            // The other half needs the same number.
             needed: is_too_few.then(|| needed.saturating_mul(2)),
         });
         boxed = boxed.with_interval(duration.index.into(), interval);
@@ -178,8 +180,8 @@ pub(super) fn answer(
     })
 }
 
-/// What the judge says against the plan where all durations are as short, or as long, as the box
-/// allows.
+/// Returns the validator's objection to the plan with all durations at their lower ends, or with
+/// all at their upper ends.
 fn violation_at_an_end(explainer: &Explainer<'_>, boxed: &DecoupledEnvelope) -> Option<String> {
     Side::BOTH.into_iter().find_map(|side| {
         let mut valuation = explainer.plan.nominal();
@@ -192,7 +194,7 @@ fn violation_at_an_end(explainer: &Explainer<'_>, boxed: &DecoupledEnvelope) -> 
     })
 }
 
-/// The durations that are left open, with their samples: every second one is for training.
+/// Returns the open durations with their samples; every second sample is for training.
 fn durations<'a>(
     plan: &'a ParametrizedPlan,
     room: &DecoupledEnvelope,
@@ -242,7 +244,8 @@ fn durations<'a>(
     durations
 }
 
-/// The envelope's interval, stretched around the nominal value, rounded outwards to exact numbers.
+/// Returns the envelope's interval, stretched around the nominal value and rounded outwards to
+/// exact numbers.
 fn interval(nominal: &Rational, room: &Interval, stretching: f64) -> Interval {
     if stretching <= 0.0 {
         return Interval::point(nominal.clone());

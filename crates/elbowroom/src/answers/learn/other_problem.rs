@@ -4,11 +4,11 @@ use elbowroom_model::Problem;
 use elbowroom_sim::WorldModel;
 use elbowroom_text::Source;
 
-/// Returns a learnt world file without the sections that a problem cannot have, such as those of actions with objects of
-/// earlier problems, and the number of these sections.
+/// Returns a learnt world file without the sections that a problem cannot have, such as those of
+/// actions with objects of earlier problems, and the number of these sections.
 ///
-/// Sections are separated by blank lines, as `learn` writes them. Any other mistake in a section leaves it out, too; the
-/// lines before the first section stay as they are.
+/// Sections are separated by blank lines, as `learn` writes them. A section with any other mistake
+/// is also left out. The lines before the first section are kept.
 pub fn known_sections(text: &str, problem: &Problem) -> (String, usize) {
     let mut sections = text.split("\n\n");
     let head = sections.next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Predictions of a world file beside observations, action by action.
+//! Comparison of the predictions of a world file with observations, by action.
 
 use std::collections::BTreeMap;
 

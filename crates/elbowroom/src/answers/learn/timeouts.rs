@@ -53,7 +53,8 @@ fn absolute(group: &Group) -> Option<TimeoutRule> {
     Some(TimeoutRule::After { factor, at_least })
 }
 
-/// The limit on a duration, or on its multiple of the planned one, rounded up to two digits.
+/// Returns the limit on a duration, or on its multiple of the planned one, rounded up to two
+/// digits.
 fn limit(group: &Group) -> Option<Rational> {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let drawn = (0..DRAWS).map(|_| group.fit.distribution.draw(&mut rng));
@@ -69,7 +70,7 @@ fn rounded_up(value: f64) -> Option<Rational> {
         return None;
     }
     let unit = 10_f64.powf(value.log10().floor() - 1.0);
-    // Less a little, because 12 units may be a little more than 12 in binary.
+    // Minus a small margin, because 12 units may be slightly more than 12 in binary.
     let digits = (value / unit - 1e-9).ceil();
     let text = format!("{:.3}", (digits * unit).max(0.001));
     text.parse().ok()

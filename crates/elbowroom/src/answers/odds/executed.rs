@@ -1,4 +1,4 @@
-//! What comes of executing the plan in samples of a world on a clock.
+//! Results of executing the plan in samples of a world on a clock.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,40 +15,40 @@ use crate::answers::Watcher;
 use crate::execute::{Analyst, Execution, RememberingPlanner, RememberingPreparer};
 use crate::flow;
 
-/// The number of plans that are remembered.
+/// Maximum number of cached plans.
 const MEMORY: usize = 2000;
 
 /// The results of executing the plan with one executor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExecutedAnswer {
-    /// By whom.
+    /// The executor.
     pub executor: String,
-    /// Whether new plans were made, by the embedded planner and in no time.
+    /// `true` if new plans were made, by the embedded planner and in no simulated time.
     pub replans: bool,
-    /// How many samples were made.
+    /// Number of samples.
     pub samples: u64,
-    /// In how many the goal was reached.
+    /// Number of samples that reached the goal.
     pub reached: u64,
     /// Wilson's 95 % interval of the probability; `None` without samples.
     pub interval: Option<(f64, f64)>,
-    /// Why the others ended, the most frequent first.
+    /// Reasons for the end of the other samples, the most frequent first.
     pub ends: Vec<EndAnswer>,
 }
 
-/// A reason for which samples did not reach the goal.
+/// A reason why samples did not reach the goal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EndAnswer {
-    /// How often.
+    /// Number of these samples.
     pub samples: u64,
-    /// The verdict on the run.
+    /// The verdict of the run.
     pub verdict: String,
-    /// Why the last plan was given up: a word of `docs/formats/trace.md`.
+    /// The reason for abandoning the last plan: a word of `docs/formats/trace.md`.
     pub cause: Option<String>,
-    /// The action that this is about.
+    /// The action that caused it.
     pub action: Option<String>,
 }
 
-/// All executors, without and with new plans, in the same samples.
+/// Executes the plan with all executors, without and with new plans, in the same samples.
 pub(super) fn all(
     subject: &Subject<'_>,
     world: &WorldModel,
@@ -83,7 +83,7 @@ fn one(
         if watcher.flow().is_break() {
             break;
         }
-        // Each sample is the same whichever came before.
+        // A task of its own makes each sample independent of the earlier ones.
         let task = Arc::new(request.task.with_own_table());
         let seed = request.settings.seed.wrapping_add(sample);
         let report = Execution::of(&task)
@@ -108,7 +108,7 @@ fn one(
             action,
         })
         .collect();
-    // Those that are as frequent stay in the order of their words.
+    // A stable sort: equally frequent reasons keep the order of their words.
     ends.sort_by_key(|end| std::cmp::Reverse(end.samples));
     ExecutedAnswer {
         executor: executor.to_string(),

@@ -1,4 +1,4 @@
-//! What another order, retrying, or another plan would gain.
+//! Gains of another order, of retrying, and of another plan.
 
 use elbowroom_execution::PlanAnswer;
 use elbowroom_model::ground::Action;
@@ -16,30 +16,30 @@ pub struct GainsAnswer {
     pub best_order: Option<BestOrderAnswer>,
     /// The best order of the plan that the embedded planner makes, if that is another plan.
     pub planners_plan: Option<BestOrderAnswer>,
-    /// The plan's actions, chosen step by step as the state asks: repeated, skipped, in any order.
+    /// The plan's actions, each chosen for the current state: repeated, skipped, in any order.
     pub as_the_state_asks: ValueAnswer,
-    /// The same with all actions of the problem: no plan and no executor does better.
+    /// The same with all actions of the problem: an upper bound for all plans and executors.
     pub any_action: ValueAnswer,
 }
 
 /// The best order of a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BestOrderAnswer {
-    /// P(A ∩ G).
+    /// The success probability P(A ∩ G).
     pub probability: f64,
-    /// Whether no order is better.
+    /// `true` if no order is better.
     pub is_proven: bool,
     /// The happenings in words.
     pub happenings: Vec<String>,
 }
 
-/// A value that can only be calculated in small worlds without time.
+/// A value that can be computed only in small worlds without time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ValueAnswer {
-    /// It.
+    /// The value.
     Probability(f64),
-    /// Why it cannot be calculated.
+    /// The reason why it cannot be computed.
     Unknown(String),
 }
 
@@ -86,7 +86,7 @@ impl GainsAnswer {
     }
 }
 
-/// The best order of the plan that the embedded planner makes.
+/// Returns the best order of the plan that the embedded planner makes.
 fn of_planners_plan(
     subject: &Subject<'_>,
     watcher: &mut dyn Watcher,

@@ -7,30 +7,31 @@ use serde::{Deserialize, Serialize};
 
 use super::{OrderAnswer, Subject};
 
-/// All orders, or why they are not listed.
+/// All orders, or the reason why they are not listed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LatticeFinding {
     /// All orders.
     Lattice(LatticeAnswer),
-    /// Why they are not listed.
+    /// The reason why they are not listed.
     Refused(String),
 }
 
-/// All orders of a plan: the sets of happenings that they can have behind them.
+/// All orders of a plan, as a lattice: its elements are the sets of happenings that are prefixes of
+/// orders.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LatticeAnswer {
-    /// How many orders there are.
+    /// Number of orders.
     pub orders: usize,
     /// The sets, smaller ones first; the first is empty.
     pub sets: Vec<SetAnswer>,
     /// The happenings that lead from set to set.
     pub edges: Vec<EdgeAnswer>,
-    /// The sets that the order of the answer leads through, as far as it is among all these.
+    /// The sets along the order of the answer, up to the first one that is not listed.
     pub order: Vec<usize>,
 }
 
-/// A set of happenings that an order can have behind it.
+/// A set of happenings that is a prefix of an order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SetAnswer {
     /// The happenings in words.
@@ -41,7 +42,7 @@ pub struct SetAnswer {
     pub ends: Option<f64>,
 }
 
-/// One more happening.
+/// An edge of the lattice: one more happening.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EdgeAnswer {
     /// The position of a set.
@@ -104,7 +105,7 @@ impl LatticeAnswer {
         }
     }
 
-    /// The picture of it.
+    /// Returns a picture of the lattice.
     pub fn picture(&self, title: &str) -> LatticePicture {
         let best = self.sets.first().map_or(0.0, |set| set.best);
         let subtitle = format!(

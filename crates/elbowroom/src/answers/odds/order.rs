@@ -1,4 +1,4 @@
-//! An order: its happenings, its layers, and where its probability is lost.
+//! An order with its happenings, layers and losses.
 
 use elbowroom_model::ground::FactId;
 use elbowroom_num::Rational;
@@ -14,28 +14,29 @@ use crate::answers::RequestError;
 /// An order and its probability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OrderAnswer {
-    /// Whether it is the best that was found, not that of the plan's times.
+    /// `true` if it is the best order found, `false` if it is that of the plan's times.
     pub is_best: bool,
-    /// Whether it is proven that no order of the plan is better; `None` if that was not asked.
+    /// `true` if it is proven that no order of the plan is better; `None` if no other order was
+    /// examined.
     pub is_proven: Option<bool>,
-    /// P(A): that all happenings succeed.
+    /// P(A): the probability that all happenings succeed.
     pub actions_probability: f64,
-    /// P(A ∩ G): that all happenings succeed and the goal holds after them.
+    /// P(A ∩ G): the probability that all happenings succeed and the goal holds after them.
     pub probability: f64,
-    /// How many conditions on numbers were taken for granted, because the numbers depend on when
-    /// things happen.
+    /// Number of conditions on numbers that were assumed to hold, because the numbers depend on the
+    /// times of happenings.
     pub assumed_conditions: usize,
-    /// Whether durations and timed initials leave time for it.
+    /// `true` if the order is consistent with durations and timed initials.
     pub has_time: bool,
     /// The happenings.
     pub happenings: Vec<HappeningAnswer>,
     /// The layer after the last happening: the goal.
     pub goal: LayerAnswer,
-    /// Where the probability is lost. All masses and the probability add up to 1.
+    /// The losses. All masses and the probability add up to 1.
     pub losses: Vec<LossAnswer>,
-    /// The part of each action, in the order in which they begin.
+    /// The effect of each action on the probability, by start.
     pub actions: Vec<ActionAnswer>,
-    /// The facts that may change by themselves to the order's harm, the worst first.
+    /// The facts that may change by themselves and prevent success, the worst first.
     pub facts: Vec<FactAnswer>,
     /// The happenings as nodes.
     #[serde(skip)]
@@ -49,35 +50,38 @@ pub struct HappeningAnswer {
     pub kind: String,
     /// The action; `None` for timed initials.
     pub action: Option<String>,
-    /// In words.
+    /// The happening in words.
     pub what: String,
-    /// `true` if it comes at the same moment as the happening before it, because they need each other.
+    /// `true` if it happens at the same time as the happening before it, because they depend on
+    /// each other.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub together: bool,
-    /// The earliest time; `None` where there is no time for the order.
+    /// The earliest time; `None` if the order is inconsistent with durations and timed initials.
     #[serde(with = "exact::option")]
     pub earliest: Option<Rational>,
-    /// The latest time; `None` where there is no bound, or no time for the order.
+    /// The latest time; `None` if there is no bound, or if the order is inconsistent with durations
+    /// and timed initials.
     #[serde(with = "exact::option")]
     pub latest: Option<Rational>,
-    /// That everything up to here succeeds, and what is under way then can go on.
+    /// Probability that everything up to here succeeds, and that the actions running then can
+    /// continue.
     pub probability_so_far: f64,
-    /// The layer before it: the facts that must hold for the rest to work if nothing else goes
-    /// wrong.
+    /// The layer before it: the facts that must hold for the remaining order to succeed if nothing
+    /// else fails.
     pub layer: LayerAnswer,
 }
 
 /// A layer: the facts that must hold between two happenings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LayerAnswer {
-    /// Facts that must be true, facts that must be false as `(not …)`, other conditions as PDDL
-    /// writes them.
+    /// Facts that must be true, facts that must be false as `(not …)`, and other conditions, in
+    /// PDDL.
     pub conditions: Vec<String>,
-    /// The actions under way.
+    /// The running actions.
     pub running: Vec<String>,
 }
 
-/// A share of all worlds that is lost at one place.
+/// The share of all worlds that is lost at a happening.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LossAnswer {
     /// The position of the happening in the order, from 0; `None` before the first.
@@ -91,7 +95,7 @@ pub struct LossAnswer {
     pub mass: f64,
 }
 
-/// Why worlds are lost.
+/// Reasons for losses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "reason", rename_all = "kebab-case")]
 pub enum LossReason {
@@ -99,38 +103,37 @@ pub enum LossReason {
     Start,
     /// The end fails.
     End,
-    /// An action under way fails.
+    /// A running action fails.
     During {
         /// The action.
         action: String,
     },
-    /// Something that the happening needs does not hold.
+    /// A condition of the happening does not hold.
     Condition {
         /// The condition.
         condition: String,
-        /// The happening that should have seen to it, or last had an effect on it; `None`: the
-        /// initial state.
+        /// The last happening with an effect on the condition; `None` for the initial state.
         since: Option<String>,
     },
-    /// Something that an action under way needs does not hold.
+    /// An invariant of a running action does not hold.
     Throughout {
         /// The action.
         action: String,
         /// The condition.
         condition: String,
-        /// As above.
+        /// As in `Condition`.
         since: Option<String>,
     },
-    /// Something that the goal asks for does not hold.
+    /// A condition of the goal does not hold.
     Goal {
         /// The condition.
         condition: String,
-        /// As above.
+        /// As in `Condition`.
         since: Option<String>,
     },
 }
 
-/// The part of an action.
+/// The effect of an action on the probability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionAnswer {
     /// Its name.
@@ -139,14 +142,14 @@ pub struct ActionAnswer {
     pub happening: usize,
     /// P(A ∩ G) if its start, its end and its effects never failed.
     pub if_certain: f64,
-    /// P(A ∩ G) if failed attempts to start it were repeated; `None`: the order is too long.
+    /// P(A ∩ G) if failed attempts to start it were repeated; `None` if the order is too long.
     pub if_retried: Option<f64>,
-    /// P(A ∩ G) if it was started again at once whenever its end fails; `None`: its end does not
-    /// fail, a failure may leave one thing or another behind, or the order is too long.
+    /// P(A ∩ G) if it was started again at once whenever its end fails. `None` if its end does not
+    /// fail, if a failure has several possible outcomes, or if the order is too long.
     pub if_done_again: Option<f64>,
 }
 
-/// The part of a fact.
+/// The effect of a fact on the probability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FactAnswer {
     /// Its name.
@@ -232,7 +235,7 @@ impl OrderAnswer {
     }
 }
 
-/// The probability lost at a happening, apart from the goal.
+/// Returns the probability lost at a happening, without losses at the goal.
 fn lost(losses: &[Loss], position: Option<usize>) -> f64 {
     let here = losses
         .iter()
@@ -308,7 +311,7 @@ impl LossAnswer {
     }
 }
 
-/// The last happening before a loss that has an effect on the fact.
+/// Returns the last happening before a loss that has an effect on the fact.
 fn since(model: &Model, sequence: &[NodeId], loss: &Loss, fact: FactId) -> Option<String> {
     let before = match (loss.position, loss.reading) {
         (None, _) => 0,

@@ -1,4 +1,4 @@
-//! Has another planner look for a plan.
+//! Planning with other planners.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -16,7 +16,7 @@ use super::{
 use crate::answers::{PlanProgress, Watcher};
 use crate::flow;
 
-/// A planner that failed: neither a plan nor an answer came of it.
+/// A planner that failed: it returned neither a plan nor an answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{planner}: {outcome}")]
 pub struct PlannerFailure {
@@ -26,8 +26,8 @@ pub struct PlannerFailure {
     pub outcome: Outcome,
 }
 
-/// Has another planner look for a plan. It reads the texts of domain and problem itself, and gets a
-/// time limit of its own, so that it can end in its own way.
+/// Searches for a plan with another planner. The planner reads domain and problem itself, and gets
+/// its own time limit, so that it can end regularly.
 ///
 /// # Errors
 /// When the planner fails.
@@ -69,7 +69,7 @@ pub fn plan_with(
     let claim = match &report.outcome {
         Outcome::Unsolvable { .. } => {
             let says = format!("{}: {}", planner.name, report.outcome);
-            // The planner's own limit on time is not one on the certificate.
+            // The planner's time limit does not apply to the certificate.
             Some(course.claimed(
                 request.task,
                 says.clone(),
@@ -114,7 +114,7 @@ impl Course<'_> {
     }
 }
 
-/// The answer; failures of the planner are failures.
+/// Builds the answer, or an error if the planner failed.
 fn conclude(
     planner: &Planner,
     request: &PlanRequest<'_>,
@@ -177,7 +177,7 @@ fn conclude(
     Ok(PlanOutcome { answer, plan })
 }
 
-/// Why it ended.
+/// Returns the reason for the end of the planner.
 fn stop(statistics: &Statistics, halt: Option<Halt>) -> PlanStop {
     match statistics.ending {
         Some(Ending::TimeLimit) => PlanStop::TimeLimit,

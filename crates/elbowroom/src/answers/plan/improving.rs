@@ -1,4 +1,4 @@
-//! Plans as they are found, each better than the one before.
+//! Iterator over the plans of a search, each better than the one before.
 
 use std::io;
 use std::ops::ControlFlow;
@@ -15,10 +15,10 @@ use super::{PlanFinding, PlanOutcome, PlanRequest, plan};
 use crate::answers::{Event, Halt, RequestError, Watcher};
 use crate::execute::renumbered;
 
-/// As much as the main thread has.
+/// Stack size of the search thread: that of the main thread.
 const STACK: usize = 64 << 20;
 
-/// Asks the embedded planner for plans as it finds them.
+/// Requests an iterator over the plans that the embedded planner finds.
 #[derive(Clone, Copy, Debug)]
 pub struct ImprovingPlansRequest<'a> {
     /// The problem.
@@ -47,22 +47,22 @@ pub enum NextPlan {
     Better(BetterPlan),
     /// There are no more: see [`ImprovingPlans::answer`].
     Ended,
-    /// Nothing yet.
+    /// No result within the given time.
     Later,
 }
 
-/// Messages of the thread of a search.
+/// Messages from the search thread.
 enum News {
     Better(BetterPlan),
     Ended(Box<Result<PlanOutcome, RequestError>>),
 }
 
-/// A search in a thread of its own, and an iterator of the plans that it finds.
+/// A search in its own thread, as an iterator over the plans that it finds.
 ///
 /// The search continues between calls. Dropping this value requests its end at the next step.
 #[derive(Debug)]
 pub struct ImprovingPlans {
-    /// The caller's task. The search numbers facts in a table of its own.
+    /// The caller's task. The search numbers facts in its own table.
     task: Arc<Task>,
     news: Receiver<News>,
     is_to_stop: Arc<AtomicBool>,
@@ -71,10 +71,10 @@ pub struct ImprovingPlans {
 }
 
 impl ImprovingPlans {
-    /// Starts the search. It ends when nothing is left to search, or when `watcher` wants no more.
+    /// Starts the search. It ends when the search space is exhausted, or when `watcher` stops it.
     ///
     /// # Errors
-    /// When there is no thread to spare.
+    /// When the thread cannot be started.
     pub fn search(
         request: &ImprovingPlansRequest<'_>,
         watcher: Box<dyn Watcher + Send>,
@@ -104,7 +104,7 @@ impl ImprovingPlans {
                 threads,
             };
             let answer = plan(&mut request, &mut relay);
-            // Nobody may listen any longer.
+            // The receiver may be gone.
             let _ = sender.send(News::Ended(Box::new(answer)));
         })?;
         Ok(Self {
@@ -116,7 +116,7 @@ impl ImprovingPlans {
         })
     }
 
-    /// The next plan, or the end of the search, if it comes within this time.
+    /// Waits up to `patience` for the next plan or the end of the search.
     ///
     /// # Panics
     /// When the search has panicked, with the same message.
@@ -137,7 +137,7 @@ impl ImprovingPlans {
                 NextPlan::Ended
             }
             Err(RecvTimeoutError::Timeout) => NextPlan::Later,
-            // A thread that is gone without an answer has panicked.
+            // A thread that ends without an answer has panicked.
             Err(RecvTimeoutError::Disconnected) => match self.thread.take().map(JoinHandle::join) {
                 Some(Err(panic)) => resume_unwind(panic),
                 _ => panic!("the search has panicked"),
@@ -145,17 +145,17 @@ impl ImprovingPlans {
         }
     }
 
-    /// A plan of the search, with the numbers that its facts have here.
+    /// Returns a plan of the search with the fact numbers of the caller's task.
     fn translated(&self, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
         renumbered(&self.task, plan).expect("the search has the same actions")
     }
 
-    /// Tells the search to stop: it ends at its next step, with the best plan so far.
+    /// Requests the end of the search. It ends at its next step, with the best plan so far.
     pub fn stop(&self) {
         self.is_to_stop.store(true, Ordering::Relaxed);
     }
 
-    /// The answer, with the last plan again, once there are no more.
+    /// Returns the answer, with the last plan, after the end of the search.
     pub fn answer(&self) -> Option<&Result<PlanOutcome, RequestError>> {
         self.answer.as_deref()
     }
@@ -211,7 +211,7 @@ impl Watcher for Relay<'_> {
                 plan: plan.clone(),
                 finding: PlanFinding::of(self.task, plan, makespan, metric, None),
             };
-            // Nobody may listen any longer.
+            // The receiver may be gone.
             let _ = self.sender.send(News::Better(better));
         }
         self.inner.notice(event);

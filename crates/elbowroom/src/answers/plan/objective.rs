@@ -1,4 +1,4 @@
-//! Plans that are made better by their slack, or by the probability that they work.
+//! Plans with the greatest slack or success probability.
 
 mod worth;
 
@@ -20,20 +20,20 @@ use crate::flow;
 use crate::makespan::end;
 use worth::{Judge, Judged};
 
-/// What else than short a plan is to be.
+/// Objective of a plan other than its makespan or metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PlanObjective {
-    /// Great slack: the relative deviation from its nominal value that each duration may have, all at the same
-    /// time, in the plan's best box ([`elbowroom_envelope::Objective::LeastSlack`]).
+    /// The slack: the relative deviation from its nominal value that each duration may have, all at
+    /// the same time, in the plan's best box ([`elbowroom_envelope::Objective::LeastSlack`]).
     /// Documents in JSON call it `room`.
     #[serde(rename = "room", alias = "slack")]
     Slack,
-    /// Likely to work in a world: executed by `live`, without any new plan.
+    /// The success probability in a world, with the executor `live` and without replanning.
     Probability,
 }
 
-/// A name that is none of [`PlanObjective`].
+/// The name of an unknown [`PlanObjective`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("plans are made for `slack` or `probability`, not for `{0}`")]
 pub struct UnknownPlanObjective(String);
@@ -58,23 +58,23 @@ impl FromStr for PlanObjective {
     }
 }
 
-/// Asks for the plan that is best by an objective, of those that can be found.
+/// Requests the best plan by an objective, among those that can be found.
 #[derive(Clone, Debug)]
 pub struct BestPlanRequest<'a> {
     /// The problem.
     pub task: &'a Arc<Task>,
-    /// By what plans are compared: for [`PlanObjective::Probability`], in this world.
+    /// The objective; for [`PlanObjective::Probability`] with its world.
     pub aim: PlanAim<'a>,
-    /// How many problems like this one are planned for; without a limit, until the watcher wants no
-    /// more or there are no others.
+    /// Maximum number of variants of the problem that are planned for. Without a limit, the search
+    /// ends when the watcher stops it or there are no further variants.
     pub most_searches: Option<usize>,
     /// `true` if a ground action may overlap itself.
     pub self_overlap: bool,
-    /// About how much memory a search may use, in bytes.
+    /// Memory limit of a search, in bytes (approximate).
     pub most_memory: Option<u64>,
 }
 
-/// An objective with what it takes.
+/// An objective with its arguments.
 #[derive(Clone, Copy, Debug)]
 pub enum PlanAim<'a> {
     /// See [`PlanObjective::Slack`].
@@ -83,47 +83,47 @@ pub enum PlanAim<'a> {
     Probability(&'a WorldModel),
 }
 
-/// What a plan is worth by an objective.
+/// Value of a plan by an objective.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum PlanWorth {
-    /// The share of its nominal value by which each duration may deviate.
+    /// The deviation that each duration may have, as a share of its nominal value.
     Slack {
         /// The share.
         #[serde(rename = "room", with = "exact")]
         slack: Rational,
     },
-    /// How often it worked.
+    /// The success rate in samples of the world.
     Sampled {
-        /// The number of samples of the world in which it worked.
+        /// The number of successful samples.
         successes: u64,
         /// The number of samples.
         samples: u64,
         /// Wilson's 95 % interval of the probability.
         interval: Option<(f64, f64)>,
     },
-    /// Nothing is known of it: there is nothing in the plan that may deviate, or it is beyond exact
-    /// analysis.
+    /// The value is unknown: nothing in the plan may deviate, or it is beyond exact analysis.
     Unknown {
-        /// Why not.
+        /// The reason.
         why: String,
     },
 }
 
-/// How the plan was chosen.
+/// The choice of a plan among several.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanChoice {
-    /// By what.
+    /// The objective.
     pub objective: PlanObjective,
-    /// What the plan is worth.
+    /// Value of the plan.
     pub value: PlanWorth,
-    /// What the shortest plan that the planner found is worth.
+    /// Value of the shortest plan that the planner found.
     pub shortest: PlanWorth,
-    /// When that one ends.
+    /// Makespan of the shortest plan.
     pub shortest_makespan: Exact,
-    /// What the plan was made for, in words; empty if it is that one.
+    /// The variant of the problem that the plan was made for, in words; empty if it is the shortest
+    /// plan.
     pub made_for: String,
-    /// How many plans were compared.
+    /// Number of compared plans.
     pub compared: usize,
 }
 
@@ -142,11 +142,11 @@ impl fmt::Display for PlanWorth {
     }
 }
 
-/// Looks for the best plan by an objective. Every plan is judged; the shortest one is the first,
-/// and no answer is worse than it.
+/// Searches for the best plan by an objective. The shortest plan is evaluated first, so the answer
+/// is at least as good.
 ///
 /// # Errors
-/// When the problem needs what the embedded planner does not support.
+/// When the problem has features that the embedded planner does not support.
 pub fn best_plan(
     request: &BestPlanRequest<'_>,
     watcher: &mut dyn Watcher,
@@ -236,7 +236,7 @@ pub fn best_plan(
     Ok(PlanOutcome { answer, plan })
 }
 
-/// The best plan, and what the shortest is worth and when it ends.
+/// Returns the best plan, and the value and makespan of the shortest plan.
 fn compared(
     request: &BestPlanRequest<'_>,
     task: &Task,
@@ -251,11 +251,12 @@ fn compared(
         let elapsed = course.elapsed();
         course.first.get_or_insert(elapsed);
         let known = best.as_ref().map(|best| &best.value);
-        // By now the facts that plans are about have their numbers.
+        // After planning, the task's table contains the facts of plans.
         let judge = judge.get_or_insert_with(|| Judge::of(request, task));
         let value = judge.value(&candidate.plan, known, course);
         let Some(value) = value else {
-            // Interrupted: of a first plan nothing may be known, of others nothing is claimed.
+            // Interrupted: the first plan is returned with an unknown value, a later one is
+            // dropped.
             best.get_or_insert(Judged::unknown(candidate, "the search was ended before"));
             break;
         };
@@ -283,7 +284,7 @@ impl PlanAim<'_> {
     }
 }
 
-/// The value of the problem's metric, if it has one.
+/// Returns the value of the problem's metric, if it has one.
 fn metric(task: &Task, plan: &TimeTriggeredPlan) -> Option<Rational> {
     match flow::judge(task, plan) {
         elbowroom_model::validate::Verdict::Valid(report) => report.metric(task),
@@ -292,8 +293,8 @@ fn metric(task: &Task, plan: &TimeTriggeredPlan) -> Option<Rational> {
 }
 
 impl Course<'_> {
-    /// Tells how far the search has come, with a new best plan and its worth, and says
-    /// whether to go on.
+    /// Notifies the watcher of the progress, with a new best plan and its value. Returns `true` if
+    /// the search continues.
     fn goes_on(&mut self, states: u64, new: Option<(&Judged, &str)>) -> bool {
         let progress = PlanProgress {
             plan: new.map(|(judged, _)| &judged.candidate.plan),

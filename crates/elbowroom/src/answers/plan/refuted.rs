@@ -70,7 +70,7 @@ impl Course<'_> {
 }
 
 impl PlanFinding {
-    /// No plan was found, and no planner claims that there is none.
+    /// Returns the finding for a search without a plan, if no planner claims that there is none.
     pub(super) fn none(task: &Task, reason: String) -> Self {
         Self::None {
             reason: with_fluents(task, reason),

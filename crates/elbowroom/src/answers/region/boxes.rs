@@ -1,4 +1,4 @@
-//! Boxes inside the region, to compare with it.
+//! Boxes inside the region, for comparison.
 
 use std::ops::ControlFlow;
 
@@ -15,11 +15,11 @@ use crate::answers::{RequestError, Watcher, exact};
 /// A box inside the region.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BoxAnswer {
-    /// How it was found: `irr`, or what it is the best of: `least-slack`, `widths`.
+    /// The search that found it: `irr`, or the objective of the best box: `least-slack`, `widths`.
     pub name: String,
     /// The interval of each parameter, by name.
     pub intervals: IndexMap<String, IntervalAnswer>,
-    /// Its share of the region's volume; `None` if that was not asked for, or cannot be told.
+    /// Its share of the region's volume; `None` if it was not requested, or is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub share: Option<Share>,
     #[serde(skip)]
@@ -37,8 +37,8 @@ pub struct IntervalAnswer {
     pub upper: End,
 }
 
-/// The boxes of the request's plan for the weak guarantee, whose region it is. Those that are not
-/// found before the watcher wants no more are left out.
+/// Returns boxes of the request's plan for the weak guarantee, on which the region is based. Boxes
+/// that are not found before the watcher stops the search are left out.
 pub(super) fn boxes(
     request: &EnvelopeRequest,
     watcher: &mut dyn Watcher,

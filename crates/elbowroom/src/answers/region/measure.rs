@@ -1,4 +1,4 @@
-//! The volume of the region, and the share of it that boxes have.
+//! The volume of the region, and the boxes' shares of it.
 
 use std::ops::ControlFlow;
 
@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 use super::sampling::estimate;
 use super::{BoxAnswer, Exact};
 
-/// Up to so many connected parameters are measured exactly.
+/// Largest number of connected parameters that are measured exactly.
 const MOST_EXACT: usize = 6;
-/// So many sides of sides are measured before sampling takes over.
+/// Work limit of the exact measurement, in faces of faces. Beyond it, the volume is sampled.
 const MOST_SIDES: usize = 300_000;
 /// The quantile of the standard normal distribution for intervals of 95 %.
 const DEVIATIONS: f64 = 1.96;
@@ -21,10 +21,10 @@ const DEVIATIONS: f64 = 1.96;
 /// The volume of a region.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measure {
-    /// The box in which the volume is measured, by parameter: as far as the region reaches, and where
-    /// nothing bounds it up to a multiple of the nominal value.
+    /// The box that contains the measured part, by parameter: the extent of the region, or a
+    /// multiple of the nominal value where the region is unbounded.
     pub frame: IndexMap<String, [Exact; 2]>,
-    /// The parameters that nothing bounds on some side.
+    /// The parameters that are unbounded on some side.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unbounded: Vec<String>,
     /// The volume as an exact number; `None` if it was estimated.
@@ -32,8 +32,7 @@ pub struct Measure {
     pub volume: Option<Exact>,
     /// Its decimal logarithm.
     pub log10: f64,
-    /// Where that is with a probability of 95 %, if it was estimated: by the spread of
-    /// independent random walks.
+    /// Its 95 % interval, if it was estimated: from the spread of independent random walks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log10_interval: Option<[f64; 2]>,
 }
@@ -46,20 +45,20 @@ pub struct Share {
     pub exact: Option<Exact>,
     /// The number.
     pub decimal: f64,
-    /// Where it is with a probability of 95 %, if it was estimated.
+    /// Its 95 % interval, if it was estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
 }
 
-/// A volume: exact, or a logarithm with its variance.
+/// A volume: exact, or an estimated logarithm with its variance.
 #[derive(Clone, Debug, PartialEq)]
 enum Size {
     Exact(Rational),
     Estimate { logarithm: f64, variance: f64 },
 }
 
-/// Measures a region, and each box's share of it; `None` if it has no volume, or the flow says no.
-/// Ends that nothing bounds count up to `most` times the nominal value away from it.
+/// Measures a region, and each box's share of it; `None` if it has no volume, or `flow` breaks.
+/// Unbounded ends count up to a distance of `most` times the nominal value from it.
 pub(super) fn measure(
     plan: &ParametrizedPlan,
     region: &Region,
@@ -111,7 +110,7 @@ pub(super) fn measure(
     })
 }
 
-/// `None` if there is no volume, or the flow says no.
+/// Returns the volume; `None` if there is none, or `flow` breaks.
 fn size_of(body: &Body, seed: u64, flow: &mut dyn FnMut() -> ControlFlow<()>) -> Option<Size> {
     let mut pieces = Vec::new();
     for (index, components) in body.pieces.iter().enumerate() {
@@ -152,7 +151,7 @@ fn size_of_component(
 }
 
 impl Size {
-    /// The natural logarithm.
+    /// Returns the natural logarithm.
     fn logarithm(&self) -> f64 {
         match self {
             Self::Exact(volume) => logarithm(volume),
@@ -167,7 +166,7 @@ impl Size {
         }
     }
 
-    /// How far the logarithm may be off; `None` if it is exact.
+    /// Returns the half-width of the 95 % interval of the logarithm; `None` if it is exact.
     fn spread(&self) -> Option<f64> {
         match self {
             Self::Exact(_) => None,
@@ -212,7 +211,7 @@ fn sum(pieces: &[Size]) -> Size {
     }
 }
 
-/// The natural logarithm of a number that may be too large or too small for a float.
+/// Returns the natural logarithm of a number that may be too large or too small for a float.
 fn logarithm(value: &Rational) -> f64 {
     if !value.is_positive() {
         return f64::NEG_INFINITY;

@@ -1,4 +1,4 @@
-//! Two parameters of a region as a picture.
+//! Pictures of two parameters of a region.
 
 use std::ops::ControlFlow;
 
@@ -10,26 +10,26 @@ use elbowroom_report::plane::PlanePicture;
 use super::{RegionFinding, RegionOutcome};
 use crate::box_text::{self, BoxTextError};
 
-/// Which picture of a region.
+/// Selection of a picture of a region.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plane {
-    /// Two parameters, from left to right and upwards, named as in boxes
+    /// The horizontal and the vertical parameter, named as in boxes
     /// ([`parse_box`](crate::box_text::parse_box)).
     pub axes: [String; 2],
-    /// What becomes of the other parameters.
+    /// Values of the other parameters.
     pub others: Others,
 }
 
-/// What becomes of the parameters that a picture does not show.
+/// Values of the parameters that a picture does not show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Others {
     /// They have their nominal values: a slice.
     Nominal,
-    /// They have whatever values suit: a projection.
+    /// They have any values inside the region: a projection.
     Any,
 }
 
-/// Why there is no such picture.
+/// Reasons for a missing picture.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
     /// There is no such parameter.
@@ -38,7 +38,7 @@ pub enum PictureError {
     /// Both axes are the same.
     #[error("`{0}` is given for both axes of the picture, which needs two parameters")]
     Same(String),
-    /// The projection takes too much.
+    /// The projection exceeds a limit.
     #[error("no projection: {0}")]
     Limit(#[from] ExactError),
     /// There is no region.
@@ -46,11 +46,11 @@ pub enum PictureError {
     NoRegion,
 }
 
-/// The picture of a region, with the boxes that its answer has.
+/// Draws a region, with the boxes of its answer.
 ///
 /// # Errors
-/// When a name is not one of the plan, there is no region, or a projection takes too much or too
-/// long by `flow`.
+/// When a name is not one of the plan, there is no region, or a projection exceeds a limit or the
+/// time allowed by `flow`.
 pub fn picture(
     outcome: &RegionOutcome,
     plane: &Plane,
@@ -113,7 +113,7 @@ pub fn picture(
     })
 }
 
-/// The name by which a picture knows a box.
+/// Returns the label of a box in pictures.
 fn box_name(name: &str) -> String {
     match name {
         "irr" => "IRR's box".to_owned(),
@@ -123,7 +123,7 @@ fn box_name(name: &str) -> String {
     }
 }
 
-/// `dur_0: (drive rover depot shelf)`.
+/// Returns the label of a parameter: `dur_0: (drive rover depot shelf)`.
 fn label(plan: &ParametrizedPlan, id: ParameterId) -> String {
     let parameter = plan.parameter(id);
     match parameter.kind {
@@ -135,8 +135,8 @@ fn label(plan: &ParametrizedPlan, id: ParameterId) -> String {
     }
 }
 
-/// From where to where an axis goes: around the nominal value, the boxes, and what of the region is
-/// not much further away than these.
+/// Returns the ends of an axis. It covers the surroundings of the nominal value, the boxes, and the
+/// parts of the region that are not much further away.
 fn window(
     id: ParameterId,
     plan: &ParametrizedPlan,
@@ -147,7 +147,7 @@ fn window(
     let own = usize::from(axes[1] == id);
     let nominal = &plan.parameter(id).nominal;
     let room = nominal.abs().max(Rational::ONE);
-    // Three times the nominal value away at most: what goes on for ever leaves the picture there.
+    // At most three times the nominal value away from it; unbounded parts leave the picture there.
     let far = &room * Rational::from(3);
     let (least, most) = (nominal - &far, nominal + &far);
     let (mut from, mut to) = (nominal - &room, nominal + &room);
@@ -172,7 +172,7 @@ fn window(
             stretch(&corner[own]);
         }
     }
-    // Durations begin at zero.
+    // The axis does not exceed the parameter's range: durations begin at zero.
     let range = &plan.parameter(id).range;
     if let Some(least) = range.lower.value()
         && from < *least
@@ -183,7 +183,7 @@ fn window(
     [from - &margin, to + &margin]
 }
 
-/// The last part of a path.
+/// Returns the last part of a path.
 fn short_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }

@@ -1,9 +1,9 @@
-//! The volume of what has too many coordinates to be measured exactly, by seeded sampling.
+//! Volumes of bodies with too many coordinates for exact measurement, by seeded sampling.
 //!
-//! A chain of bodies, from a box inside to the whole, each at most twice as large as the one before:
-//! how much larger is the share of a random walk in the larger one that falls into the smaller
-//! one. The walk moves along one coordinate at a time ("hit and run"). Several walks with seeds of
-//! their own tell how uncertain the result is.
+//! A chain of bodies leads from a box inside to the whole body; each is at most twice as large as
+//! the one before. Their ratio is the reciprocal of the share of a random walk in the larger one
+//! that falls into the smaller one. The walk moves along one coordinate at a time ("hit and run").
+//! Several walks with different seeds estimate the variance.
 
 use std::ops::ControlFlow;
 
@@ -11,12 +11,12 @@ use elbowroom_envelope::Component;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
-/// The walks.
+/// Number of walks.
 const WALKS: u32 = 16;
-/// Steps of a walk in each body, for each coordinate.
+/// Number of steps of a walk in each body, per coordinate.
 const STEPS: usize = 120;
 
-/// A logarithm of a volume, and its variance.
+/// An estimated logarithm of a volume, and its variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate {
     pub(super) logarithm: f64,
@@ -25,13 +25,13 @@ pub(super) struct Estimate {
 
 /// `a x <= b`, by coordinate.
 struct Rows {
-    /// For each coordinate the rows with it, and its factors there.
+    /// For each coordinate, the rows that contain it, with its factors.
     of: Vec<Vec<(usize, f64)>>,
-    /// What is left of each row's bound at the walk's place.
+    /// The slack of each row at the current position of the walk.
     slack: Vec<f64>,
 }
 
-/// The volume of a component; `None` if it has no inside, or `flow` says no.
+/// Estimates the volume of a component; `None` if it has no interior, or `flow` breaks.
 pub(super) fn estimate(
     component: &Component,
     seed: u64,
@@ -47,7 +47,7 @@ pub(super) fn estimate(
     let (middle, half) = (float(&middle), float(&half));
     let count = middle.len();
     let dimension = f64::from(u32::try_from(count).ok()?);
-    // The frame comes first: twice its width around the middle covers all.
+    // The rows of the frame come first. Twice its width around the middle covers the whole body.
     let furthest = (0..count).map(|place| {
         let (lower, upper) = (
             &component.rows[2 * place].1,
@@ -119,8 +119,8 @@ struct Walk {
 }
 
 impl Walk {
-    /// Walks in the body cut to `outer` times the inscribed box: the share of its steps in the body
-    /// cut to `inner` times that box.
+    /// Walks in the body cut to `outer` times the inscribed box. Returns the share of its steps in
+    /// the body cut to `inner` times that box.
     fn share(&mut self, half: &[f64], inner: f64, outer: f64) -> f64 {
         let count = half.len();
         let mut beyond = (0..count)
@@ -160,7 +160,7 @@ impl Walk {
         inside / steps
     }
 
-    /// Uniform in `[0, 1)`.
+    /// Returns a uniform random number in `[0, 1)`.
     #[allow(clippy::cast_precision_loss, reason = "53 bits fit exactly")]
     fn unit(&mut self) -> f64 {
         (self.random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64

@@ -1,4 +1,4 @@
-//! What may change in a plan, as parameters of its network.
+//! The changeable quantities of a plan, as parameters of its network.
 
 use std::sync::Arc;
 
@@ -18,24 +18,25 @@ use super::RepairRequest;
 use crate::AnyPlan;
 use crate::flow::FlowError;
 
-/// What a unit of a duration costs, which the world decides on, if nobody says otherwise.
+/// Default cost per unit of a duration, which the world decides.
 const DURATION_WEIGHT: i64 = 2;
-/// The same of a bound that keeps time points apart.
+/// Default cost per unit of a bound that separates time points.
 const SEPARATION_WEIGHT: i64 = 10;
 
 /// A plan whose changeable quantities are parameters.
 pub(super) struct Subject {
-    /// With each timed initial by itself.
+    /// The task with separate timed initials.
     pub(super) task: Task,
     pub(super) plan: ParametrizedPlan,
-    /// How many of its parameters are the plan's own; the others were opened for the repair.
+    /// Number of the plan's own parameters; the others were opened for the repair.
     pub(super) given: usize,
-    /// Of a plan with fixed times, the times, by which interfering actions keep their order.
+    /// The times of a plan with fixed times, which order its interfering actions.
     pub(super) times: Option<Schedule>,
     pub(super) changeable: Vec<Changeable>,
-    /// Before anything was opened: where the actions have all of their domain's durations.
+    /// The plan before quantities were opened, whose actions have the duration constraints of the
+    /// domain.
     original: StnPlan,
-    /// Of bounds in an STN plan file, what they are, in words.
+    /// The opened bounds of an STN plan file, described in words.
     pub(super) bounds: Vec<(ParameterId, String)>,
 }
 
@@ -110,7 +111,7 @@ impl Subject {
         });
     }
 
-    /// Refuses to open a duration of which the domain says what changes with the plan's course.
+    /// Rejects opening a duration whose constraint in the domain depends on the plan's course.
     fn allow(
         &self,
         closed: &ParametrizedPlan,
@@ -135,7 +136,7 @@ impl Subject {
         })
     }
 
-    /// The values of a parameter that was opened which cost nothing.
+    /// Returns the values of an opened parameter that cost nothing.
     fn free(&self, closed: &ParametrizedPlan, id: ParameterId) -> Interval {
         let parameter = self.plan.parameter(id);
         let ParameterKind::Duration(instance) = parameter.kind else {
@@ -156,7 +157,7 @@ impl Subject {
         )
     }
 
-    /// Takes back that a parameter was opened, except for its name.
+    /// Restores the original range of an opened parameter, which keeps its name.
     fn fix(&mut self, closed: &ParametrizedPlan, id: ParameterId) {
         let free = self.free(closed, id);
         let parameter = &mut self.plan.parameters[id.index()];
@@ -168,7 +169,7 @@ impl Subject {
         if let Some(most) = free.upper.value().filter(|most| *nominal > **most) {
             nominal.clone_from(most);
         }
-        // Within what is allowed it stays free.
+        // It can still vary within the range that the domain allows.
         self.changeable.push(Changeable {
             parameter: id,
             free,
@@ -218,7 +219,7 @@ impl Subject {
             return;
         };
         let words = self.bound_words(constraint.from, constraint.to, side);
-        // What is in order stays in order.
+        // The order of the two time points is kept.
         let range = if value.is_negative() {
             Interval::EVERYTHING
         } else {
@@ -256,7 +257,7 @@ impl Subject {
         id
     }
 
-    /// The changed problem, and the plan with these values and times.
+    /// Returns the changed problem, and the plan with these values and times.
     pub(super) fn repaired(
         &self,
         values: &Valuation,
@@ -275,7 +276,7 @@ impl Subject {
             let value = &values[own.parameter];
             let allowed = self.original.instance(instance).action.durative();
             let duration = match allowed {
-                // What the domain allows it goes on asking for.
+                // A duration that the domain allows keeps its constraint.
                 Some(body) if own.free.contains(value) => body.duration.clone(),
                 _ => vec![DurationConstraint {
                     comparison: Comparison::Equal,
@@ -292,7 +293,7 @@ impl Subject {
     }
 }
 
-/// All that may change if nobody says what.
+/// Returns all quantities that may change by default.
 fn every_quantity(task: &Task, plan: &ParametrizedPlan) -> Vec<VarySpec> {
     let spec = |target, weight: i64| VarySpec {
         text: String::new(),
@@ -337,7 +338,7 @@ fn every_quantity(task: &Task, plan: &ParametrizedPlan) -> Vec<VarySpec> {
     durations.chain(timed).collect()
 }
 
-/// An STN plan whose timed initials are those of the task.
+/// Returns an STN plan whose timed initials are those of the task.
 fn with_timed_apart(task: &Task, plan: &ParametrizedPlan) -> ParametrizedPlan {
     let mut apart = plan.clone();
     let is_action = |node: &Node| !matches!(node, Node::Timed(_));
@@ -347,7 +348,7 @@ fn with_timed_apart(task: &Task, plan: &ParametrizedPlan) -> ParametrizedPlan {
         .iter()
         .filter(|node| is_action(node))
         .count();
-    // Timed initials come last, and only their own times say anything about them.
+    // Timed initials come last, and only the bounds on their own times mention them.
     apart.plan.nodes.truncate(count);
     apart
         .plan
@@ -366,8 +367,8 @@ fn with_timed_apart(task: &Task, plan: &ParametrizedPlan) -> ParametrizedPlan {
     apart
 }
 
-/// A time for each node such that differences of starts and ends are durations that the file gives;
-/// the plan need not have a schedule.
+/// Returns a time for each node such that differences of starts and ends are the durations in the
+/// file. The plan need not have a schedule.
 fn durations_of(plan: &ParametrizedPlan) -> Schedule {
     let mut times = vec![Rational::ZERO; plan.plan.nodes.len()];
     let nominal = plan.nominal();

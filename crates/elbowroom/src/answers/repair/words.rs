@@ -1,4 +1,4 @@
-//! A repair in words.
+//! Descriptions of repairs in words.
 
 use elbowroom_envelope::obligations::Requirement;
 use elbowroom_envelope::{Hindrance, Repair};
@@ -10,7 +10,7 @@ use super::Change;
 use super::subject::Subject;
 use crate::explain::Explainer;
 
-/// So many digits of numbers in words.
+/// Number of digits of numbers in descriptions.
 const DIGITS: u32 = 6;
 
 impl Subject {
@@ -18,7 +18,7 @@ impl Subject {
         Explainer::new(&self.task, &self.plan)
     }
 
-    /// The quantities that cost something at these values.
+    /// Returns the quantities that cost something at these values.
     pub(super) fn changes(&self, values: &Valuation) -> Vec<Change> {
         let changes = self.changeable.iter().filter_map(|own| {
             let to = &values[own.parameter];
@@ -40,7 +40,7 @@ impl Subject {
         bound.map_or_else(|| self.explainer().quantity(id), |(_, words)| words.clone())
     }
 
-    /// What makes the repair cost so much.
+    /// Describes the bounds and conditions that determine the cost of the repair.
     pub(super) fn because(&self, repair: &Repair) -> Vec<String> {
         let hindrances = repair.because.iter().map(|(hindrance, _)| hindrance);
         let mut words: Vec<String> = Vec::new();
@@ -54,7 +54,7 @@ impl Subject {
         words
     }
 
-    /// What stands in the way of any repair.
+    /// Describes the bounds and conditions that prevent any repair.
     pub(super) fn hindrances(&self, hindrances: &[Hindrance]) -> Vec<String> {
         let mut words: Vec<String> = Vec::new();
         for hindrance in hindrances {
@@ -69,7 +69,8 @@ impl Subject {
         words
     }
 
-    /// A requirement that cannot be met; of a fact, whether anything makes it so.
+    /// Describes a requirement that cannot be met; for a fact, also whether any action makes it
+    /// true.
     fn missing(&self, requirement: &Requirement) -> String {
         let words = self.explainer().requirement(requirement);
         let (Requirement::Condition { condition, .. }
@@ -123,7 +124,7 @@ impl Subject {
         }
     }
 
-    /// A bound that an STN plan did not have, in words.
+    /// Describes an additional bound of an STN plan.
     pub(super) fn bound(&self, constraint: &Constraint) -> Option<String> {
         let values = self.plan.nominal();
         let side = |bound: &Bound, side: Side| {
@@ -139,7 +140,7 @@ impl Subject {
         (!sides.is_empty()).then(|| sides.join(", "))
     }
 
-    /// A bound of a constraint, in words.
+    /// Describes a bound of a constraint.
     pub(super) fn bound_words(&self, from: NodeId, to: NodeId, side: Side) -> String {
         let words = |node: NodeId| self.plan.plan.node_words(&self.task, node);
         let extreme = match side {

@@ -1,4 +1,4 @@
-//! Problems in which actions bring less, or take more, than they are planned to.
+//! Variants of problems with less production or more consumption than planned.
 
 use elbowroom_model::Task;
 use elbowroom_model::problem::{
@@ -11,17 +11,17 @@ use elbowroom_sim::{Purpose, Rule, WorldModel};
 use super::super::rewrite::add_function_of;
 use super::variant::{SAMPLES, SEED, place_of};
 
-/// How scarce things are in a variant.
+/// Scarcity of amounts in a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Scarcity {
-    /// As in that many of 100 cases at most.
+    /// The quantile, in percent: amounts are at most this scarce in this share of cases.
     pub(super) quantile: u64,
-    /// Of what: the position of the world's rule; all of them if there is none.
+    /// The position of the rule in the world; `None` for all rules.
     pub(super) of: Option<usize>,
 }
 
-/// The scarcities for which plans are made, those of one thing first: where several amounts vary, all
-/// of them being bad at once may leave no plan, and then one of them says what a plan should beware of.
+/// Returns the scarcities to plan for. Those of a single rule come first: if several amounts are
+/// scarce at once, there may be no plan, but plans for a single scarce amount are still useful.
 pub(super) fn scarcities(world: &WorldModel) -> Vec<Scarcity> {
     let rules =
         || (0..world.amounts.len()).filter(|place| !world.amounts[*place].rule.is_certain());
@@ -40,7 +40,7 @@ pub(super) fn scarcities(world: &WorldModel) -> Vec<Scarcity> {
 }
 
 impl Scarcity {
-    /// What plans are made for, for people.
+    /// Describes the variant for users.
     pub(super) fn words(self, world: Option<&WorldModel>) -> String {
         let rule = self.of.and_then(|place| world?.amounts.get(place));
         let what = rule.map_or("amounts".to_owned(), |rule| rule.fluent.to_string());
@@ -51,9 +51,8 @@ impl Scarcity {
         )
     }
 
-    /// Makes things scarce: what an action takes is as much, and what it brings as little, as in so
-    /// many of 100 cases, and never less scarce than planned. Where the domain gives no number, nothing
-    /// changes.
+    /// Makes amounts scarce: the quantile of consumption, and the opposite quantile of production,
+    /// but never less scarce than planned. Effects without a constant amount do not change.
     pub(super) fn apply(self, task: &Task, problem: &mut Problem, world: &WorldModel) {
         for schema in (0..problem.schemas.len()).map(SchemaId::from) {
             for (at_end, place) in updates(problem, schema) {
@@ -72,7 +71,8 @@ impl Scarcity {
         }
     }
 
-    /// The amount in place of a number, with the problem that says how much it is.
+    /// Returns the expression that replaces a constant amount, and the problem that defines its
+    /// values.
     fn scarce(
         self,
         task: &Task,
@@ -137,7 +137,7 @@ impl Scarcity {
     }
 }
 
-/// The effects of a schema that change numbers: whether at its end, and the place.
+/// Returns the numeric effects of a schema: `true` for an effect at the end, and its position.
 fn updates(problem: &Problem, schema: SchemaId) -> Vec<(bool, usize)> {
     let of = |at_end| {
         let numbered = effects(problem, schema, at_end).iter().enumerate();
@@ -167,7 +167,7 @@ fn effects_mut(problem: &mut Problem, schema: SchemaId, at_end: bool) -> &mut [E
     }
 }
 
-/// The name of a fluent of an instance.
+/// Returns the name of a fluent of an instance.
 fn ground(problem: &Problem, fluent: &Fluent, arguments: &[ObjectId]) -> Option<String> {
     let mut name = format!("({}", problem.functions[fluent.function.index()].name);
     for term in &fluent.arguments {

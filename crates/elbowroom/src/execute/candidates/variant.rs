@@ -1,4 +1,4 @@
-//! Problems like a given one, whose plans are other plans of it.
+//! Variants of a problem, whose plans are further plans of the problem.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,34 +16,34 @@ use elbowroom_sim::{ExogenousChange, Purpose, WorldModel};
 use super::super::rewrite::{add_function_of, set_durations};
 use super::scarcity::Scarcity;
 
-/// How many samples a quantile is taken from.
+/// Number of samples for a quantile.
 pub(super) const SAMPLES: u64 = 100;
 
-/// Where the seeds of these samples begin: far from those that people choose.
+/// First seed of these samples, far from seeds that users choose.
 pub(super) const SEED: u64 = 0x7061_6365_0000_0000;
 
-/// How long actions take in a variant.
+/// Durations of actions in a variant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Pace {
-    /// As long as planned.
+    /// The planned durations.
     #[default]
     Planned,
-    /// As long as in that many of 100 cases at most, in the world; events of the world come as
-    /// early as in all others.
+    /// The quantiles of durations in the world, in percent. Events of the world have the opposite
+    /// quantiles, so they come early.
     Quantile(u64),
-    /// So many hundredths of what is planned.
+    /// The planned durations multiplied by this percentage.
     Slower(u64),
 }
 
-/// A problem like the given one.
+/// A variant of the problem.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Variant {
     pace: Pace,
-    /// Whether there is less of things than planned.
+    /// Scarcity of amounts, if any.
     pub(super) scarcity: Option<Scarcity>,
-    /// Whether plans are to have actions that seldom fail, rather than to be short.
+    /// `true` if plans should have actions that rarely fail, rather than a short makespan.
     pub(super) is_reliable: bool,
-    /// The actions that plans must do without.
+    /// The actions that plans must not contain.
     pub(super) without: BTreeSet<String>,
 }
 
@@ -75,17 +75,17 @@ impl Variant {
         next
     }
 
-    /// Whether it is the problem itself.
+    /// Returns `true` if it is the problem itself.
     pub(super) fn is_problem(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Whether its plans are plans of the problem as they stand.
+    /// Returns `true` if its plans are plans of the problem without conversion.
     pub(super) fn is_as_written(&self) -> bool {
         self.pace == Pace::Planned && self.scarcity.is_none() && !self.is_reliable
     }
 
-    /// Whether the same is scarcer in it, or as scarce.
+    /// Returns `true` if the same amount is at least as scarce as in `other`.
     pub(super) fn is_scarcer_than(&self, other: &Self) -> bool {
         let (Some(own), Some(others)) = (self.scarcity, other.scarcity) else {
             return false;
@@ -93,7 +93,7 @@ impl Variant {
         own.of == others.of && own.quantile >= others.quantile
     }
 
-    /// What it is, for people; empty for the problem itself.
+    /// Describes the variant for users; empty for the problem itself.
     pub(super) fn words(&self, world: Option<&WorldModel>) -> String {
         let mut words = Vec::new();
         match self.pace {
@@ -120,7 +120,7 @@ impl Variant {
         words.join(", ")
     }
 
-    /// The problem, beginning where the situation is; `None` where it is no other one.
+    /// Returns the problem of the variant, starting in the situation; `None` if it does not differ.
     pub(super) fn problem(
         &self,
         task: &Task,
@@ -153,8 +153,8 @@ impl Variant {
     }
 }
 
-/// Gives actions another duration. A plan in which something is over too soon is none of the task,
-/// so none is shorter than planned.
+/// Changes the durations of actions. No duration becomes shorter than planned, because a plan with
+/// shorter durations is no plan of the task.
 fn slow_down(task: &Task, problem: &mut Problem, slow: &dyn Fn(&str, &Rational) -> Rational) {
     for schema in (0..problem.schemas.len()).map(SchemaId::from) {
         set_durations(task, schema, problem, &|name, planned| {
@@ -163,7 +163,7 @@ fn slow_down(task: &Task, problem: &mut Problem, slow: &dyn Fn(&str, &Rational) 
     }
 }
 
-/// From the command to the end, in that many of 100 cases at most.
+/// Returns the quantile, in percent, of the time from the command to the end.
 fn quantile_of(
     known: &mut BTreeMap<(String, Rational), Vec<Rational>>,
     world: &WorldModel,
@@ -192,8 +192,8 @@ pub(super) fn place_of(quantile: u64) -> usize {
     usize::try_from(quantile.min(100) * (SAMPLES - 1) / 100).unwrap_or(0)
 }
 
-/// What happens by itself, as timed initials: as early as all but that many of 100 times. What
-/// happens seldom is left out.
+/// Adds the events of the world as timed initials, at the opposite quantile of their times. Rare
+/// events are omitted.
 fn add_events(problem: &mut Problem, world: &WorldModel, quantile: u64, now: &Rational) {
     for (index, event) in world.exogenous.iter().enumerate() {
         #[expect(clippy::cast_precision_loss, reason = "below 100")]
@@ -220,7 +220,8 @@ fn add_events(problem: &mut Problem, world: &WorldModel, quantile: u64, now: &Ra
     }
 }
 
-/// A change of the world as one of the problem; `None` where the problem does not have it.
+/// Converts a change of the world to one of the problem; `None` if the problem does not have its
+/// fact or fluent.
 fn change(problem: &Problem, change: &ExogenousChange) -> Option<TimedChange> {
     let (ExogenousChange::Fact(name, _) | ExogenousChange::Value(name, _)) = change;
     let mut words = name.trim_matches(['(', ')']).split_whitespace();
@@ -236,12 +237,12 @@ fn change(problem: &Problem, change: &ExogenousChange) -> Option<TimedChange> {
     })
 }
 
-/// Makes the metric the odds against a plan: the sum, over its actions, of -ln P(it does not fail),
-/// and a little for the time, so that of plans alike the shorter one is better.
+/// Replaces the metric by the odds against a plan: the sum of -ln P(no failure) over its actions,
+/// plus a small weight for the time, so that the shorter of two equal plans is better.
 fn count_failures(task: &Task, problem: &mut Problem, world: &WorldModel) {
     let odds = FunctionId::from(problem.functions.len());
     problem.functions.push(Function {
-        // No PDDL name has a space, so none is the same.
+        // PDDL names have no spaces, so the name is unique.
         name: "odds against".to_owned(),
         parameters: Vec::new(),
     });
@@ -255,7 +256,7 @@ fn count_failures(task: &Task, problem: &mut Problem, world: &WorldModel) {
     for schema in (0..problem.schemas.len()).map(SchemaId::from) {
         let value = add_function_of(task, schema, "odds", problem, &|name, _| {
             let fails = world.failing(name).map_or(0.0, |rule| rule.probability);
-            // What always fails is worse than anything.
+            // An action that always fails gets a large finite cost.
             let against = -(1.0 - fails.min(0.999_999)).ln();
             Some(Rational::new(written(against), 1_000_000))
         });
@@ -279,7 +280,7 @@ fn count_failures(task: &Task, problem: &mut Problem, world: &WorldModel) {
     });
 }
 
-/// Millionths.
+/// Returns the number in millionths.
 pub(super) fn written(number: f64) -> i64 {
     #[expect(
         clippy::cast_possible_truncation,
@@ -289,7 +290,7 @@ pub(super) fn written(number: f64) -> i64 {
     whole
 }
 
-/// The duration that the domain fixes to a number.
+/// Returns the duration if the domain fixes it to a number.
 pub(super) fn duration_fixed_by_domain(action: &Action) -> Option<Rational> {
     let [only] = action.durative()?.duration.as_slice() else {
         return None;

@@ -15,7 +15,7 @@ use elbowroom_sim::Seen;
 use super::super::rollouts::{Metered, Rollouts};
 use super::{Rehearse, SEED, Way};
 
-/// What all samples of one scene have in common.
+/// Shared data of all samples of one scene.
 pub(super) struct Stage {
     belief: Progression,
     seen: Seen,
@@ -27,10 +27,10 @@ pub(super) struct Stage {
 
 impl Stage {
     pub(super) fn new(scene: &Scene<'_>, rollouts: &Rollouts) -> Self {
-        // What is only thought of gets no numbers.
+        // Samples must not add facts to the task's own table.
         let belief = scene.belief.with_own_table();
         let time = belief.time().to_string();
-        // FNV-1a: other scenes have other samples.
+        // FNV-1a: each scene has different samples.
         let hash = time.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
         });
@@ -46,7 +46,7 @@ impl Stage {
         }
     }
 
-    /// Whether the goal is reached by a way in a sample.
+    /// Returns `true` if an alternative reaches the goal in a sample.
     pub(super) fn succeeds(
         &mut self,
         who: &mut Rehearse,
@@ -122,7 +122,7 @@ impl Stage {
     }
 }
 
-/// Has a plan already for one situation.
+/// Planner with a prepared plan for one situation.
 struct Planned<'p> {
     first: Option<&'p (Situation, TimeTriggeredPlan)>,
     planner: &'p mut dyn Planner,
@@ -139,10 +139,10 @@ impl Planner for Planned<'_> {
     }
 }
 
-/// Begins nothing for a while.
+/// Executor that starts no action before a given time.
 struct Waiting {
     until: Rational,
-    /// What was heard meanwhile.
+    /// Events received while waiting.
     news: Vec<News>,
     inner: Box<dyn Executor>,
 }

@@ -1,5 +1,5 @@
-//! How the parts of a [`RunSpec`](super::RunSpec) are written: most as the texts that the command
-//! line reads.
+//! Serialization of the members of a [`RunSpec`](super::RunSpec): most are texts in the syntax of
+//! the command line.
 
 use serde::{Deserialize, Deserializer};
 
@@ -12,7 +12,7 @@ where
     Option::deserialize(deserializer)
 }
 
-/// As a text.
+/// Serialization as a text.
 pub(crate) mod as_text {
     use std::borrow::Cow;
     use std::fmt::Display;
@@ -38,7 +38,7 @@ pub(crate) mod as_text {
     }
 }
 
-/// As a list of texts.
+/// Serialization as a list of texts.
 pub(crate) mod listed {
     use std::fmt::Display;
     use std::str::FromStr;
@@ -64,7 +64,7 @@ pub(crate) mod listed {
     }
 }
 
-/// A positive number, as a text.
+/// Serialization of a positive number as a text.
 pub(super) mod positive {
     use elbowroom_num::Rational;
     use serde::de::Error;
@@ -90,7 +90,7 @@ pub(super) mod positive {
         }
     }
 
-    /// One that may be `null`, but not left out.
+    /// Serialization of a positive number or `null`; the member is required.
     pub(in crate::execute::spec) mod nullable {
         use elbowroom_num::Rational;
         use serde::de::Error;
@@ -121,6 +121,6 @@ pub(super) mod positive {
         }
     }
 
-    /// One that may be left out.
+    /// Serialization of a positive number or `null`; the member is optional.
     pub(in crate::execute::spec) use nullable as option;
 }

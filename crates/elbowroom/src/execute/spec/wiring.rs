@@ -1,4 +1,4 @@
-//! From what a run is to whoever makes it.
+//! Construction of a run from its specification.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -35,13 +35,13 @@ pub enum SpecError {
     /// The world file cannot be read.
     #[error("{0}")]
     World(Diagnostics),
-    /// Another planner is not known, or cannot be used like that.
+    /// Another planner is unknown, or cannot be used with these settings.
     #[error(transparent)]
     Planner(#[from] PlannerError),
     /// The likelihood file cannot be read.
     #[error("{0}")]
     Likelihoods(Diagnostics),
-    /// The problem has a part that executors do not heed.
+    /// The problem has a part that executors do not support.
     #[error(
         "plans cannot be executed here: executors do not support {0} yet, which the domain has"
     )]
@@ -49,40 +49,40 @@ pub enum SpecError {
     /// The time-outs name an action that the problem does not have.
     #[error("{0}")]
     Timeout(String),
-    /// The executor compares plans in the world that a world file describes, and there is none.
+    /// The executor compares plans in the world of a world file, but there is none.
     #[error("`{0}` must know how the world behaves")]
     NeedsWorld(ExecutorSpec),
-    /// The executor compares plans of the embedded planner, and there is another.
+    /// The executor compares plans of the embedded planner, but another planner is given.
     #[error("`{0}` chooses among plans of the embedded planner")]
     NeedsEmbedded(ExecutorSpec),
-    /// Self-overlap was allowed, and the plans come from another planner, or from none.
+    /// Self-overlap was allowed, but the plans come from another planner, or there is no planner.
     #[error("self-overlap can be allowed in plans of the embedded planner only, not of `{0}`")]
     SelfOverlap(String),
-    /// The likeliest first plan was asked for, and there is nothing to choose among, or by.
+    /// The likeliest first plan was requested, but it cannot be chosen.
     #[error("the likeliest first plan cannot be chosen: {0}")]
     FirstPlan(FirstPlanError),
     /// A time limit was set for a planner that has none.
     #[error("`{0}` has no time limit for better plans; the embedded planner is limited by states")]
     NoTimeLimit(String),
-    /// The most likely box was asked for, and nothing is known of the world.
+    /// The most likely box was requested, but there is no model of the world.
     #[error(transparent)]
     Chance(#[from] ChanceError),
-    /// A simulation was asked for.
+    /// A simulation was requested, but the world is a process.
     #[error("the world is a process; it cannot be simulated")]
     Process,
-    /// A requirement of a world that spoils plans is missing.
+    /// The adversarial world cannot be created.
     #[error(transparent)]
     Spoiler(#[from] SpoilerError),
 }
 
-/// Why the first plan cannot be chosen.
+/// Reasons why the first plan cannot be chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FirstPlanError {
     /// A plan was given.
     #[error("a plan is given")]
     Given,
-    /// Another planner was named, which gives its own plan only.
+    /// Another planner was named, whose plan is used without a choice.
     #[error("it is one of the embedded planner's")]
     AnotherPlanner,
     /// There is no world file, and there are no likelihoods.
@@ -93,14 +93,14 @@ pub enum FirstPlanError {
     Lasting,
 }
 
-/// There is no world that spoils the plan.
+/// Reasons why an adversarial world cannot be created.
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpoilerError {
-    /// There is none.
+    /// There is no plan.
     #[error("there is no plan to spoil")]
     NoPlan,
-    /// The plan does not work.
+    /// The plan cannot be prepared.
     #[error(transparent)]
     Unprepared(#[from] PrepareError),
     /// The box is not one of this plan.
@@ -109,17 +109,17 @@ pub enum SpoilerError {
     /// The plan has no envelope, and no box was given.
     #[error("the plan has no envelope to spoil it in")]
     NoEnvelope,
-    /// Nothing satisfies the plan's constraints.
+    /// The plan's constraints are inconsistent.
     #[error("in this box nothing satisfies the plan's constraints")]
     Empty,
 }
 
 impl RunSpec {
-    /// The world that the specification describes, unless that is a process: a simulation of
-    /// `model`, or a world that spoils `plan`.
+    /// Returns the world of the specification, unless it is a process: a simulation of `model`, or
+    /// an adversary of `plan`.
     ///
     /// # Errors
-    /// When there is no plan to spoil, or it does not fit the box.
+    /// When there is no plan for the adversary, or the plan does not match the box.
     pub fn world<'m>(
         &self,
         model: &'m WorldModel,
@@ -151,14 +151,13 @@ impl RunSpec {
         Ok(Box::new(Paced::new(sim, spoiling)))
     }
 
-    /// Whom [`Self::planner`] names, with the limits of the run; to be asked with `clock` and
-    /// `goes_on`, as in [`Embedded`]. For executors that look for likelier plans, it is the one
-    /// that makes the likeliest in the world of `model`. Its first plan is chosen as
-    /// [`Self::first_plan`] says; other planners have one plan only.
+    /// Returns the planner that [`Self::planner`] names, with the limits of the run, and with
+    /// `clock` and `goes_on` as in [`Embedded`]. For executors that search for likelier plans, it
+    /// returns the likeliest plan in the world of `model`. The embedded planner's first plan is
+    /// chosen by [`Self::first_plan`]; other planners return their only plan.
     ///
     /// # Errors
-    /// When the planner is not known, or has been set a limit that it does not have, or the
-    /// likelihood file cannot be read.
+    /// When the planner is unknown, or has no such limit, or the likelihood file cannot be read.
     pub fn planner_for<'a>(
         &self,
         task: &Task,
@@ -218,8 +217,8 @@ impl RunSpec {
         }))
     }
 
-    /// What the first plan is chosen by; `None` if it is the planner's own: if that was asked for,
-    /// nothing is known, or the goals are still to come.
+    /// Returns the knowledge for the choice of the first plan. `None` if the planner's own plan is
+    /// used: if it was requested, there is no knowledge, or goals are given later.
     fn known_before(
         &self,
         task: &Task,
@@ -238,7 +237,7 @@ impl RunSpec {
         }))
     }
 
-    /// Runs like this one, in samples of its world.
+    /// Returns the settings of rollouts of this run in samples of its world.
     fn rollouts(&self, world: &WorldModel, likelihoods: Arc<Likelihoods>) -> Rollouts {
         let world = Arc::new(world.clone());
         let mut flow = self.envelopes();
@@ -254,8 +253,8 @@ impl RunSpec {
         }
     }
 
-    /// Returns the rollouts of executors that weigh moves, which replace a table of moves. `None` if no model of the world
-    /// is believed.
+    /// Returns the rollouts of executors that evaluate moves, which replace a table of moves.
+    /// `None` if there is no believed world.
     fn rehearse(
         &self,
         task: &Task,
@@ -272,8 +271,9 @@ impl RunSpec {
         Ok(Some(SharedRehearse::new(rehearse)))
     }
 
-    /// By what a first plan is chosen if nobody says: by its probability where the embedded planner
-    /// makes it and something is known that it can be chosen by.
+    /// Returns the default criterion for a first plan: its probability, if the embedded planner
+    /// makes it and there is a model of the world or of likelihoods; otherwise, its makespan or
+    /// metric.
     pub fn usual_first_plan(&self) -> FirstPlan {
         let is_known = self.believed_world().is_some() || self.likelihoods.is_some();
         let is_embedded = self.planner.eq_ignore_ascii_case(EMBEDDED);
@@ -284,7 +284,7 @@ impl RunSpec {
         }
     }
 
-    /// Whom [`Self::planner`] names.
+    /// Returns the planner that [`Self::planner`] names.
     fn whom(&self) -> Result<Whom, SpecError> {
         let name = &self.planner;
         let own = match name {
@@ -298,10 +298,10 @@ impl RunSpec {
         }
     }
 
-    /// Whether the planner is known, and has the limits that it is set.
+    /// Checks that the planner is known, and supports its settings.
     ///
     /// # Errors
-    /// When it is not, or has not.
+    /// When it is unknown, or does not support them.
     pub fn check_planner(&self) -> Result<(), SpecError> {
         match self.whom()? {
             Whom::Nobody | Whom::Another(_) if self.self_overlap => {
@@ -311,11 +311,11 @@ impl RunSpec {
         }
     }
 
-    /// Whether the members go together, as far as that can be said before files are read: that the
-    /// planner is known, and that the executor can do with it and with what is known of the world.
+    /// Checks the consistency of the members before files are read: the planner is known, and the
+    /// executor supports the planner and the model of the world.
     ///
     /// # Errors
-    /// When they do not.
+    /// When they are inconsistent.
     pub fn check(&self) -> Result<(), SpecError> {
         self.check_planner()?;
         let whom = self.whom()?;
@@ -335,7 +335,7 @@ impl RunSpec {
         if self.objective == Some(Objective::Probability) && self.believed_world().is_none() {
             return Err(SpecError::Chance(ChanceError::NoWorld));
         }
-        // Who weighs moves goes by the plan where that cannot be done.
+        // Executors that evaluate moves follow the plan if there is no model.
         if !self.executor.asks_odds() || self.executor.asks_outlook() {
             return Ok(());
         }
@@ -348,7 +348,7 @@ impl RunSpec {
         }
     }
 
-    /// The embedded planner, with the limits of the run and without a clock.
+    /// Returns the embedded planner, with the limits of the run and without a clock.
     pub fn embedded(&self) -> Embedded<'static> {
         Embedded {
             settings: embedded::Settings {
@@ -362,7 +362,7 @@ impl RunSpec {
                 .planning_budget
                 .as_ref()
                 .map_or(u64::MAX, planning_work),
-            // Requests wait while plans are made in the thread of the run.
+            // Requests have to wait for plans that are made in the thread of the run.
             patience: if self.is_lasting && self.executor.asks_odds() {
                 1
             } else {
@@ -372,8 +372,8 @@ impl RunSpec {
         }
     }
 
-    /// The expected planning time in the world; 0 where it is measured, because it is not known
-    /// beforehand.
+    /// Returns the expected planning time in the world; 0 if it is measured, because it is not
+    /// known in advance.
     fn expected_planning_time(&self) -> Rational {
         match &self.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
@@ -381,7 +381,7 @@ impl RunSpec {
         }
     }
 
-    /// Who makes plans of this problem ready.
+    /// Returns the preparer of plans of this problem.
     ///
     /// # Errors
     /// When the world file cannot be read.
@@ -398,12 +398,12 @@ impl RunSpec {
         envelopes
     }
 
-    /// The execution that the specification is of; who plans, the plan to begin with, and the world
-    /// are still to be said. What executors take to be likely is found out within limits that do
+    /// Returns the execution of the specification. The caller adds the planner, the initial plan
+    /// and the world. Tables and likelihoods for the executor are computed within limits that do
     /// not depend on the machine.
     ///
     /// # Errors
-    /// When its files cannot be read, or the members do not go together.
+    /// When its files cannot be read, or its members are inconsistent.
     pub fn execution(&self, task: &Arc<Task>) -> Result<Execution<'static>, SpecError> {
         self.check()?;
         if let Some(feature) = task.only_judged() {
@@ -416,7 +416,7 @@ impl RunSpec {
         let envelopes = self.envelopes_in(model.as_ref());
         let model = model.filter(|_| self.executor.asks_odds());
         let is_embedded = matches!(self.whom()?, Whom::Embedded);
-        // A table of moves is made for one goal.
+        // A table of moves has a fixed goal.
         let has_table = self.executor.asks_outlook() && !self.is_lasting;
         let tabulated = model.as_ref().filter(|_| has_table);
         let tabulated = tabulated.map(|model| self.outlook(task, model, is_embedded));
@@ -446,10 +446,10 @@ impl RunSpec {
             .with_rehearsal(rehearsal))
     }
 
-    /// The table of moves of `policy` for the world of `model`.
+    /// Computes the table of moves of `policy` for the world of `model`.
     ///
     /// # Errors
-    /// The reason if there is none, for people.
+    /// The reason for a missing table, for users.
     fn outlook(
         &self,
         task: &Arc<Task>,

@@ -1,4 +1,4 @@
-//! The goals of a lasting run, and their states.
+//! The goals of a persistent run, and their states.
 
 use std::collections::VecDeque;
 
@@ -9,7 +9,7 @@ use elbowroom_report::trace::SnapshotLine;
 
 use super::super::documents::{GoalNow, GoalsNow, OpenGoal};
 
-/// The greatest number of closed goals that are remembered.
+/// Maximum number of closed goals in the list.
 const MOST_CLOSED: usize = 1000;
 
 const PURSUED: &str = "pursued";
@@ -20,7 +20,7 @@ const ACHIEVED: &str = "achieved";
 const CANCELLED: &str = "cancelled";
 const FAILED: &str = "failed";
 
-/// The open goals, and the last ones that were closed.
+/// The open goals, and the most recently closed ones.
 #[derive(Clone, Debug, Default)]
 pub(super) struct GoalList {
     open: Vec<GoalNow>,
@@ -52,13 +52,14 @@ impl GoalList {
         open.collect()
     }
 
-    /// Returns all goals that are remembered.
+    /// Returns all goals in the list.
     pub(super) fn all(&self) -> GoalsNow {
         let goals = self.closed.iter().chain(&self.open).cloned().collect();
         GoalsNow { goals }
     }
 
-    /// Returns the goals of a run that begins there. The goal of the problem has its text from this list.
+    /// Returns the goals of a run that continues from a snapshot. The goal of the problem has its
+    /// text from this list.
     pub(super) fn at(&self, snapshot: &SnapshotLine) -> Self {
         let own = self.open.first().map(|goal| &goal.goal);
         let open = snapshot.goals.iter().map(|line| GoalNow {
@@ -98,8 +99,9 @@ impl GoalList {
         }
     }
 
-    /// No plan reaches the open goals that are pursued; none exists if it `is_certain`. Those that are set aside even
-    /// now can never become true.
+    /// Marks the open goals after a failed search for a plan. Pursued goals become impossible if it
+    /// `is_certain` that no plan exists, otherwise unplanned. Goals that are still set aside are
+    /// impossible.
     pub(super) fn give_up(&mut self, is_certain: bool, why: &str, now: &Rational) {
         for goal in &mut self.open {
             let is_pursued = goal.state == PURSUED;
@@ -113,7 +115,7 @@ impl GoalList {
         }
     }
 
-    /// Another plan is requested for the open goals.
+    /// Marks the open goals as pursued, because another plan was requested.
     pub(super) fn try_again(&mut self) {
         for goal in &mut self.open {
             if [IMPOSSIBLE, UNPLANNED].contains(&goal.state.as_str()) {
@@ -128,7 +130,7 @@ impl GoalList {
         self.close(now, CANCELLED, Some(why), |goal| goal.name == name);
     }
 
-    /// Closes all open goals, which are achieved.
+    /// Closes all open goals as achieved.
     pub(super) fn close_all(&mut self, now: &Rational) {
         self.close(now, ACHIEVED, None, |_| true);
     }

@@ -1,10 +1,11 @@
-//! Where there is no way to the goal even if nothing goes wrong, as a formula.
+//! Dead ends as a formula: the states without a way to the goal even if nothing fails.
 
 use std::collections::BTreeMap;
 
 use super::formula::Formula;
 
-/// The states of which a table says so: bit `i` of a state is the truth of the `i`-th name.
+/// Returns a formula for the states whose entry in `table` is `true`. Bit `i` of a state is the
+/// truth of the `i`-th name.
 pub(super) fn states(table: &[bool], names: &[String]) -> Formula {
     if table.iter().all(|is_in| *is_in) {
         return Formula::TRUE;
@@ -19,7 +20,7 @@ pub(super) fn states(table: &[bool], names: &[String]) -> Formula {
     }
     let last = Formula::atom(last);
     let (with, without) = (states(with, names), states(without, names));
-    // What both have in common needs no case.
+    // The common part needs no case distinction.
     if with == Formula::TRUE {
         return Formula::any([last, without]);
     }
@@ -32,8 +33,8 @@ pub(super) fn states(table: &[bool], names: &[String]) -> Formula {
     ])
 }
 
-/// The same where the table depends on which actions are under way, each by its name: `sets` has
-/// all sets that there can be.
+/// Does the same for tables that depend on the running actions, each given by its name. `sets`
+/// contains all possible sets of running actions.
 pub(super) fn by_set(
     sets: &[(Vec<usize>, Vec<bool>)],
     running: &[String],
@@ -109,7 +110,7 @@ mod tests {
                 let bits = (tables >> (4 * set)) & 15;
                 (0..4).map(|state| bits & (1 << state) != 0).collect()
             };
-            // At most one of the two is under way.
+            // At most one of the two is running.
             let sets = [(vec![], table(0)), (vec![0], table(1)), (vec![1], table(2))];
             let formula = by_set(&sets, &running, &facts);
             for (number, (_, table)) in sets.iter().enumerate() {

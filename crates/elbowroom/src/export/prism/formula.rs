@@ -24,7 +24,7 @@ impl Formula {
         Self::Atom(text.into())
     }
 
-    /// All of them, without what adds nothing.
+    /// Returns the conjunction, without redundant parts.
     pub(super) fn all(parts: impl IntoIterator<Item = Self>) -> Self {
         let mut kept = Vec::new();
         for part in parts {
@@ -38,7 +38,7 @@ impl Formula {
         single(kept, Self::All)
     }
 
-    /// At least one of them, without what adds nothing.
+    /// Returns the disjunction, without redundant parts.
     pub(super) fn any(parts: impl IntoIterator<Item = Self>) -> Self {
         let mut kept = Vec::new();
         for part in parts {
@@ -51,7 +51,7 @@ impl Formula {
         single(kept, Self::Any)
     }
 
-    /// It is false.
+    /// Returns the negation.
     pub(super) fn negated(self) -> Self {
         match self {
             Self::Not(part) => *part,
@@ -100,15 +100,15 @@ impl Display for Formula {
     }
 }
 
-/// A probability as it is written in decimals: the number of the file that it comes from, not its
-/// nearest binary fraction.
+/// Returns the probability as written in decimals: the number in the file, not its nearest binary
+/// fraction.
 pub(super) fn exact(probability: f64) -> Rational {
     let text = format!("{probability}");
     text.parse()
         .expect("a finite number in decimals is a fraction")
 }
 
-/// All decimals of a number that has finitely many.
+/// Formats a number that has finitely many decimals, with all of them.
 pub(super) fn decimal(number: &Rational) -> String {
     let ten = Rational::from(10);
     let mut digits = 0;
@@ -120,7 +120,7 @@ pub(super) fn decimal(number: &Rational) -> String {
     number.to_decimal(digits)
 }
 
-/// `p : update + …`, without what never happens. The probabilities add up to 1.
+/// Formats `p : update + …`, without updates of probability 0. The probabilities add up to 1.
 pub(super) fn choice(ways: &[(Rational, String)]) -> String {
     let ways: Vec<_> = ways.iter().filter(|(p, _)| !p.is_zero()).collect();
     match ways.as_slice() {

@@ -1,4 +1,4 @@
-//! The process on a clock that is cut into cells: see [`timed`].
+//! The process on a clock that is divided into cells: see [`timed`].
 
 mod modules;
 
@@ -12,28 +12,28 @@ use super::{PrismError, bare, checked};
 use crate::export::names::distinct;
 use crate::timed::{Act, Chances, Event, Facts, Needs, Settings, Side, TimedWorld, chances};
 
-/// From where the best value is bounded.
+/// Direction of the bound on the best value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
-    /// The agent decides at the boundaries of cells, and what happens between them happens in the
-    /// order that is worst for it: a game of two players.
+    /// The agent decides at the boundaries of cells, and happenings between them have the worst
+    /// order for it: a game of two players.
     Lower,
-    /// The agent knows at the beginning of a cell what it brings, and chooses the order.
+    /// The agent knows the happenings of a cell at its beginning, and chooses their order.
     Upper,
 }
 
-/// The process of the timed optimum ([`crate::timed`]) on a grid of so many cells, in the language
-/// of PRISM: its `Pmax=? [F "goal"]`, or, for the lower bound, `<<agent>> Pmax=? [F "goal"]`, is a
-/// bound on the best probability with which an executor without foresight reaches the goal.
+/// Returns the process of the timed optimum ([`crate::timed`]) on a grid of `cells` cells, in the
+/// language of PRISM. Its `Pmax=? [F "goal"]`, or, for the lower bound, `<<agent>> Pmax=? [F
+/// "goal"]`, is a bound on the success probability of the best executor without foresight.
 ///
 /// It has none of the shortcuts of [`optimum`](crate::timed::optimum): any action may be started or
-/// cancelled whenever the state allows, in whatever order. So the upper bound is the same, and the
-/// lower one is at least as great: where [`optimum`](crate::timed::optimum) takes something worse
-/// than the worst order for it, the game does not.
+/// cancelled whenever the state allows, in any order. So the upper bound is the same. The lower
+/// bound is at least as great, because [`optimum`](crate::timed::optimum) sometimes assumes less
+/// than the worst order.
 ///
 /// # Errors
-/// When the world is not one for which there is a timed optimum, when there cannot be so many cells,
-/// and when there are more than [`MOST_COMMANDS`](super::MOST_COMMANDS) commands.
+/// When the world has no timed optimum, when the number of cells is out of range, and when there
+/// are more than [`MOST_COMMANDS`](super::MOST_COMMANDS) commands.
 pub fn timed(
     task: &Task,
     model: &WorldModel,
@@ -76,7 +76,7 @@ pub fn timed(
     checked(process.text(&problem.name, &problem.domain))
 }
 
-/// A world on a grid, with names.
+/// A world on a grid, with names for its parts.
 struct Process<'p> {
     world: &'p TimedWorld,
     chances: &'p Chances,
@@ -85,29 +85,31 @@ struct Process<'p> {
     acts: Vec<String>,
 }
 
-/// What its failure makes true and false, if it can fail in one way only.
+/// Returns the facts that a failure of the action makes true and false, if all its failures have
+/// the same outcome.
 fn fails(act: &Act) -> (Facts, Facts) {
     let way = act.failures.first();
     way.map_or((0, 0), |way| (way.adds, way.deletes))
 }
 
-/// Something that takes place at one moment.
+/// A happening of the process.
 struct Happening {
     label: String,
-    /// What it needs of facts.
+    /// Its condition on facts.
     needs: Formula,
     adds: Facts,
     deletes: Facts,
     owner: Owner,
-    /// Whether the agent decides that it takes place, not the world.
+    /// `true` if the agent decides that it takes place, `false` if the world does.
     is_agents: bool,
 }
 
-/// Whose state it changes, and how.
+/// The module whose state it changes, and the change.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Owner {
     Started(usize),
-    /// What the variable of its end says when it does: well, badly, or no matter.
+    /// The end of an action, with the required value of the variable of its end: success, failure,
+    /// or any.
     Ended(usize, Option<bool>),
     Event(usize),
 }
@@ -154,7 +156,7 @@ impl Process<'_> {
                     let all: Vec<String> = all.map(|label| format!("[{label}]")).collect();
                     all.join(", ")
                 };
-                // A label that no command has is a mistake.
+                // PRISM rejects a label without a command.
                 let worlds: &[&str] = if self.has_a_beginning() {
                     &["tick", "begin", "begun"]
                 } else {
@@ -187,7 +189,7 @@ impl Process<'_> {
         text.push('\n');
     }
 
-    /// All that can take place within a cell or at its boundary.
+    /// Returns all happenings that are possible within a cell or at its boundary.
     fn happenings(&self) -> Vec<Happening> {
         let mut all = Vec::new();
         for (index, (act, name)) in self.world.acts.iter().zip(&self.acts).enumerate() {
@@ -212,7 +214,7 @@ impl Process<'_> {
             };
             let agents = self.bound == Bound::Upper;
             let needs = self.holds(&end.needs);
-            // An end that lacks what it needs fails; then nobody undoes what the start did.
+            // An end whose condition does not hold fails; the effects of the start remain.
             let lacks = needs.clone().negated();
             let effects = (end.adds, end.deletes);
             all.push(ended("end", needs, effects, Some(true), agents));
@@ -316,7 +318,8 @@ impl Process<'_> {
         text.push_str("endmodule\n\n");
     }
 
-    /// After the last cell: what could come about if nothing were ever made false.
+    /// Writes the commands after the last cell: the facts that could still become true if no fact
+    /// ever became false.
     fn hopes(&self, text: &mut String) {
         text.push_str(
             "  // Facts that could still become true if no fact became false any more.\n",
@@ -344,12 +347,12 @@ impl Process<'_> {
         }
     }
 
-    /// Whether something may happen before anybody can do something.
+    /// Returns `true` if an event may happen before the first decision.
     fn has_a_beginning(&self) -> bool {
         self.chances.before.iter().any(|p| *p > 0.0)
     }
 
-    /// The update that makes facts true and false; additions win.
+    /// Returns the update that makes facts true and false; additions win.
     fn changes(&self, adds: Facts, deletes: Facts) -> String {
         let names = self.facts.iter().enumerate();
         let changes = names.filter_map(|(place, name)| {
@@ -371,12 +374,12 @@ impl Process<'_> {
         }
     }
 
-    /// A condition now.
+    /// Returns a condition in the present state.
     fn holds(&self, needs: &Needs) -> Formula {
         self.after(needs, 0, 0)
     }
 
-    /// A condition after effects; additions win.
+    /// Returns a condition after effects; additions win.
     fn after(&self, needs: &Needs, adds: Facts, deletes: Facts) -> Formula {
         let part = |part: &Needs| self.after(part, adds, deletes);
         match needs {
@@ -390,7 +393,7 @@ impl Process<'_> {
         }
     }
 
-    /// Whether a condition may hold if more facts may be false than those that are.
+    /// Returns the formula that a condition holds if some of the true facts are made false.
     fn may_hold(&self, needs: &Needs) -> Formula {
         match needs {
             Needs::All(parts) => Formula::all(parts.iter().map(|part| self.may_hold(part))),

@@ -15,15 +15,15 @@ use super::formula::{Formula, choice, exact};
 use super::{PrismError, bare, checked, dead_ends};
 use crate::export::names::distinct;
 
-/// Dead ends are looked for in at most so many states.
+/// Maximum number of states in the search for dead ends.
 const MOST_STATES: usize = 1 << 18;
 
-/// The Markov decision process of [`optimum`](elbowroom_probability::optimum) in the language of
-/// PRISM: its `Pmax=? [F "goal"]` is the best probability of reaching the goal.
+/// Returns the Markov decision process of [`optimum`](elbowroom_probability::optimum) in the
+/// language of PRISM. Its `Pmax=? [F "goal"]` is the best probability of reaching the goal.
 ///
 /// # Errors
-/// When there is time or a number in the problem, when likelihoods are missing, when the settings
-/// limit the number of steps, and when there are too many states to say which are dead ends.
+/// When the problem has time or numbers, when likelihoods are missing, when the settings limit the
+/// number of steps, and when there are too many states to find the dead ends.
 pub fn untimed(
     task: &Task,
     likelihoods: &Likelihoods,
@@ -32,7 +32,7 @@ pub fn untimed(
     if settings.horizon != Horizon::Unlimited {
         return Err(PrismError::Horizon);
     }
-    // Facts are entered into the table of facts as they are met.
+    // Facts are added to the table of this task when they are first used.
     let task = Arc::new(task.clone());
     let plan = PartialOrderPlan::unordered(&task, all_actions_under(&task, likelihoods)?);
     let model = Model::new(Arc::clone(&task), plan, likelihoods, Semantics::World)?;
@@ -40,16 +40,16 @@ pub fn untimed(
     checked(process.text()?)
 }
 
-/// A problem, with the names of all that is in it.
+/// A problem, with names for its facts and actions.
 struct Process<'p> {
     model: Arc<Model>,
     likelihoods: &'p Likelihoods,
     settings: &'p Settings,
     actions: Vec<(InstanceId, Action)>,
-    /// Of actions: what follows the letter and the underscore.
+    /// Names of actions, without the prefix of a letter and an underscore.
     names: Vec<String>,
     facts: Vec<FactId>,
-    /// Of facts, with letter and underscore.
+    /// Names of facts, with the prefix.
     fact_names: Vec<String>,
     dead_end: Option<Formula>,
 }
@@ -61,18 +61,18 @@ struct Happening<'p> {
     snap: &'p SnapAction,
 }
 
-/// One of the ways in which things may stand after a failed end.
+/// An outcome of a failed end.
 struct Failure {
-    /// The place of the end among the happenings.
+    /// The position of the end among the happenings.
     happening: usize,
-    /// Given that it fails.
+    /// Conditional probability of the outcome after a failure.
     probability: Rational,
-    /// In order.
+    /// The changes of facts, in order.
     changes: Vec<(FactId, bool)>,
 }
 
 impl Failure {
-    /// What it does to a fact, as certain effects.
+    /// Returns its effects on a fact, as certain effects.
     fn effects(&self, fact: FactId) -> Vec<(bool, Rational)> {
         let own = self.changes.iter().filter(|(other, _)| *other == fact);
         own.map(|(_, becomes)| (*becomes, Rational::ONE)).collect()
@@ -142,7 +142,7 @@ impl<'p> Process<'p> {
         (0..self.actions.len()).filter(|action| self.actions[*action].1.durative().is_some())
     }
 
-    /// Where no plan leads to the goal.
+    /// Returns the formula of the dead ends: no plan leads from them to the goal.
     fn dead_ends(&self) -> Result<Formula, PrismError> {
         let durative: Vec<usize> = self.durative().collect();
         let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
@@ -178,7 +178,7 @@ impl<'p> Process<'p> {
             tables.push((set, table.collect()));
         }
         let running: Vec<String> = self.names.iter().map(|name| format!("u_{name}")).collect();
-        // Instantaneous actions are never under way and have no name there.
+        // Instantaneous actions are never running, so they have no such name.
         let place = |action: &usize| durative.iter().position(|other| other == action);
         for (set, _) in &mut tables {
             *set = set.iter().filter_map(place).collect();
@@ -267,7 +267,7 @@ impl<'p> Process<'p> {
         let _ = writeln!(text, "// The agent chooses.\nformula ready = {ready};\n");
     }
 
-    /// The agent, and what is under way.
+    /// Writes the module of the agent and of the running actions.
     fn agent(&self, text: &mut String) -> Result<(), PrismError> {
         let happenings = self.happenings();
         let failures = self.failures();
@@ -338,7 +338,7 @@ impl<'p> Process<'p> {
         Ok(())
     }
 
-    /// What the agent can do: to try a start, to end an action.
+    /// Writes a command of the agent: an attempt to start an action, or its end.
     fn command(
         &self,
         happening: &Happening<'_>,
@@ -384,7 +384,7 @@ impl<'p> Process<'p> {
         Ok(())
     }
 
-    /// What failed ends may leave behind, happening by happening.
+    /// Returns the outcomes of failed ends, by happening.
     fn failures(&self) -> Vec<Failure> {
         let mut failures = Vec::new();
         for (index, happening) in self.happenings().iter().enumerate() {
@@ -396,7 +396,7 @@ impl<'p> Process<'p> {
             let last = aftermaths.len().saturating_sub(1);
             let mut left = Rational::ONE;
             for (place, aftermath) in aftermaths.into_iter().enumerate() {
-                // The last one has all that is left, so that they add up to 1 exactly.
+                // The last one gets the remaining probability, so that the sum is exactly 1.
                 let probability = if place == last {
                     left.clone()
                 } else {
@@ -413,7 +413,7 @@ impl<'p> Process<'p> {
         failures
     }
 
-    /// What comes of a step once facts have changed.
+    /// Writes the commands after a step has changed facts.
     fn afterwards(&self, phases: &Phases, text: &mut String) {
         if let Some(settle) = phases.settle {
             text.push_str("  // Actions whose conditions over all are violated fail.\n");
@@ -437,7 +437,7 @@ impl<'p> Process<'p> {
         }
     }
 
-    /// The facts that may or may not hold at the beginning, with how likely they do.
+    /// Returns the facts whose initial value is uncertain, with the probabilities that they hold.
     fn uncertain(&self) -> impl Iterator<Item = (FactId, f64)> + '_ {
         let belief = self.likelihoods.initial_belief(self.task());
         let facts = self.facts.iter();
@@ -446,7 +446,7 @@ impl<'p> Process<'p> {
             .filter(|(_, p)| *p > 0.0 && *p < 1.0)
     }
 
-    /// A fact: how each step changes it.
+    /// Writes the module of a fact: its change in each step.
     fn fact(&self, place: usize, text: &mut String) -> Result<(), PrismError> {
         let (fact, name) = (self.facts[place], &self.fact_names[place]);
         let task = self.task();
@@ -487,7 +487,7 @@ impl<'p> Process<'p> {
                     Rational::ZERO
                 };
                 for (makes_true, chance) in &effects {
-                    // An effect that fails leaves the fact as it was.
+                    // A failed effect leaves the fact unchanged.
                     let rest = &(&Rational::ONE - chance) * &p;
                     p = if *makes_true { &rest + chance } else { rest };
                 }
@@ -509,7 +509,7 @@ impl<'p> Process<'p> {
         Ok(())
     }
 
-    /// The effects of a happening on a fact, deletions first, each with how likely it takes place.
+    /// Returns the effects of a happening on a fact, deletions first, each with its probability.
     fn effects(
         &self,
         happening: &Happening<'_>,
@@ -538,7 +538,7 @@ struct Phases {
     nothing: usize,
     settle: Option<usize>,
     count: Option<usize>,
-    /// The last one.
+    /// The last value.
     begin: usize,
 }
 

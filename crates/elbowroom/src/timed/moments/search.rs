@@ -1,4 +1,5 @@
-//! Bounds from both sides where everything happens at [known times](super): what is looked at, in which order.
+//! Bounds from both sides for worlds with [known times](super): the restricted and relaxed worlds,
+//! in the order of their examination.
 
 use super::cells;
 use crate::timed::above::Above;
@@ -8,18 +9,18 @@ use crate::timed::within::fitting;
 use crate::timed::world::TimedWorld;
 use crate::timed::{Grid, NotTabulated, SLACK, Settings, Side, Stop, chances, graph, step};
 
-/// What was found.
+/// The bounds found.
 pub(in crate::timed) struct Found {
     pub(in crate::timed) grid: Grid,
-    /// How many cells there are, seen from below.
+    /// Number of cells of the lower bound.
     pub(in crate::timed) cells: usize,
-    /// By whom the bound from below is reached.
+    /// The restricted agent behind the lower bound.
     pub(in crate::timed) within: Option<Keeping>,
-    /// Whether there are values from below, and from above.
+    /// `true` for each side with a computed bound: below, above.
     has: [bool; 2],
 }
 
-/// Whoever keeps to a set of actions.
+/// An agent restricted to a set of actions.
 #[derive(Clone)]
 pub(in crate::timed) struct Keeping {
     /// The world of these actions.
@@ -27,31 +28,31 @@ pub(in crate::timed) struct Keeping {
     pub(in crate::timed) manner: Manner,
 }
 
-/// How much is tried for bounds.
+/// Effort for bounds.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::timed) struct Effort {
-    /// Each bound may have one in so many of all states that there may be, one of these after the other until bounds
-    /// are close.
+    /// Divisors of the maximum number of states, for each bound; they are used one after the other
+    /// until the bounds are close.
     shares: &'static [usize],
-    /// Whether nothing more is tried once the first world within plans has too many states.
+    /// `true` to stop if the first restricted world has too many states.
     gives_up: bool,
 }
 
-/// What a look came to.
+/// Result of a computation of one bound.
 enum Look {
-    /// There is a value.
+    /// A bound was found.
     Done,
     TooManyStates,
     Interrupted,
 }
 
-/// Whoever keeps to a set, and whether that has a value already.
+/// A restricted agent, and whether its lower bound is known.
 struct FromBelow {
     keeping: Keeping,
     is_done: bool,
 }
 
-/// A world in which more is possible, and how many cells its next grid has, about; `None` after the finest.
+/// A relaxed world, and the approximate number of cells of its next grid; `None` after the finest.
 struct FromAbove {
     world: TimedWorld,
     wanted: Option<usize>,
@@ -63,8 +64,8 @@ struct Search<'a> {
     found: Found,
 }
 
-/// Bounds from both sides where everything happens at known times; `None` where it does not, or if `goes_on` says
-/// so.
+/// Computes bounds from both sides if everything happens at known times; `None` if not, or if
+/// `goes_on` returns `false`.
 pub(in crate::timed) fn bounds(
     world: &TimedWorld,
     settings: &Settings,
@@ -103,7 +104,7 @@ pub(in crate::timed) fn bounds(
         let mut from_below = below.iter_mut().filter(|next| !next.is_done);
         let mut from_above = above.iter_mut().filter(|next| next.wanted.is_some());
         let mut kinder = from_above.next();
-        // From either side in turn, as one does not know which is the harder one.
+        // Alternate between the sides, because the harder one is not known in advance.
         loop {
             let keeping = from_below.next();
             if search.found.is_close(settings) || (keeping.is_none() && kinder.is_none()) {
@@ -135,12 +136,12 @@ pub(in crate::timed) fn bounds(
 }
 
 impl Effort {
-    /// For the yardstick.
+    /// For bounds on the success probability ([`optimum`](crate::timed::optimum)).
     pub(in crate::timed) const WHOLE: Self = Self {
         shares: &[12, 4],
         gives_up: false,
     };
-    /// For a policy, for which a run waits.
+    /// For a policy: the run has to wait for it.
     pub(in crate::timed) const QUICK: Self = Self {
         shares: &[12],
         gives_up: true,
@@ -152,14 +153,15 @@ impl Found {
         self.is_bounded() && self.grid.upper - self.grid.lower <= settings.gap
     }
 
-    /// Whether there is a value from either side.
+    /// Returns `true` if both bounds are computed.
     pub(in crate::timed) fn is_bounded(&self) -> bool {
         self.has == [true; 2]
     }
 }
 
 impl Keeping {
-    /// To each of the [plans](Settings::plans), then to each of the [fallbacks](Settings::fallbacks), and then to nothing.
+    /// Returns agents restricted to each of the [plans](Settings::plans), then to each of the
+    /// [fallbacks](Settings::fallbacks), and finally an unrestricted one.
     fn all(world: &TimedWorld, settings: &Settings) -> Vec<Self> {
         let keeping = |worlds: Vec<TimedWorld>, sets: &[&[Vec<String>]]| {
             let keeping = worlds.into_iter().map(|world| {
@@ -181,7 +183,7 @@ impl Keeping {
 }
 
 impl Search<'_> {
-    /// Worlds in which more is possible, those with few states first.
+    /// Returns the relaxed worlds, those with few states first.
     fn worlds_from_above(&self, world: &TimedWorld) -> Result<Vec<FromAbove>, NotTabulated> {
         let above = world.seen_from(Side::Above);
         let freer = above.without_numbers_over_all()?;
@@ -217,7 +219,7 @@ impl Search<'_> {
         Ok(Look::Done)
     }
 
-    /// One grid.
+    /// Computes the upper bound on one grid.
     fn look_from_above(
         &mut self,
         next: &mut FromAbove,
@@ -225,7 +227,7 @@ impl Search<'_> {
     ) -> Result<Look, NotTabulated> {
         let world = &next.world;
         let wanted = next.wanted.unwrap_or(self.found.cells);
-        // The last grid is the one on which nothing is given away.
+        // The last grid is exact: no duration is rounded down.
         let (step, cells) = match fitting(world, wanted, Side::Above) {
             Some(fit) if fit.cells < self.found.cells => (fit.step(), fit.cells),
             _ => (step(world, self.found.cells), self.found.cells),

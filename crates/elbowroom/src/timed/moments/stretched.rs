@@ -1,9 +1,9 @@
-//! The bound from above where everything happens at [known times](super): an action that is ready to end
-//! may end at any time at which something happens or gets ready.
+//! The upper bound for worlds with [known times](super): an action that is ready to end may end at
+//! any time of a happening, or when something becomes ready.
 //!
-//! Most had best end at once. An end that is put off comes right before something that it would have been in the way
-//! of, or it never comes. So where nothing of the kind can come about any more while the action is
-//! under way, the agent ends it or lets it go before it does anything else.
+//! Usually, it is best to end at once. A delayed end comes right before a happening that the end
+//! would prevent, or it never comes. So if no such happening is possible while the action is
+//! running, the agent ends or cancels the action before any other move.
 
 use indexmap::IndexMap;
 
@@ -17,12 +17,13 @@ use crate::timed::graph::{Choice, Target};
 use crate::timed::state::{Phase, State};
 use crate::timed::world::{Facts, TimedWorld};
 
-/// Whether an end has a reason to wait, by facts, what is under way, what has happened, and the end.
+/// Cache of [`may_be_better_later`], by facts, running actions, past events, and the end.
 pub(in crate::timed) type Reasons = IndexMap<(Facts, u64, u32, usize, Ending), bool>;
 
-/// Actions that differ in their starts only: once they are under way it does not matter which one it is.
+/// Classes of actions that differ only in their starts. While they are running, they are
+/// interchangeable.
 pub(in crate::timed) struct Alike {
-    /// By action: those that end like it, as bits.
+    /// By action: the actions of its class, as bits.
     of: Vec<u64>,
 }
 
@@ -42,14 +43,15 @@ impl Alike {
         Self { of: of.collect() }
     }
 
-    /// As which action one is under way that starts: the first that ends like it and is not.
+    /// Returns the action that represents `act` while it is running: the first one of its class
+    /// that is not running.
     pub(in crate::timed) fn free(&self, state: &State, act: usize) -> Option<usize> {
         let free = self.of[act] & !state.under_way();
         (free != 0).then(|| free.trailing_zeros() as usize)
     }
 }
 
-/// Whether two actions that cannot fail and change no numbers end in the same way.
+/// Returns `true` if two actions cannot fail, change no numbers at their ends, and have equal ends.
 fn ends_alike(one: &Act, other: &Act) -> bool {
     let (Some((one_over_all, one_end)), Some((other_over_all, other_end))) =
         (&one.rest, &other.rest)
@@ -66,7 +68,7 @@ fn ends_alike(one: &Act, other: &Act) -> bool {
 }
 
 impl Cell<'_> {
-    /// What is done before anything else is thought about, if there is something of the kind.
+    /// Returns the choices if there is a move that is optimal before all others.
     pub(in crate::timed) fn nothing_else_at(
         &mut self,
         moment: &Moment,
@@ -74,7 +76,8 @@ impl Cell<'_> {
     ) -> Option<Vec<Choice>> {
         let world = self.bound.world;
         let (state, coming) = moment;
-        // Where an action may end as late as one likes and be let go, a start that does nothing costs nothing.
+        // An action may end as late as the agent likes and can be cancelled, so a start without
+        // effects is never harmful.
         let for_nothing = startable.iter().find(|act| {
             let act = &world.acts[**act];
             let rest = act.rest.as_ref();
@@ -100,8 +103,8 @@ impl Cell<'_> {
         None
     }
 
-    /// To begin anew what is under way, or something that ends like it: letting go is of no other use, as nothing has to
-    /// end.
+    /// Returns the choices to restart a running action, or to start an action of the same class
+    /// instead. There is no other use of cancelling, because actions need not end.
     pub(in crate::timed) fn begun_anew(&mut self, moment: &Moment, place: usize) -> Vec<Choice> {
         let bound = self.bound;
         let world = bound.world;
@@ -127,9 +130,9 @@ impl Cell<'_> {
             .collect()
     }
 
-    /// Nothing more is done until something may happen.
+    /// Returns the target of waiting until the next possible happening.
     pub(in crate::timed) fn pass_until_something_happens(&mut self, mut state: State) -> Target {
-        // When what is ready began does not matter any more.
+        // The start of an action that is ready is irrelevant.
         for running in &mut state.running {
             if running.phase != Phase::Goes {
                 running.since = 0;
@@ -149,7 +152,8 @@ impl Cell<'_> {
         }
     }
 
-    /// Whether an end may be better after something that can come about while its action is under way.
+    /// Returns `true` if an end may be better after a happening that is possible while its action
+    /// is running.
     fn has_reason_to_wait(&mut self, state: &State, act: usize, ending: Ending) -> bool {
         let world = self.bound.world;
         let (facts, under_way) = (state.facts | world.tested, state.under_way());

@@ -1,39 +1,40 @@
-//! Whether an end may be better after something else: [`may_be_better_later`].
+//! Check whether an end may be better after another happening: [`may_be_better_later`].
 
 use crate::timed::act::{Act, Needs, Snap};
 use crate::timed::failures::{Ending, Failed};
 use crate::timed::numbers::Amount;
 use crate::timed::world::{Facts, TimedWorld};
 
-/// What a happening changes.
+/// The changes by a happening.
 #[derive(Clone, Copy, Debug, Default)]
 struct Footprint {
     adds: Facts,
     deletes: Facts,
-    /// The numbers that it changes, as bits.
+    /// The changed numbers, as bits.
     numbers: u64,
-    /// Of these, those that it sets.
+    /// Those of them that are assigned.
     sets: u64,
 }
 
-/// An end that could come now.
+/// An end that is possible now.
 struct Waiting<'a> {
     world: &'a TimedWorld,
-    /// The action, if it is known: it does not start again before it has ended.
+    /// The action, if it is known. It does not start again before it has ended.
     act: Option<usize>,
     own: Footprint,
-    /// What it needs.
+    /// The facts that its condition reads.
     reads: Facts,
     /// The comparisons of the numbers that it changes.
     tests: Facts,
-    /// What must hold until it comes.
+    /// The facts of its over-all condition, which must hold until it ends.
     kept: Facts,
 }
 
-/// Whether an end that could come now may be better after something that can come about while its action is under
-/// way: something that it would be in the way of, or that would undo what it does, or that it needs.
-/// Where more facts are never worse it is in nobody's way by what it gives. If it is alone, no other action ends
-/// like it; else it may be another one that is under way.
+/// Returns `true` if an end that is possible now may be better after a happening that is possible
+/// while its action is running: one that the end would prevent, one that would undo the end's
+/// effects, or one that its condition requires. In a monotone world, added facts prevent nothing.
+/// If `is_alone`, no other action has the same end; otherwise another action of the class may be
+/// running instead.
 pub(super) fn may_be_better_later(
     world: &TimedWorld,
     (facts, under_way, happened, act, ending): (Facts, u64, u32, usize, Ending),
@@ -44,7 +45,7 @@ pub(super) fn may_be_better_later(
     };
     let (own, reads) = match world.acts[act].failed(ending) {
         Some(failed) => (Footprint::of_failed(failed), 0),
-        // It waits for what it needs.
+        // The end waits until its condition holds.
         None if !end.needs.hold(facts) => return true,
         None => (Footprint::of(end), end.needs.mentions()),
     };
@@ -77,8 +78,9 @@ pub(super) fn may_be_better_later(
 }
 
 impl Waiting<'_> {
-    /// Goes through all that may come about from these facts, with that under way, if nothing is made false but what
-    /// the action needs.
+    /// Searches for such a happening among all that are possible from these facts and with these
+    /// running actions, in a relaxation: only facts of the action's over-all condition become
+    /// false.
     fn has_something_to_wait_for(&self, mut facts: Facts, mut started: u64) -> bool {
         let acts = || self.world.acts.iter().enumerate();
         for (index, other) in acts() {
@@ -136,7 +138,7 @@ impl Waiting<'_> {
         failures.any(|failed| self.is_undone_by(Footprint::of_failed(failed)))
     }
 
-    /// Whether needs that hold before the end may not hold after it.
+    /// Returns `true` if a condition that holds before the end may fail after it.
     fn is_in_the_way_of(&self, needs: &Needs) -> bool {
         let changed = if self.world.is_monotone {
             self.own.deletes & !self.own.adds
@@ -146,7 +148,7 @@ impl Waiting<'_> {
         needs.mentions() & (changed | self.tests) != 0
     }
 
-    /// Whether it makes a difference if that comes before the end.
+    /// Returns `true` if the result may depend on the order of `other` and the end.
     fn is_undone_by(&self, other: Footprint) -> bool {
         let own = self.own;
         let changed = if self.world.is_monotone {
@@ -157,7 +159,7 @@ impl Waiting<'_> {
         changed != 0 || (other.sets & own.numbers) | (other.numbers & own.sets) != 0
     }
 
-    /// Whether the action is not under way after that.
+    /// Returns `true` if `snap` violates the over-all condition, so that the action is aborted.
     fn is_broken_by(&self, snap: &Snap) -> bool {
         snap.deletes & !snap.adds & self.kept != 0
     }
@@ -186,7 +188,7 @@ impl Footprint {
 }
 
 impl TimedWorld {
-    /// The comparisons of these numbers.
+    /// Returns the comparisons of these numbers.
     fn tests_of(&self, numbers: u64) -> Facts {
         let tests = self.tests.iter().enumerate();
         let read = tests.filter(|(_, test)| numbers & (1 << test.number) != 0);

@@ -1,6 +1,6 @@
-//! Where numbers, and what is drawn for them, are cut: where that decides a condition, at once, after amounts that are
-//! known, or drawn a second time. So of a number from which nothing but known amounts has been taken nothing is lost
-//! by the cut.
+//! Division of the values of numbers and of random amounts into intervals. The cuts are where a
+//! value decides a condition: at once, after constant amounts, or after a second draw. So the
+//! division is exact for a number that has changed only by constant amounts.
 
 use std::collections::BTreeSet;
 
@@ -11,14 +11,14 @@ use crate::timed::act::{Act, Snap};
 use crate::timed::world::{Facts, unknown_shape};
 use crate::timed::{NotTabulated, TimedWorld};
 
-/// The most places at which the values of a number, or of what is drawn, are cut.
+/// Maximum number of cuts of a number, or of a random amount.
 const MOST_CUTS: usize = 64;
 
-/// After how many known amounts a condition may decide where to cut.
+/// Maximum number of constant amounts that are added up to find cuts.
 const MOST_SUMMED: usize = 8;
 
 impl Amount {
-    /// The most by which the number can change, if it is then no further than that way.
+    /// Returns the largest value of the amount that changes the number by at most `way`.
     fn cut(&self, way: i64) -> i64 {
         match self.change {
             Changed::Set | Changed::Added => way,
@@ -28,7 +28,7 @@ impl Amount {
 }
 
 impl TimedWorld {
-    /// Enters where numbers are cut, and how what is drawn may come out.
+    /// Computes the cuts of numbers, and the possible draws of random amounts.
     pub(in crate::timed) fn cut(&mut self) -> Result<(), NotTabulated> {
         for place in 0..self.numbers.len() {
             self.cut_number(place);
@@ -55,7 +55,7 @@ impl TimedWorld {
         amounts.filter(move |amount| amount.number == number)
     }
 
-    /// Those of actions with which it is not over.
+    /// Returns the changes of a number by actions that do not reach the goal.
     fn amounts_before_goal(&self, number: usize) -> impl Iterator<Item = &Amount> {
         let acts = self.acts.iter().filter(|act| !act.wins(&self.goal));
         let snaps = acts.flat_map(|act| {
@@ -66,7 +66,7 @@ impl TimedWorld {
         amounts.filter(move |amount| amount.number == number)
     }
 
-    /// Values that are known from the beginning, or once they are set.
+    /// Returns the known values: the initial one, and those that are assigned.
     fn anchors(&self, number: usize) -> BTreeSet<i64> {
         let set = self.amounts_of(number).filter_map(|amount| match amount {
             Amount {
@@ -79,7 +79,7 @@ impl TimedWorld {
         set.chain([self.numbers[number].initial.low]).collect()
     }
 
-    /// The values at which conditions change, each once.
+    /// Returns the values at which conditions change.
     fn thresholds(&self, number: usize) -> BTreeSet<i64> {
         let first = self.facts.len();
         let asked_for = self.asked_for();
@@ -90,7 +90,7 @@ impl TimedWorld {
         own.flat_map(|(_, test)| test.edges()).collect()
     }
 
-    /// The facts and comparisons that some condition reads.
+    /// Returns the facts and comparisons that some condition reads.
     fn asked_for(&self) -> Facts {
         let of_act = |act: &Act| {
             let rest = act.rest.as_ref();
@@ -103,7 +103,7 @@ impl TimedWorld {
         of_acts | self.goal.mentions()
     }
 
-    /// What known amounts add up to, those of fewer amounts first.
+    /// Returns the sums of constant amounts, those of fewer amounts first.
     fn sums(&self, number: usize) -> Vec<i64> {
         let steps = self
             .amounts_before_goal(number)
@@ -158,7 +158,8 @@ impl TimedWorld {
             })
         };
         let only_falls = only(Changed::Taken, Changed::Added);
-        // A number that only rises is never below all that are known, and one that only falls never above.
+        // A number that only rises is never below all known values, and one that only falls never
+        // above.
         if let Some(lowest) = lowest.filter(|_| only(Changed::Added, Changed::Taken)) {
             edges.insert(lowest - 1);
         }
@@ -186,7 +187,8 @@ impl TimedWorld {
         number.known = known.into_iter().collect();
     }
 
-    /// From where on what is drawn leads to a threshold in two steps that are alike, and by how much in each.
+    /// Returns the pairs of a known value and a step such that two equal random amounts of this
+    /// step lead from the value to a threshold.
     fn halves(&self, amount: &Amount) -> Vec<(i64, i64)> {
         if amount.change == Changed::Set {
             return Vec::new();
@@ -201,7 +203,8 @@ impl TimedWorld {
         ways.filter(decides).collect()
     }
 
-    /// How likely what is drawn is to be at most that; `None` if its shape is not known.
+    /// Returns the probability that a random amount is at most `value`; `None` if its distribution
+    /// function is not available.
     fn share(&self, amount: &Amount, value: i64) -> Option<f64> {
         let By::Drawn { rule, planned } = &amount.by else {
             return None;
@@ -211,7 +214,7 @@ impl TimedWorld {
         rule.share(value, Part::UpTo, *planned, self.model.resolution.to_f64())
     }
 
-    /// Whether what is drawn may be more than that, and may be less.
+    /// Returns `true` if a random amount may be larger than `value`, and may be smaller.
     fn may_be_beyond(&self, amount: &Amount, value: i64) -> bool {
         let share = self.share(amount, value);
         share.is_some_and(|share| share > 1e-9 && share < 1.0 - 1e-9)
@@ -221,7 +224,7 @@ impl TimedWorld {
         self.share(amount, -1).is_some_and(|share| share <= 0.0)
     }
 
-    /// How what a happening draws may come out.
+    /// Returns the possible draws of a happening, with their probabilities.
     fn draws(&self, snap: &Snap) -> Result<Vec<(f64, Vec<Span>)>, NotTabulated> {
         let mut all: Vec<(f64, Vec<Span>)> = vec![(1.0, Vec::new())];
         for amount in &snap.amounts {
@@ -241,7 +244,7 @@ impl TimedWorld {
         Ok(all)
     }
 
-    /// What is drawn, cut where that decides something, with how likely each part is.
+    /// Returns the intervals of a random amount between its cuts, with their probabilities.
     fn parts(&self, amount: &Amount) -> Option<Vec<(f64, Span)>> {
         let lowest = if self.is_never_negative(amount) {
             0
@@ -265,7 +268,7 @@ impl TimedWorld {
         Some(parts)
     }
 
-    /// Where what is drawn decides something.
+    /// Returns the values of a random amount that decide a condition.
     fn cuts(&self, amount: &Amount) -> BTreeSet<i64> {
         let number = amount.number;
         let from = match amount.change {

@@ -1,4 +1,4 @@
-//! Why the box of a certificate is inside the envelope.
+//! Proof that the box of a certificate is inside the envelope.
 
 use elbowroom_envelope::linear::Factor as Multiplicand;
 use elbowroom_envelope::obligations::{Difference, Inequality};
@@ -16,13 +16,13 @@ use elbowroom_verify::{End, Exact};
 
 use super::super::Subject;
 
-/// The limit on the time points of a plan whose certificates tell why the box is inside.
+/// Largest number of time points for which a certificate proves that the box is inside.
 const MOST_POINTS: usize = 500;
 
-/// The limit on the numbers in all that is told of that.
+/// Largest number of numbers in such a proof.
 const MOST_NUMBERS: usize = 50_000;
 
-/// Why the box is inside the envelope; `None` if that takes too much to tell.
+/// Returns the proof that the box is inside the envelope, or `None` if it would be too large.
 pub(super) fn sound(
     subject: &Subject<'_>,
     oracle: &mut Oracle,
@@ -37,7 +37,7 @@ pub(super) fn sound(
         endless: endless(envelope),
         control: control.map_or(Control::Assumed, |proof| control_of(plan, proof)),
         conditions: oracle.condition_proofs(envelope).map(|proofs| {
-            // What cannot fail in any way needs no proof.
+            // A condition that cannot fail in any way needs no proof.
             let never_fails =
                 |why: &Unfailing| matches!(why, Unfailing::Ways(ways) if ways.is_empty());
             let proofs = proofs.iter();
@@ -48,7 +48,7 @@ pub(super) fn sound(
     (numbers(&sound) <= MOST_NUMBERS).then_some(sound)
 }
 
-/// About how many numbers there are in it.
+/// Estimates how many numbers a proof contains.
 fn numbers(sound: &Sound) -> usize {
     let control = match &sound.control {
         Control::Times(times) => times.len(),
@@ -82,7 +82,7 @@ fn numbers_of_way(way: &Way) -> usize {
     3 * way.differences.len() + inequalities.sum::<usize>() + sums.sum::<usize>()
 }
 
-/// The ends of the box that are infinite.
+/// Returns the infinite ends of the box.
 fn endless(envelope: &DecoupledEnvelope) -> Vec<Endless> {
     let intervals = envelope.intervals().iter().enumerate();
     let ends = intervals.flat_map(|(parameter, interval)| {
@@ -178,7 +178,7 @@ fn condition(subject: &Subject<'_>, proof: &ConditionProof) -> Condition {
     }
 }
 
-/// Appends a case and those that it is split into; the position of the first.
+/// Appends a case after those that it is split into, and returns the position of the first.
 fn unfailing(why: &Unfailing, cases: &mut Vec<Failing>) -> usize {
     let place = cases.len();
     match why {

@@ -4,10 +4,11 @@ use elbowroom_envelope::Guarantee;
 use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan, Side};
 use elbowroom_verify::{Constraint, Exact, Limit, Part, Proof};
 
-/// The plan's constraints, as an executor with this guarantee has to see to them.
+/// Returns the plan's constraints, as an executor with this guarantee has to satisfy them.
 pub(super) fn constraints(plan: &ParametrizedPlan, guarantee: Guarantee) -> Vec<Constraint> {
     let nominal = DecoupledEnvelope::point(&plan.nominal());
-    // Without knowledge of the future it matters who decides on a difference.
+    // Except under weak controllability, contingent links are distinguished from bounds that the
+    // executor satisfies by its choices.
     let (is_weak, network) = match guarantee {
         Guarantee::Weak => (true, None),
         _ => (false, plan.uncertain_network(&nominal).ok()),
@@ -33,9 +34,9 @@ pub(super) fn constraints(plan: &ParametrizedPlan, guarantee: Guarantee) -> Vec<
     .collect()
 }
 
-/// Those constraints that proofs are about, without numbers that no proof uses; the proofs get
-/// their new positions. A proof about times that are fixed in advance is also about all durations
-/// that are not.
+/// Returns the constraints that the proofs use, without bounds that no proof uses, and renumbers
+/// them in the proofs. A proof about times that are fixed in advance also uses all durations that
+/// are not fixed.
 pub(super) fn used_constraints(all: Vec<Constraint>, proofs: &mut [Proof]) -> Vec<Constraint> {
     let mut is_used = vec![false; all.len()];
     let mut sides = vec![[false; 2]; all.len()];

@@ -1,4 +1,4 @@
-//! What plans are worth by an objective.
+//! Values of plans by an objective.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -19,8 +19,8 @@ use crate::execute::{Candidate, Rollouts, Tryout};
 use crate::flow;
 use crate::makespan::end;
 
-/// How many samples a plan is tried out in, round by round: who is behind the best one by more than
-/// chance is tried no further.
+/// Number of samples after each round. A plan that is significantly behind the best one gets no
+/// further samples.
 const ROUNDS: [u64; 5] = [50, 100, 200, 400, 1000];
 
 /// A plan with its value.
@@ -39,7 +39,7 @@ impl Judged {
         }
     }
 
-    /// Of plans that are worth the same, the shorter one is better.
+    /// Returns `true` if this plan has a greater value, or the same value and a shorter makespan.
     pub(super) fn is_better_than(&self, other: &Self) -> bool {
         let rank = |value: &Value| match value {
             Value::Unknown(_) => None,
@@ -61,7 +61,7 @@ impl Judged {
     }
 }
 
-/// What was found out about a plan.
+/// Value of a plan.
 pub(super) enum Value {
     Slack(Rational),
     Samples(Vec<bool>),
@@ -69,7 +69,7 @@ pub(super) enum Value {
 }
 
 impl Value {
-    /// Whether it was tried in fewer samples than another, because it was behind.
+    /// Returns `true` if it has fewer samples than `other`, because it was behind.
     fn was_dropped(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Samples(own), Self::Samples(other)) => own.len() < other.len(),
@@ -98,7 +98,7 @@ impl Value {
     }
 }
 
-/// Finds out what plans are worth.
+/// Evaluates plans.
 pub(super) enum Judge<'a> {
     Slack(Arc<Task>),
     Probability(Box<Tryout<'a>>),
@@ -125,8 +125,8 @@ impl Judge<'_> {
         }
     }
 
-    /// `None` if the watcher wanted no more before it was known. `best` is the value of the best
-    /// plan so far.
+    /// Returns the value of a plan; `None` if the watcher stopped the evaluation. `best` is the
+    /// value of the best plan so far.
     pub(super) fn value(
         &mut self,
         plan: &TimeTriggeredPlan,
@@ -191,7 +191,7 @@ fn samples(
     Some(Value::Samples(results))
 }
 
-/// Hears of nothing: what is inside a comparison is nobody's progress.
+/// Watcher without progress events, for the search inside a comparison.
 struct Quiet<'q, 'w>(&'q mut Course<'w>);
 
 impl Watcher for Quiet<'_, '_> {

@@ -58,7 +58,7 @@ impl Process<'_> {
         text.push_str("endmodule\n\n");
     }
 
-    /// Writes the draw of its end in the present cell, by elapsed time.
+    /// Writes the random draw of its end in the present cell, by elapsed time.
     fn draws(&self, act: usize, label: &str, guard: &str, text: &mut String) {
         let since = format!("a_{}", self.acts[act]);
         let ends = format!("o_{}", self.acts[act]);
@@ -94,7 +94,7 @@ impl Process<'_> {
                 let begins = format!("({since}'=1)");
                 let ways = match self.bound {
                     Bound::Lower => begins,
-                    // It may end in the very cell.
+                    // It may end in the same cell.
                     Bound::Upper => {
                         let ways = ends_of(&ends, &self.chances.ends[act][0], "");
                         let ways = ways.map(|(p, end)| match end.as_str() {
@@ -140,14 +140,15 @@ impl Process<'_> {
         Formula::all(std::iter::once(needs).chain(over_all))
     }
 
-    /// Returns the over-all conditions of an action after these effects; `None` if they do not
-    /// matter to it.
+    /// Returns the over-all conditions of an action after these effects; `None` if the effects do
+    /// not concern them.
     fn goes_on(&self, act: &Act, adds: Facts, deletes: Facts) -> Option<Formula> {
         let (over_all, _) = act.rest.as_ref()?;
         (over_all.mentions() & (adds | deletes) != 0).then(|| self.after(over_all, adds, deletes))
     }
 
-    /// An event: 0 still to come, 1 in this cell, 2 over.
+    /// Writes the module of an event, with the states 0 (may still happen), 1 (happens in this
+    /// cell) and 2 (over).
     pub(super) fn event_module(&self, event: usize, happenings: &[Happening], text: &mut String) {
         let name = format!("e_{event}");
         let world_event = &self.world.events[event];
@@ -207,7 +208,7 @@ impl Process<'_> {
 fn ends_of(name: &str, hazard: &Ends, otherwise: &str) -> [(Rational, String); 3] {
     let (well, badly) = (exact(hazard.well), exact(hazard.badly()));
     let rest = &(&Rational::ONE - &well) - &badly;
-    // What rounding has left over goes to the likelier one.
+    // The rounding error is added to the likelier end.
     let is_over = rest.to_f64() < 1e-12;
     let one = Rational::ONE;
     let (well, badly, rest) = match (is_over, well >= badly) {
@@ -222,7 +223,7 @@ fn ends_of(name: &str, hazard: &Ends, otherwise: &str) -> [(Rational, String); 3
     ]
 }
 
-/// The first and the last place of each run of equal texts.
+/// Returns the first and the last position of each run of equal texts.
 fn runs(texts: &[String]) -> Vec<(usize, usize)> {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for (place, text) in texts.iter().enumerate() {
@@ -234,7 +235,7 @@ fn runs(texts: &[String]) -> Vec<(usize, usize)> {
     runs
 }
 
-/// A number is one of these.
+/// Returns the condition that a number is in a range.
 fn range(name: &str, from: usize, to: usize) -> String {
     if from == to {
         format!("{name}={from}")
