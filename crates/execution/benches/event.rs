@@ -11,7 +11,7 @@ fn main() {
     divan::main();
 }
 
-/// How many actions end in one sample.
+/// Number of actions that end in one sample.
 const EVENTS: usize = 200;
 
 #[divan::bench(args = [1_000, 10_000, 100_000])]

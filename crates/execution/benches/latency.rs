@@ -1,5 +1,5 @@
-//! How long single events take: median, 99th percentile and worst of all events of a plan (the
-//! first 20,000 of long ones), for each executor with a network. The plan is that of [`robots`].
+//! Latency of single events: median, 99th percentile and maximum over all events of a plan (the
+//! first 20,000 of long plans), for each executor with a network. The plan is that of [`robots`].
 //!
 //! ```text
 //! cargo bench -p elbowroom-execution --bench latency

@@ -1,9 +1,9 @@
-//! Dispatching an STN plan: what all executors that go by a temporal network have in common.
+//! Dispatching of an STN plan: the common part of all executors that use a temporal network.
 //!
-//! A time point is *ready* when everything that must come before it has been observed; it is
-//! started as soon as its window opens (paper 1, Algorithm 2, lines 6 to 10). Time points that
-//! have happened are fixed in the network, and with a whole [`Horizon`] that moves the windows of
-//! all others, deadlines included. Work per event is in proportion to the windows that move.
+//! A time point is *ready* when everything that must come before it has been observed. It is
+//! started as soon as its window opens (paper 1, Algorithm 2, lines 6 to 10). Executed time points
+//! are fixed in the network. With a whole [`Horizon`], this updates the windows of all others,
+//! including deadlines. The work per event is proportional to the number of windows that change.
 
 mod apart;
 mod explain;
@@ -47,7 +47,7 @@ pub(crate) enum Sight {
     OneHop,
 }
 
-/// The plan's constraints from which the parts of its network were made, by position.
+/// For each part of the network, the position of the plan's constraint that it comes from.
 #[derive(Clone, Debug)]
 struct Sources {
     /// For each constraint of the network; `None` if it comes from none.
@@ -81,7 +81,7 @@ fn contradiction(mission: &Mission, sources: &Sources, behind: &[NetworkLimit]) 
 pub(crate) struct Dispatch {
     task: Arc<Task>,
     plan: StnPlan,
-    /// The actions, with nominal values for what is left open.
+    /// The actions, with nominal values for the open parameters.
     actions: Vec<Arc<Action>>,
     nominal: Schedule,
     /// The time on the world's clock when the plan's clock reads 0.
@@ -96,15 +96,16 @@ pub(crate) struct Dispatch {
     progress: Progress,
     /// See [`watch::numbers_of_durations`].
     numbers_of_durations: BTreeMap<InstanceId, Vec<DurationConstraint>>,
-    /// When instances that have not been seen to start were told to, on the plan's clock.
+    /// The times, on the plan's clock, at which instances were commanded whose start has not been
+    /// observed.
     told: BTreeMap<InstanceId, Rational>,
     /// Timed initials that have not happened, the last one first, with their times.
     timed: Vec<(Rational, NodeId)>,
-    /// Instances that were under way before the plan began: of these it knows the rest.
+    /// Instances that were running before the plan began. The plan contains only their remainder.
     resumed: BTreeSet<InstanceId>,
     /// Starts that have failed and are to be tried again.
     retries: BTreeMap<NodeId, Retry>,
-    /// What has happened outside the network's bounds since it was last known to work.
+    /// Violations of the network's bounds since the network was last known to be executable.
     strain: Strain,
     /// The happenings that starts are separated from; `None` if the network orders all interfering happenings.
     separation: Option<Separation>,
@@ -147,10 +148,11 @@ impl Dispatch {
         Ok(Self::with_horizon(mission, horizon, sources, bounds))
     }
 
-    /// Takes up a plan in which the world decides on what `reading` says is contingent.
+    /// Creates the dispatch of a plan whose contingent durations (according to `reading`) are
+    /// decided by the world.
     ///
     /// # Errors
-    /// When no executor could be sure to keep to it: the constraints that stand against each other.
+    /// If the network is not dynamically controllable: the conflicting constraints.
     pub(crate) fn controlled(
         mission: &Mission,
         reading: &dyn Fn(&Constraint) -> Reading,
@@ -174,12 +176,11 @@ impl Dispatch {
         Ok(Self::with_horizon(mission, horizon, sources, &bounds))
     }
 
-    /// Goes by other readings of the constraints from now on; what has happened stays, and nothing
-    /// else happens before now.
+    /// Replaces the network by one with other readings of the constraints. Executed time points
+    /// keep their times; the others cannot happen before `now`.
     ///
     /// # Errors
-    /// When no executor could be sure to keep to it: the plan's constraints that stand against each
-    /// other, in words.
+    /// If the new network is not dynamically controllable: the conflicting constraints of the plan.
     pub(crate) fn rebound(
         &mut self,
         now: &Rational,
@@ -228,20 +229,22 @@ impl Dispatch {
         Ok(())
     }
 
-    /// The network of what is left: what has happened stays, and nothing else happens before now.
+    /// Returns the network of the remaining plan. Executed time points keep their times; the others
+    /// cannot happen before `now`.
     fn rest(
         &self,
         now: &Rational,
         reading: &dyn Fn(&Constraint) -> Reading,
     ) -> Result<PlanNetwork, Impossible> {
         let has_happened = |node: NodeId| self.happened(node).is_some();
-        // When something ends that is under way is not the executor's to decide.
+        // The executor does not decide when a running action ends, so ends have no lower bound at
+        // `now`.
         let waits = |what: Node| !matches!(what, Node::End(_));
         let plan = self.plan.remainder(now, |node| self.happened(node), waits);
         plan.uncertain_network(&|constraint| {
             if constraint.from == NodeId::ZERO && constraint.reason == elbowroom_plan::Reason::Given
             {
-                // Of these some are the plan's own, which say what they say.
+                // These include constraints of the plan itself; their bounds are kept as they are.
                 let (lower, upper) = given(constraint);
                 return Reading::Requirement { lower, upper };
             }
@@ -344,7 +347,7 @@ impl Dispatch {
         dispatch
     }
 
-    /// Time 0 has happened, and so have the starts of what is running.
+    /// Marks time 0 and the starts of the running actions as executed.
     fn begin(&mut self, running: &BTreeMap<StepId, crate::event::Ticket>) {
         if let Horizon::Dispatchable(_) = self.horizon {
             // To the others the origin has always happened.
@@ -409,7 +412,7 @@ impl Dispatch {
         self.progress.happened[node.index()].as_ref()
     }
 
-    /// The instances that have started, or were told to, and have not ended.
+    /// Instances that have started, or were commanded to, and have not ended.
     pub(crate) fn running(&self) -> &BTreeSet<InstanceId> {
         &self.progress.running
     }
@@ -523,7 +526,7 @@ pub(crate) fn given(constraint: &Constraint) -> Bounds {
     (value(&constraint.lower), value(&constraint.upper))
 }
 
-/// Whether an action takes no time.
+/// Returns `true` if the action is instantaneous.
 pub(crate) fn is_instantaneous(action: &Action) -> bool {
     matches!(action.body, Body::Instantaneous(_))
 }

@@ -1,4 +1,4 @@
-//! What passes between an executor's side and the world: commands and observations.
+//! Commands to the world, and observations from it.
 
 use std::fmt;
 use std::sync::Arc;
@@ -31,9 +31,9 @@ pub enum Command {
         /// The planned duration; `None` for an instantaneous action.
         duration: Option<Rational>,
     },
-    /// Stop an action. What it did at its start stays done; its end does not happen.
+    /// Cancel an action. Its start effects remain; its end effects do not happen.
     Cancel {
-        /// Which start.
+        /// The ticket of its start.
         ticket: Ticket,
     },
 }
@@ -72,14 +72,14 @@ pub enum Event {
         ticket: Ticket,
         /// The part that is done, from 0 to 1, if that is known.
         completion: Option<Rational>,
-        /// What there is to say about it; may be empty.
+        /// A note from the world as text; may be empty.
         note: String,
     },
     /// A fact is seen to be true or false.
     Fact {
         /// The fact.
         fact: FactId,
-        /// Whether it is true.
+        /// `true` if the fact is true.
         truth: bool,
     },
     /// A fluent is seen to have a value.
@@ -104,11 +104,12 @@ pub enum Event {
     },
 }
 
-/// What is asked of a run that goes on when its goal is reached
-/// ([`Run::lasting`](crate::run::Run::lasting)); to others nothing of it means anything.
+/// Request from an operator to an executive ([`Run::lasting`](crate::run::Run::lasting)). Other
+/// runs ignore requests, except pauses and the abandonment of the goal in
+/// [attended](crate::run::Run::attended) runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// To reach this goal, too, or in place of that of the same name.
+    /// Add a goal. It replaces an open goal of the same name.
     Pursue {
         /// By which it is named from then on.
         name: String,
@@ -127,9 +128,9 @@ pub enum Request {
         /// The ticket of its start.
         ticket: Ticket,
     },
-    /// To start nothing more; what is under way goes on.
+    /// Stop dispatching; running actions continue.
     Pause,
-    /// To go on after a pause.
+    /// Resume after a pause.
     Resume,
 }
 
@@ -167,8 +168,8 @@ pub enum Ending {
     Cancelled,
 }
 
-/// The amount by which an action's effect changed a fluent: what stands behind the operator in
-/// `(increase fluent amount)`, `(decrease fluent amount)`, `(assign fluent amount)`.
+/// The amount by which an action's effect changed a fluent: the value of `amount` in `(increase
+/// fluent amount)`, `(decrease fluent amount)` or `(assign fluent amount)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// The fluent.

@@ -16,8 +16,8 @@ use crate::reason::Reason;
 /// The form of a plan that an executor requires, from the least to the most preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
-    /// Which orderings facts need. Nothing is left open, and where numbers matter, nothing is
-    /// guaranteed: what `ROSPlan`'s dispatcher has.
+    /// The orderings that facts require. There are no open parameters, and numeric conditions are
+    /// not guaranteed. This is the information of `ROSPlan`'s dispatcher.
     Orderings,
     /// The same, and the partial order of the plan's happenings, whose layers can be executed in
     /// more than one order.
@@ -32,10 +32,10 @@ pub enum Need {
     Envelope,
 }
 
-/// An action of the present plan, by a number that the executor chooses.
+/// Identifier of an action of the present plan, chosen by the executor.
 ///
-/// What is running already when a plan is taken up ([`Mission::running`]) has the number of its
-/// instance in [`Mission::plan`]. Executors that go by that plan number all steps so.
+/// An action that is running when a plan is adopted ([`Mission::running`]) has the number of its
+/// instance in [`Mission::plan`]. Executors that execute that plan number all steps this way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StepId(pub u32);
 
@@ -64,8 +64,8 @@ pub trait Executor: Send {
     /// When the plan cannot be executed (any more): why.
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>>;
 
-    /// Says what to do. It is asked again until it says [`Decision::Wait`]; what is new is told
-    /// only once.
+    /// Returns the next decision. The run calls this again until the decision is
+    /// [`Decision::Wait`]. Each news item is passed only once.
     fn decide(&mut self, moment: &Moment<'_>) -> Decided;
 
     /// Returns whether the plan for which it last requested another one ([`Decision::Replan`]) has a fair chance to work,
@@ -95,21 +95,23 @@ pub trait Executor: Send {
         None
     }
 
-    /// The last moment, in the world's time, at which a step under way can end so that no new plan is needed, if nothing
-    /// else deviates and as far as that can be told. `None` if nothing is known but its window.
+    /// Returns the latest end of a running step with which no new plan is needed if nothing else
+    /// deviates, on the world's clock, as far as it can be computed. `None` if only the step's
+    /// window is known.
     fn bears_until(&self, _step: StepId, _now: &Rational) -> Option<Rational> {
         None
     }
 
-    /// One more of it, as it stands, which decides as this one would: to try out what comes of
-    /// going on. `None` if it cannot be had.
+    /// Returns a copy of the executor in its present state, which makes the same decisions.
+    /// Rehearsals use it to simulate the rest of the run. `None` if the executor cannot be copied.
     fn fork(&self) -> Option<Box<dyn Executor>> {
         None
     }
 }
 
-/// Whether a run can be on a clock: not in the browser's module, which is the smaller for it. There, nobody plans beside
-/// a run, and the room of what is under way is not watched.
+/// `true` if runs may use a real clock. In the WebAssembly module for browsers it is `false`, which
+/// keeps the module small: plans are not made in the background there, and the slack of running
+/// actions is not monitored.
 pub(crate) const CAN_HAVE_A_CLOCK: bool = !cfg!(target_family = "wasm");
 
 /// The time window of a happening.
@@ -145,10 +147,10 @@ pub struct Mission {
     /// The partial order of the plan's happenings, for those that need it
     /// ([`Need::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
-    /// The actions under way, which go on in the plan: see [`StepId`].
+    /// The running actions, which continue in the plan: see [`StepId`].
     pub running: BTreeMap<StepId, Ticket>,
-    /// Other steps of the plan that have begun since the time from which it is, before it is taken up.
-    /// That they have, and what has ended, is told as news.
+    /// Other steps of the plan that have begun between the plan's start time and its adoption.
+    /// Their starts and ends are reported to the executor as news.
     pub begun: BTreeMap<StepId, Ticket>,
 }
 
@@ -163,8 +165,7 @@ pub struct Moment<'a> {
     pub belief: &'a Progression,
 }
 
-/// Something observed that concerns the present plan, already checked: each start and end is told
-/// once.
+/// Checked observation that concerns the present plan. Each start and end is reported once.
 #[derive(Clone, Debug, PartialEq)]
 pub enum News {
     /// An action has started.
@@ -267,7 +268,7 @@ pub struct Order {
 }
 
 impl Decision {
-    /// The word by which traces name it.
+    /// Returns the name used in traces.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Start(_) => "start",

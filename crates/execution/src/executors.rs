@@ -37,7 +37,7 @@ use crate::rehearsal::Rehearsal;
 /// nothing deviates any more; `docs/executors.md` compares it with the baselines.
 pub const DEFAULT_EXECUTOR: &str = live::REGISTERED.name;
 
-/// Every executor, in the order in which help and reports list them.
+/// All executors, in the order used by help and reports.
 pub const EXECUTORS: &[Registered] = &[
     fixed::REGISTERED,
     stn::REGISTERED,
@@ -56,11 +56,11 @@ pub struct Registered {
     pub name: &'static str,
     /// The meaning of the number after the name and a colon, if it takes one.
     pub argument: Option<&'static str>,
-    /// Whether that number can be left out.
+    /// `true` if the argument is optional.
     pub is_optional: bool,
     /// A summary, in one sentence.
     pub summary: &'static str,
-    /// Where it comes from.
+    /// The paper that describes it.
     pub paper: &'static str,
     /// The knowledge of a plan that it needs.
     pub need: Need,
@@ -77,15 +77,15 @@ pub struct Means {
     /// For those that look for likelier plans ([`ExecutorSpec::asks_odds`]); without, they do not
     /// look.
     pub odds: Option<Box<dyn Odds>>,
-    /// For `lookahead`: what it found out about the same problem and likelihoods in other runs.
+    /// For `lookahead`: results for the same problem and likelihoods from other runs.
     pub foresight: Foresight,
-    /// For `adaptable`: what it found out about the same plans in other samples of the same scene.
+    /// For `adaptable`: results for the same plans from other samples of the same scene.
     pub orders: Option<Orders>,
-    /// For those that weigh each move ([`ExecutorSpec::asks_outlook`]); without, they go by their
-    /// plan.
+    /// For executors that evaluate each move ([`ExecutorSpec::asks_outlook`]). Without it, they
+    /// follow their plan.
     pub outlook: Option<Arc<dyn Outlook>>,
-    /// For those that weigh each move, where nobody can tell what it is worth: who tries out what
-    /// can be done.
+    /// For executors that evaluate each move, if there is no [`Outlook`]: simulates the possible
+    /// moves.
     pub rehearsal: Option<Box<dyn Rehearsal>>,
 }
 
@@ -148,17 +148,17 @@ impl ExecutorSpec {
         (self.registered.make)(self.argument.clone(), means.into())
     }
 
-    /// Whether the executor looks for plans that are likelier to succeed.
+    /// Returns `true` if the executor searches for plans that are more likely to succeed.
     pub fn asks_odds(&self) -> bool {
         self.asks_outlook() || (self.registered.is_optional && self.argument.is_some())
     }
 
-    /// Whether the executor chooses the likeliest order of a plan's actions.
+    /// Returns `true` if the executor chooses the most likely order of a plan's actions.
     pub fn reorders(&self) -> bool {
         [adaptable::REGISTERED.name, lookahead::REGISTERED.name].contains(&self.registered.name)
     }
 
-    /// Whether the executor weighs each move, if somebody can tell it what it is worth.
+    /// Returns `true` if the executor evaluates each move with an [`Outlook`], where there is one.
     pub fn asks_outlook(&self) -> bool {
         self.registered.name == policy::REGISTERED.name
     }

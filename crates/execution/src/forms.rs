@@ -11,22 +11,22 @@ use crate::horizon::{NetworkLimit, grounds};
 /// The number of networks remembered; an executor asks for one of a few.
 const MOST: usize = 8;
 
-/// The form of a network, or what stands against there being one.
+/// The dispatchable form of a network, or the conflict that shows that there is none.
 pub(crate) type Form = Result<Arc<Dispatchable<Rational>>, Vec<NetworkLimit>>;
 
-/// A network that somebody has asked for.
+/// A network that was converted before.
 #[derive(Clone)]
 enum Known {
     /// Its form, which has the network.
     Controllable(Arc<Dispatchable<Rational>>),
-    /// The network, and what stands against it.
+    /// The network, and the conflict.
     Refused(Arc<UncertainNetwork>, Vec<NetworkLimit>),
 }
 
-/// The dispatchable forms of the networks of a plan, each computed once for all executions of it.
+/// Cache of the dispatchable forms of a plan's networks. Each form is computed once for all
+/// executions of the plan.
 ///
-/// Copies share what they remember. Networks are compared in full, so that it makes no difference
-/// to any answer what is remembered.
+/// Copies share the cache. Networks are compared in full, so cached forms do not change any result.
 #[derive(Clone, Default)]
 pub struct Forms(Arc<Mutex<Vec<Known>>>);
 

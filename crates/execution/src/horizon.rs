@@ -1,4 +1,4 @@
-//! How far an executor looks when it asks when a time point may happen.
+//! Time windows of time points, with different reach of constraint propagation.
 
 use std::sync::Arc;
 
@@ -16,11 +16,11 @@ pub(crate) type Ends = (Option<Rational>, Option<Rational>);
 pub(crate) enum Horizon {
     /// Windows that follow from all constraints together.
     Whole(Box<MovingWindows>),
-    /// What follows from each single constraint with a time point that has happened: what paper
-    /// 1's dispatcher and `ROSPlan`'s see.
+    /// Windows that follow from single constraints with executed time points, as in the dispatchers
+    /// of paper 1 and `ROSPlan`.
     OneHop(OneHop),
-    /// What follows from the network in a form in which that shows at each time point's neighbours,
-    /// the world deciding on some of them.
+    /// Windows that follow from a dispatchable form of the network: an event has to be propagated
+    /// only to its neighbours. The world decides on the contingent links.
     Dispatchable(Box<Dispatcher>),
 }
 
@@ -45,10 +45,10 @@ pub(crate) struct OneHop {
 pub(crate) struct Missed {
     /// The end that was missed.
     pub(crate) end: WindowEnd,
-    /// The amount by which it is missed.
+    /// The amount by which the window is missed.
     pub(crate) by: Rational,
-    /// Whether it is outside nothing but the bounds of the link that ends there, so that the rest may work all the
-    /// same.
+    /// `true` if only the bounds of the contingent link that ends there are violated. Then the
+    /// remaining plan may still work.
     pub(crate) is_only_link: bool,
 }
 
@@ -68,7 +68,8 @@ impl Horizon {
         Self::Dispatchable(Box::new(Dispatcher::new(form)))
     }
 
-    /// Whether all that must come before a time point has happened, as far as that is known here.
+    /// Returns `true` if all time points that must come before have happened. Without a
+    /// dispatchable form, always `true`.
     pub(crate) fn is_ready(&self, node: NodeId) -> bool {
         match self {
             Self::Whole(_) | Self::OneHop(_) => true,
@@ -76,7 +77,8 @@ impl Horizon {
         }
     }
 
-    /// Whether the world decides when a time point happens.
+    /// Returns `true` if the world decides when a time point happens. Without a dispatchable form,
+    /// always `true`.
     pub(crate) fn is_contingent(&self, node: NodeId) -> bool {
         match self {
             Self::Whole(_) | Self::OneHop(_) => true,
@@ -142,7 +144,8 @@ impl Horizon {
         }
     }
 
-    /// Whether all goes on to work after a time point has happened outside the bounds of its link, and nothing else.
+    /// Returns `true` if the network is still executable after a time point has happened outside
+    /// the bounds of its link, and nothing else was violated.
     pub(crate) fn bears(&self, node: NodeId, now: &Rational) -> bool {
         match self {
             Self::Whole(_) | Self::OneHop(_) => false,
@@ -150,8 +153,8 @@ impl Horizon {
         }
     }
 
-    /// Takes the link under way that ends at a time point for one that ends by `until`, or at any time. Whether the
-    /// executor is still sure to satisfy everything.
+    /// Assumes that the running link that ends at a time point ends by `until`, or at any time.
+    /// Returns `true` if the network is still executable.
     pub(crate) fn prolong(
         &mut self,
         end: NodeId,
@@ -167,7 +170,8 @@ impl Horizon {
         }
     }
 
-    /// The latest time, `until` at most, by which the link under way that ends at a time point may be taken to end.
+    /// Returns the latest end, at most `until`, that can be assumed for the running link that ends
+    /// at a time point.
     pub(crate) fn prolongable(
         &self,
         end: NodeId,

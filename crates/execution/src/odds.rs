@@ -1,4 +1,4 @@
-//! How likely plans are to succeed: a port.
+//! Port: success probabilities of plans.
 
 use elbowroom_num::Rational;
 

@@ -1,4 +1,4 @@
-//! Where plans come from: a port.
+//! Port: sources of plans.
 
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -10,23 +10,24 @@ pub trait Planner: Send {
     /// The plan's facts and fluents are those of `task`, whose table may grow for that.
     fn plan(&mut self, task: &Task, situation: &Situation) -> Planned;
 
-    /// A plan from there will be asked for soon, unless things go otherwise. Whoever can work aside
-    /// begins with it, and has it ready when it is asked for. Answers do not depend on it.
+    /// Announces that a plan from this situation will probably be requested soon. Planners that can
+    /// work in the background may begin with it. Answers do not depend on it.
     fn expect(&mut self, _task: &Task, _situation: &Situation) {}
 
-    /// Begins to make a plan from there, beside whoever asks, in place of what was begun before;
-    /// whether it can do that. When there is an answer, whoever drives the run tells it so
-    /// ([`Event::PlanMade`](crate::Event::PlanMade)), and it is [collected](Planner::collect).
+    /// Begins to plan from this situation in the background, and replaces any search begun before.
+    /// Returns `false` if the planner cannot do that. When there is an answer, the driver of the
+    /// run reports [`Event::PlanMade`](crate::Event::PlanMade), and the run
+    /// [collects](Planner::collect) it.
     fn begin(&mut self, _task: &Task, _situation: &Situation) -> bool {
         false
     }
 
-    /// The answer to what was begun, which it is waited for if it is not there.
+    /// Returns the answer of the search that was begun; blocks until there is one.
     fn collect(&mut self, task: &Task, situation: &Situation) -> Planned {
         self.plan(task, situation)
     }
 
-    /// What was begun is not needed any more.
+    /// Cancels the search that was begun.
     fn give_up(&mut self) {}
 
     /// Returns `true` if the next answer is read from the record of a run. The planner must then be asked, even if the
@@ -95,7 +96,7 @@ pub struct Planned {
     pub answer: PlanAnswer,
     /// The planning time in seconds, if it was measured.
     pub seconds: Option<Rational>,
-    /// What there is to say about the plan, for people: why it and not another one.
+    /// A remark about the plan for users, for example the reason for which it was chosen.
     pub remark: Option<String>,
     /// Known reasons for which the goals have no plan.
     pub shortfall: Shortfall,
@@ -174,12 +175,12 @@ pub enum PlanAnswer {
     Unsolvable,
     /// No plan has been found; there may be one.
     NotFound {
-        /// Why not.
+        /// The reason.
         why: String,
     },
     /// The planner has failed, which says nothing about plans: it has crashed, for example.
     Failed {
-        /// How.
+        /// The error.
         why: String,
     },
     /// There is no planner to ask.
@@ -187,7 +188,7 @@ pub enum PlanAnswer {
 }
 
 impl PlanAnswer {
-    /// Why there is no plan, in words.
+    /// Returns the reason for which there is no plan, in words.
     pub fn why_not(&self) -> Option<&str> {
         match self {
             Self::Plan(_) => None,

@@ -33,14 +33,14 @@ pub(crate) use start::conditions_on_duration;
 use crate::event::{Measured, Ticket};
 use motion::{Motion, Rate};
 
-/// The state at one moment, with what is under way.
+/// The state at one moment, with the running actions.
 #[derive(Clone, Debug)]
 pub struct Progression {
     task: Arc<Task>,
     time: Rational,
     facts: Vec<bool>,
     values: Vec<Option<Rational>>,
-    /// The time of the present group: [`Progression::time`], or earlier for what is told late.
+    /// The time of the present group: [`Progression::time`], or earlier for late reports.
     group: Rational,
     /// Facts that have changed since the beginning of the present group, as they were on arrival.
     facts_on_arrival: BTreeMap<FactId, bool>,
@@ -50,12 +50,12 @@ pub struct Progression {
     doubtful_facts: BTreeMap<FactId, Vec<Doubt>>,
     /// Fluents that an action may have changed.
     doubtful_values: BTreeMap<FluentId, Vec<Doubt>>,
-    /// How many groups of timed initials have happened.
+    /// Number of groups of timed initials that have happened.
     timed: usize,
     running: BTreeMap<Ticket, Underway>,
 }
 
-/// A durative action under way.
+/// A running durative action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Underway {
     /// The action.
@@ -126,7 +126,8 @@ impl Progression {
         &self.task
     }
 
-    /// The same state, of a task whose table of facts grows by itself: for what is only thought of.
+    /// Returns the same state with a task whose table of facts grows independently, for
+    /// hypothetical states.
     #[must_use]
     pub fn with_own_table(&self) -> Self {
         let task = Arc::new(self.task.with_own_table());
@@ -151,12 +152,13 @@ impl Progression {
         &self.running
     }
 
-    /// The groups of timed initials that have happened: the first so many of [`Task::timed`].
+    /// Returns the number of groups of timed initials that have happened; they are the first ones
+    /// of [`Task::timed`].
     pub fn timed_past(&self) -> usize {
         self.timed
     }
 
-    /// Whether a basic fact is true.
+    /// Returns `true` if a basic fact is true.
     pub fn fact(&self, fact: FactId) -> bool {
         let truth = self.facts.get(fact.index()).copied().unwrap_or(false);
         truth && !self.doubtful_facts.contains_key(&fact)
@@ -202,10 +204,11 @@ impl Progression {
         self.task.timed().get(self.timed).map(|timed| &timed.time)
     }
 
-    /// Lets time pass: continuous change, and the timed initials up to and including `to`.
+    /// Advances the time: applies continuous change, and the timed initials up to and including
+    /// `to`.
     ///
     /// # Errors
-    /// When a fluent that moves has no value. Time passes all the same.
+    /// If a fluent that changes continuously has no value. The time is advanced in any case.
     pub fn advance(&mut self, to: &Rational) -> Result<(), Unreadable> {
         let mut outcome = Ok(());
         while let Some(timed) = self.task.timed().get(self.timed).filter(|t| t.time <= *to) {
@@ -221,8 +224,8 @@ impl Progression {
         outcome.and(self.drift(to))
     }
 
-    /// What comes next happened at `time`: lets time pass until then, or, if that is past, begins a
-    /// group of its own for it. Time is never taken back.
+    /// Prepares for happenings at `time`: advances the time to it, or begins a separate group for
+    /// it if it is past. Time never goes back.
     ///
     /// # Errors
     /// As [`Progression::advance`].
@@ -437,7 +440,7 @@ impl Progression {
         outcome
     }
 
-    /// The changes by the continuous effects under way.
+    /// Returns the changes by the active continuous effects.
     fn motion(&self) -> Result<Motion, Unreadable> {
         let mut rates = Vec::new();
         for underway in self.running.values() {
@@ -476,7 +479,7 @@ impl Progression {
     }
 }
 
-/// Leaves out the effects that will not take place, and what is decided of the others' guards.
+/// Removes the effects that will not take place, and the decided parts of the guards of the others.
 fn decide_guards(body: &mut DurativeBody, at_end: &[bool], continuous: &[bool]) {
     let mut on = at_end.iter();
     let end = Arc::make_mut(&mut body.end);

@@ -1,4 +1,4 @@
-//! Amounts that were measured, and what they say about a plan's parameters.
+//! Measured amounts, and the parameter values that follow from them.
 
 use elbowroom_model::ground::{Action, Body, Change, Effect, Expression, FluentId};
 use elbowroom_model::problem::Unknown;
@@ -33,7 +33,7 @@ pub(crate) struct Deviation {
 pub(crate) struct Amounts {
     pub(crate) readings: Vec<Reading>,
     pub(crate) deviations: Vec<Deviation>,
-    /// How many amounts there is nothing to compare with.
+    /// Number of amounts for which the plan has no expected value.
     pub(crate) unread: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Why an executor decides as it does.
+//! Reasons for the decisions of executors.
 
 mod about;
 mod behind;
@@ -10,8 +10,9 @@ use elbowroom_num::{Interval, Rational};
 pub use about::About;
 pub use behind::{Behind, Changed};
 
-/// Why an executor decides as it does: what was observed or not, what was allowed, what stands
-/// behind that, by how much it was missed, and since when. Times are the world's.
+/// The reason for a decision of an executor: the observation, the allowed values, the constraints
+/// and events that caused it, the amount by which it was missed, and the time since when it holds.
+/// Times are on the world's clock.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reason {
     /// The kind of reason.
@@ -39,17 +40,18 @@ pub struct Reason {
 pub enum Promise {
     /// It works whatever the world does within the envelope.
     Envelope,
-    /// It works whatever the world does within a part of the envelope around what is planned.
+    /// The remaining plan works for all deviations within a part of the envelope around the planned
+    /// values.
     PartOfEnvelope,
-    /// It works if what is still to begin takes as long as planned, however long it takes what is
-    /// under way to end.
+    /// The remaining plan works if all future actions take as long as planned, however long the
+    /// running actions take.
     Planned,
     /// It can still work.
     Luck,
 }
 
 impl Promise {
-    /// All of them, with the words by which traces name them.
+    /// All of them, with their names in traces.
     pub const NAMES: &[(Self, &str)] = &[
         (Self::Envelope, "envelope"),
         (Self::PartOfEnvelope, "part-of-envelope"),
@@ -57,7 +59,7 @@ impl Promise {
         (Self::Luck, "luck"),
     ];
 
-    /// The word by which traces name it.
+    /// Returns the name used in traces.
     pub fn name(self) -> &'static str {
         let found = Self::NAMES.iter().find(|(promise, _)| *promise == self);
         found.map_or("unknown", |(_, name)| name)
@@ -114,7 +116,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// All of them, with the words by which traces name them.
+    /// All of them, with their names in traces.
     pub const NAMES: &[(Self, &str)] = &[
         (Self::Due, "due"),
         (Self::NothingDue, "nothing-due"),
@@ -140,7 +142,7 @@ impl Cause {
         (Self::TooLate, "too-late"),
     ];
 
-    /// The word by which traces name it.
+    /// Returns the name used in traces.
     pub fn name(self) -> &'static str {
         let found = Self::NAMES.iter().find(|(cause, _)| *cause == self);
         found.map_or("unknown", |(_, name)| name)
@@ -206,7 +208,7 @@ impl fmt::Display for Reason {
         if let Some(since) = &self.since {
             write!(f, ", since {}", since.to_decimal(3))?;
         }
-        // What it is about explains nothing.
+        // The subject of the reason is not repeated as its explanation.
         let about = self.about.as_ref().map(ToString::to_string);
         let behind = self.behind.iter().map(ToString::to_string);
         let behind: Vec<String> = behind.filter(|it| about.as_ref() != Some(it)).collect();

@@ -39,18 +39,18 @@ pub enum WarningCause {
 
 /// Takes the record of a run as it comes about.
 pub trait Recorder: Send {
-    /// One entry. What is kept must be kept before this returns, so that a run that is cut short
-    /// leaves its record.
+    /// Records an entry. Persistent recorders must write the entry before this returns, so that the
+    /// record of an interrupted run is complete.
     fn record(&mut self, entry: &Entry<'_>);
 
-    /// The world is told now what was recorded since the last time, all commands of one decision. Whoever
-    /// promises that nothing is begun that is not on record sees to that here, once for all of them.
+    /// Called before the world receives the commands recorded since the last call, which are all
+    /// commands of one decision. Recorders that must record each command before it is executed
+    /// synchronise their storage here, once for all of them.
     fn commit(&mut self) {}
 
-    /// A lasting run takes up a plan, or rests with nothing under way, and could be gone on with from
-    /// what `stand` says, without what was recorded before: whoever wants to, may begin its record
-    /// anew here, and says whether it has. Asked whenever a plan is taken up, before that is recorded,
-    /// and as long as the run rests.
+    /// Offers to rotate the record. It is called when an executive adopts a plan, before that is
+    /// recorded, and while it is idle with no running action. The run can then be resumed from
+    /// `stand` alone, without the earlier record. Returns `true` if the recorder has rotated.
     fn begin_anew(&mut self, stand: &dyn Fn() -> Stand) -> bool {
         let _ = stand;
         false
@@ -93,10 +93,10 @@ impl Recorder for NoRecord {
     fn record(&mut self, _entry: &Entry<'_>) {}
 }
 
-/// One entry of a run's record. All times are the world's, except in plans, where it is said.
+/// One entry of a run's record. All times are on the world's clock unless stated otherwise.
 #[derive(Clone, Copy, Debug)]
 pub enum Entry<'a> {
-    /// A plan is taken up; its times are those of [`Mission::origin`].
+    /// A plan is adopted; its times are relative to [`Mission::origin`].
     Mission(&'a Mission),
     /// The executor decided.
     Decided {
@@ -125,14 +125,14 @@ pub enum Entry<'a> {
         /// The observations.
         observations: &'a [Observation],
     },
-    /// The observations made when the world was asked to look at the goal.
+    /// The observations from the [look](crate::World::look) at the goal.
     Looked {
         /// The time.
         now: &'a Rational,
         /// The observations.
         observations: &'a [Observation],
     },
-    /// An observation, and what was made of it.
+    /// An observation, and its interpretation.
     Taken {
         /// The time of the report.
         now: &'a Rational,
@@ -160,13 +160,13 @@ pub enum Entry<'a> {
         took: &'a Rational,
         /// The plan, on the task's clock.
         plan: Option<&'a TimeTriggeredPlan>,
-        /// Why there is none.
+        /// The reason for which there is none.
         why_not: Option<&'a str>,
-        /// Whether it is certain that there is none.
+        /// `true` if it is certain that there is none.
         is_unsolvable: bool,
-        /// Whether there is none because the planner has failed.
+        /// `true` if there is none because the planner has failed.
         has_failed: bool,
-        /// What the planner has to say about it.
+        /// The planner's remark.
         remark: Option<&'a str>,
         /// Known reasons for which the goals have no plan.
         shortfall: &'a Shortfall,
@@ -184,12 +184,13 @@ pub enum Entry<'a> {
         /// The cause of the warning.
         cause: WarningCause,
     },
-    /// The present plan continues: the goals have changed, and its rest reaches these, too; or it was given up, and no
-    /// other plan was found; or the one that was found is no better.
+    /// The present plan continues, for one of these reasons: the goals have changed and the
+    /// remaining plan also reaches the new ones; the plan was abandoned and no other one was found;
+    /// or the plan that was found is no better.
     Kept {
         /// The time.
         now: &'a Rational,
-        /// How the goals have changed, or why the plan was given up.
+        /// The change of the goals, or the reason for abandoning the plan.
         reason: &'a Reason,
     },
     /// One of several goals of a lasting run is closed, set aside, or pursued again.
@@ -205,11 +206,11 @@ pub enum Entry<'a> {
     Resting {
         /// The time.
         now: &'a Rational,
-        /// What came of the goals; `None` if there were none.
+        /// The verdict on the goals; `None` if there were none.
         verdict: Option<&'a Verdict>,
         /// The goals by name: those that were reached, or else those that are open.
         goals: &'a [String],
-        /// What can never become true again, as in [`Report::dead_end`].
+        /// The parts of the goal that can never become true again, as in [`Report::dead_end`].
         dead_end: &'a [Reason],
     },
     /// Somebody asked the run to end.

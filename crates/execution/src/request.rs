@@ -34,7 +34,7 @@ pub struct PlanRequest {
     pub id: RequestId,
     /// The task, with the goals of the plan.
     pub task: Arc<Task>,
-    /// The situation in which the plan begins.
+    /// The situation from which the plan starts.
     pub situation: Situation,
     /// When the answer is needed.
     pub urgency: Urgency,
@@ -55,7 +55,7 @@ pub struct PrepareRequest {
     pub task: Arc<Task>,
     /// The plan, on the world's clock.
     pub plan: TimeTriggeredPlan,
-    /// The situation in which the plan begins.
+    /// The situation from which the plan starts.
     pub situation: Situation,
     /// The tickets of the actions that are running there, in its order.
     pub running: Vec<Ticket>,

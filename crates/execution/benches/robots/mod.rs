@@ -18,7 +18,7 @@ use elbowroom_plan::{
     ParameterKind, ParametrizedPlan, Reason, Schedule, StnPlan, Valuation,
 };
 
-/// An executor that goes by the plan.
+/// Creates an executor that has adopted the plan of `mission`.
 pub(crate) fn ready(spec: &str, mission: &Mission) -> Box<dyn Executor> {
     let spec: ExecutorSpec = spec.parse().expect("a known executor");
     let mut executor = spec.build(Box::new(Everywhere));
@@ -26,7 +26,7 @@ pub(crate) fn ready(spec: &str, mission: &Mission) -> Box<dyn Executor> {
     executor
 }
 
-/// A world in which one action ends after the other.
+/// World in which the actions end one after the other.
 pub(crate) struct Events {
     running: BTreeSet<(Rational, StepId)>,
     now: Rational,
@@ -44,8 +44,8 @@ impl Events {
         }
     }
 
-    /// Tells the executor what has happened, does what it says, and lets the next action end;
-    /// whether there was one.
+    /// Passes the news to the executor, carries out its decisions, and ends the next action.
+    /// Returns `false` if no action is running.
     pub(crate) fn next(&mut self, executor: &mut dyn Executor) -> bool {
         loop {
             let moment = Moment {
@@ -100,7 +100,8 @@ impl Region for Everywhere {
     }
 }
 
-/// A plan with so many actions. Open durations may be anything up to twice the planned one.
+/// Creates a plan with `count` actions. If `is_open`, each duration may be up to twice the planned
+/// one.
 pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
     const ROBOTS: usize = 20;
     let task = Arc::new(Task::new(Problem::default()));

@@ -19,7 +19,8 @@ impl Dispatch {
             let id = InstanceId::from(index);
             let action = (&*self.task, &*self.actions[index]);
             let is_recent = |time: &&Rational| *time + &self.epsilon > *now;
-            // What was running when the plan began has not started then.
+            // The plan contains only the remainder of these actions, so their starts do not count
+            // here.
             if let Some(time) = self.happened(start).filter(is_recent)
                 && !self.resumed.contains(&id)
             {

@@ -6,12 +6,12 @@ use elbowroom_plan::{InstanceId, NodeId, network_node};
 use super::Dispatch;
 use crate::horizon::Missed;
 
-/// What has happened outside the bounds of a network since it was last known to work.
+/// Violations of a network's bounds since the network was last known to be executable.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Strain {
     /// Ends outside the bounds of nothing but their own links.
     ends: Vec<NodeId>,
-    /// Whether something else was missed.
+    /// `true` if any other bound was violated.
     is_broken: bool,
 }
 
@@ -31,11 +31,11 @@ pub(crate) struct Overdue {
     pub(crate) instance: InstanceId,
     /// When it began, on the plan's clock.
     pub(crate) begun: Rational,
-    /// How long it was planned to take.
+    /// The planned duration.
     pub(crate) planned: Rational,
 }
 
-/// A time by which an action that is overdue may be taken to end, on the plan's clock.
+/// Assumption about the end of an overdue action, on the plan's clock.
 #[derive(Clone, Debug)]
 pub(crate) enum Until {
     /// Whenever it likes.
@@ -47,11 +47,13 @@ pub(crate) enum Until {
 }
 
 impl Dispatch {
-    /// Goes on by the network as it is, if that works: with what has happened outside its bounds, and with each action
-    /// that is overdue taken for one that ends by the first of these times that does.
+    /// Continues with the present network if it is still executable, despite the violations so far.
+    /// Returns `true` if it is. For each overdue action, `until` lists assumptions about its end,
+    /// and the first one with which the network works is adopted.
     ///
-    /// The time it takes does not depend on the length of the plan, but on what is next to what has happened. Where it
-    /// says no, a look at the whole rest may still find that it works.
+    /// The run time depends on the neighbours of the executed time points, not on the length of the
+    /// plan. The check is incomplete: if it returns `false`, the remaining plan may still be
+    /// feasible.
     pub(crate) fn bear(&mut self, now: &Rational, until: &dyn Fn(&Overdue) -> Vec<Until>) -> bool {
         if self.strain.is_broken {
             return false;
@@ -100,8 +102,8 @@ impl Dispatch {
         true
     }
 
-    /// The latest time, `most` at most, by which an action under way may end so that the network as it is still works; on
-    /// the world's clock.
+    /// Returns the latest end of a running action, at most `most`, with which the present network
+    /// is still executable, on the world's clock.
     pub(crate) fn prolongable(
         &self,
         id: InstanceId,

@@ -1,4 +1,4 @@
-//! What has happened of a plan, and what is ready to be started.
+//! Execution progress of a plan: the executed time points and the starts that are ready.
 
 use std::collections::BTreeSet;
 
@@ -17,7 +17,7 @@ pub(super) struct Progress {
     pub(super) successors: Vec<Vec<NodeId>>,
     /// Starts that have everything behind them that must come before.
     pub(super) ready: BTreeSet<NodeId>,
-    /// Instances that were told to start and have not ended.
+    /// Instances that were commanded to start and have not ended.
     pub(super) running: BTreeSet<InstanceId>,
     /// Instances that have not ended.
     pub(super) left: usize,
@@ -125,10 +125,11 @@ fn falling_together(count: usize, constraints: &[Constraint]) -> Vec<usize> {
     network.components()
 }
 
-/// What a start waits for: what comes before it, and the ends that come before ends among these.
+/// Returns the nodes that a start waits for: its predecessors, and the ends that precede ends among
+/// these.
 ///
-/// Ends may fall together and are reported one after the other; the plan then orders only one of
-/// them before the start.
+/// Ends at the same time are reported one after the other, and the plan may order only one of them
+/// before the start.
 fn with_ends_before(
     plan: &StnPlan,
     before: &[BTreeSet<NodeId>],

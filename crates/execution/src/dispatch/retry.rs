@@ -11,7 +11,7 @@ use crate::reason::About;
 pub(super) struct Retry {
     /// The time at which it may be tried again, on the plan's clock.
     pub(super) not_before: Rational,
-    /// How often it has failed in a row.
+    /// Number of failures in a row.
     pub(super) failures: u32,
 }
 
@@ -45,7 +45,8 @@ impl Dispatch {
             .map(|retry| retry.not_before.clone())
     }
 
-    /// How often a start has failed in a row; `of` describes it where it is still to come.
+    /// Returns the number of failures in a row of a start; `of` describes the start if it is still
+    /// to come.
     pub(super) fn failures(&self, start: NodeId, of: Option<String>) -> Option<About> {
         let failures = self.retries.get(&start)?.failures;
         Some(About::Retry { of, failures })

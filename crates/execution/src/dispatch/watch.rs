@@ -1,4 +1,4 @@
-//! What to do now, and when to look again.
+//! Decisions: the starts that are due, and the time of the next decision.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::horizon::Horizon;
 use crate::progression::{Outlook, Progression, conditions_on_duration};
 use crate::reason::{About, Cause, Reason};
 
-/// An instance that may be under way, although nobody has said so.
+/// Instance that was commanded and may be running, although its start was not reported.
 struct Silent {
     /// Until when it may be, on the plan's clock; `None` if there is no such time.
     until: Option<Rational>,
@@ -106,7 +106,8 @@ impl Dispatch {
         }
     }
 
-    /// Starts these, unless one of them lacks what it needs.
+    /// Starts these actions, except from the first one on whose conditions do not hold. If that is
+    /// the very first, a new plan is requested.
     fn order(&mut self, nodes: &[NodeId], now: &Rational, belief: &Progression) -> Decided {
         let mut orders = Vec::new();
         for &node in nodes {
@@ -144,8 +145,8 @@ impl Dispatch {
         }
     }
 
-    /// How long an action that starts now is told to take: as long as planned, or as near to that
-    /// as what is known allows.
+    /// Returns the duration that is commanded for an action that starts now: the planned one, or
+    /// the nearest value that its bounds and its window allow.
     pub(super) fn told_duration(&self, id: InstanceId, now: &Rational) -> Rational {
         let planned = self.nominal_duration(id);
         let (least, most) = &self.durations[id.index()];
@@ -179,9 +180,10 @@ impl Dispatch {
         }
     }
 
-    /// Whether an instance was told to start in time, and nobody has said that it did: reports can
-    /// be lost, and when it did start is known from its end at the latest, or from the silence. Once it
-    /// would be over by now if it had started, it has not: its start is late.
+    /// Returns a value if an instance was commanded in time, its start was not reported, and it may
+    /// still be running. Reports can be lost; the end, or the lack of one, shows when the action
+    /// started. When its longest duration has passed since the command, it is assumed not to have
+    /// started, and its start is late.
     fn silent(&self, id: InstanceId, now: &Rational) -> Option<Silent> {
         let start = network_node(self.ends[id.index()][0]);
         let Horizon::Dispatchable(_) = self.horizon else {
@@ -196,7 +198,7 @@ impl Dispatch {
         (is_in_time && may_run).then_some(Silent { until })
     }
 
-    /// What should have happened by now and has not.
+    /// Returns the reason if a time point is overdue.
     pub(crate) fn overdue(&self, moment: &Moment<'_>) -> Option<Reason> {
         let now = self.local(moment.now);
         let (node, latest) = self.missing(&now)?;
@@ -228,11 +230,12 @@ impl Dispatch {
         Some(reason)
     }
 
-    /// The first time point that should have happened by then, on the plan's clock, and has not, with the time by which.
+    /// Returns the first time point whose window has closed by `now`, on the plan's clock, with its
+    /// latest time.
     ///
-    /// The windows are exact, so comparing each time point that is awaited with its own window
-    /// finds out whether all of them can still happen now or later. They are not moved on by the
-    /// mere passing of time, because something that has happened may be reported later.
+    /// The windows are exact, so it suffices to compare each awaited time point with its own
+    /// window. Windows are not updated merely because time passes, since an event may be reported
+    /// later than it happened.
     pub(super) fn missing(&self, now: &Rational) -> Option<(NodeId, Rational)> {
         let running = self.progress.running.iter();
         let awaited = running

@@ -45,17 +45,17 @@ pub(super) const REGISTERED: Registered = Registered {
     },
 };
 
-/// A plan whose orders have at most so many happenings is searched to the end before each start,
-/// by who looks ahead.
+/// For `lookahead`: greatest number of happenings of a plan whose orders are searched completely
+/// before each start.
 const SHORT: usize = 20;
 
 /// See [`REGISTERED`]. With foresight it is `lookahead`.
 #[derive(Clone)]
 pub(super) struct Adaptable {
     likelihoods: Arc<Likelihoods>,
-    /// What is not certain of the beginning; a new plan does not change that.
+    /// Uncertain initial facts. A new plan does not change them.
     initial: Initial,
-    /// Of plans that were taken up before.
+    /// Searches of plans that were adopted earlier.
     orders: Option<Orders>,
     foresight: Option<Foresight>,
     /// `true` if the table of a small world has led to the same state repeatedly: then orders are executed.
@@ -117,11 +117,11 @@ impl Adaptable {
         }
     }
 
-    /// All that can be done in a small world, where nothing is under way and everything is known;
-    /// with the actions.
+    /// Returns the table of a small world, with its actions. `None` if an action is running or the
+    /// state is uncertain.
     fn tabulated(&self, mission: &Mission) -> Option<(Chooser, Vec<Step>)> {
         let foresight = self.foresight.as_ref()?;
-        // A table is for who sees the state as it is.
+        // A table requires a fully known state.
         if !mission.running.is_empty() || !self.initial.is_empty() || self.is_table_circling {
             return None;
         }
@@ -153,7 +153,7 @@ impl Adaptable {
             let reason = Reason::new(Cause::NoOrder).about(About::NoPartialOrder);
             return Err(Box::new(reason));
         };
-        // What is running comes first in both.
+        // In both, running actions come first.
         let by_instance = plan
             .instance_of_step
             .iter()

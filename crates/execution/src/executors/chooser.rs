@@ -1,4 +1,4 @@
-//! Who chooses the next happening of a plan, or of everything that can be done: [`Chooser`].
+//! Choice of the next happening, by orders of a plan or by the table of a small world: [`Chooser`].
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ pub(super) enum Chooser {
     Table {
         table: Arc<Table>,
         search: Box<OrderSearch>,
-        /// The value of the state in which was chosen last.
+        /// Value of the state at the last choice.
         value: f64,
     },
 }
@@ -85,7 +85,7 @@ impl Chooser {
         }
     }
 
-    /// Why this is next.
+    /// Returns the reason for this choice.
     pub(super) fn about(&self, next: &NextHappening) -> About {
         match self {
             Self::Table { value, .. } => About::BestOfAll(*value),

@@ -60,7 +60,7 @@ fn place_timed(plan: &mut StnPlan, nominal: &Schedule) {
     };
     let placed = plan.constraints.iter().map(|constraint| {
         let (from, to) = (constraint.from, constraint.to);
-        // In either direction: as bounds on what is not timed, counted from what is.
+        // In both directions: bounds on the untimed node, counted from the timed one.
         let (timed, other, lower, upper) = match (is_timed(from), is_timed(to)) {
             (true, false) => (from, to, constraint.lower.clone(), constraint.upper.clone()),
             (false, true) => (
@@ -102,7 +102,7 @@ impl Executor for Fixed {
             };
             let time = |node: elbowroom_plan::NodeId| &mission.nominal[node];
             let room = self.around(&(time(constraint.to) - time(constraint.from)));
-            // What is left of a running action is a guess; it may well end sooner.
+            // The remaining duration of a running action is an estimate; the action may end sooner.
             let is_rest = mission.running.contains_key(&StepId::from(instance));
             let lower = if is_rest {
                 Some(Rational::ZERO)

@@ -1,4 +1,4 @@
-//! `lookahead`: what is best in the world of the likelihoods, on a clock.
+//! `lookahead`: the best action in the world of the likelihoods, on a clock.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

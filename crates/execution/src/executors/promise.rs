@@ -1,4 +1,4 @@
-//! What can be promised of the rest of a plan: the most that still holds.
+//! The strongest promise that still holds for the remaining plan.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::Reading;
@@ -13,8 +13,9 @@ use crate::executor::{Mission, StepId};
 use crate::quantities::duration_parameters;
 use crate::reason::{About, Cause, Promise, Reason};
 
-/// How much of the room around what is planned is tried, in sixteenths. On a clock each start is a little late, and where
-/// ends of the room lie on their limits, that takes as little from it.
+/// Shares of the envelope around the planned values that are tried, in sixteenths. On a real clock
+/// each start is a little late; where the envelope has no slack to spare, a slightly smaller share
+/// makes up for that.
 const SHARES: [i64; 7] = [16, 15, 12, 8, 4, 2, 1];
 
 /// A reading of each constraint of a plan.
@@ -28,7 +29,7 @@ const SLACKS: [i64; 5] = [16, 8, 4, 2, 1];
 enum Overrun {
     /// However long.
     ForEver,
-    /// Another quarter of what was planned.
+    /// A quarter of the planned duration.
     Quarter,
     /// They are taken to end when it suits.
     Suitable,
@@ -60,7 +61,7 @@ pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason
     most(reads_more_than_facts, knows_room, &mut attempt)
 }
 
-/// Whether a reason says that something happened at another time than the plan allows.
+/// Returns `true` if the reason is that something happened outside the times that the plan permits.
 pub(super) fn is_about_time(reason: &Reason) -> bool {
     matches!(
         reason.cause,
@@ -73,26 +74,27 @@ pub(super) fn lacks_time(reason: &Reason) -> bool {
     is_about_time(reason) || matches!(reason.about, Some(About::TooLittleTime))
 }
 
-/// What is left of a plan.
+/// The remaining plan.
 pub(super) struct Rest<'a> {
     pub(super) mission: &'a Mission,
     /// The values observed, and for the rest the planned ones.
     pub(super) values: &'a Valuation,
-    /// Whether nothing has left the envelope, what is under way included: what numbers bear is known
-    /// of all of it then.
+    /// `true` if no quantity has left the envelope, including the durations of running actions.
+    /// Then the numeric conditions are guaranteed in all of the envelope.
     pub(super) is_inside: bool,
-    /// Whether the plan needs more than facts, one by one.
+    /// `true` if the plan's conditions are more than single facts, for example numeric.
     pub(super) reads_more_than_facts: bool,
-    /// What was promised of it before.
+    /// The promise so far.
     pub(super) promise: Promise,
-    /// Whether its constraints are not what they were, with what was observed.
+    /// `true` if an observation has changed the plan's constraints.
     pub(super) has_other_constraints: bool,
 }
 
-/// Something was not as promised: makes the most of what is left.
+/// Returns the strongest promise for the remaining plan that still holds after a deviation, and
+/// dispatches accordingly.
 ///
 /// # Errors
-/// When the rest does not work even if nothing deviates any more.
+/// If the remaining plan fails even when executed nominally.
 pub(super) fn weaken(
     dispatch: &mut Dispatch,
     rest: &Rest<'_>,
@@ -108,7 +110,7 @@ pub(super) fn weaken(
         has_other_constraints,
     } = *rest;
     let local = dispatch.local(now);
-    // What numbers bear is known only where nothing has left the envelope.
+    // Numeric conditions are only guaranteed while no quantity has left the envelope.
     let is_unknown = !is_inside && reads_more_than_facts;
     if !has_other_constraints && dispatch.bear(&local, &|overdue| ends(rest, overdue, &local)) {
         return Ok(if is_unknown {
@@ -140,7 +142,7 @@ pub(super) fn weaken(
         return Ok(promise);
     }
     if reason.cause == Cause::Unreachable {
-        // What cannot happen in time any more says more than what stands against each other.
+        // A missed time point explains more than the conflicting constraints.
         return Err(Box::new(reason));
     }
     let mut lost = Reason {
@@ -152,8 +154,9 @@ pub(super) fn weaken(
     Err(Box::new(lost.since(now.clone())))
 }
 
-/// The last moment, in the world's time, at which an action under way can end so that the rest works if nothing else
-/// deviates any more; `None` if there is none, or no limit. Takes time in proportion to the plan.
+/// Returns the latest end of a running action with which the remaining plan works if nothing else
+/// deviates any more, on the world's clock. `None` if there is none, or no limit. Takes time in
+/// proportion to the plan.
 pub(super) fn bears_until(
     dispatch: &Dispatch,
     (mission, values): (&Mission, &Valuation),
@@ -283,13 +286,14 @@ fn ends(rest: &Rest<'_>, overdue: &Overdue, now: &Rational) -> Vec<Until> {
     vec![Until::ForEver, Until::At(quarter)]
 }
 
-/// How much longer an action is taken to go on that is overdue.
+/// Returns the additional time that an overdue action is assumed to take.
 fn quarter(mission: &Mission, planned: &Rational) -> Rational {
     (planned / Rational::from(4)).max(mission.task.epsilon().clone())
 }
 
-/// The first attempt to succeed, with what it promises. What numbers bear is known of all of the
-/// envelope, or, once something has left it (`knows_room` does not hold), of what is planned.
+/// Returns the result of the first attempt that succeeds, with its promise, from the strongest
+/// assumptions to the weakest. Numeric conditions are guaranteed in all of the envelope or, once a
+/// quantity has left it (`knows_room` is `false`), only for the planned values.
 fn most<T, E>(
     reads_more_than_facts: bool,
     knows_room: bool,
@@ -326,19 +330,20 @@ struct Room<'a> {
     envelope: Option<&'a DecoupledEnvelope>,
     /// The values observed, and the nominal ones of the rest.
     values: &'a Valuation,
-    /// How much of the room around what is planned; 1 is all of it.
+    /// The share of the envelope around the planned values; 1 is all of it.
     share: &'a Rational,
     overrun: Overrun,
-    /// Whether nothing has left the envelope, what is under way included.
+    /// `true` if no quantity has left the envelope, including the durations of running actions.
     is_inside: bool,
-    /// For how long an instance has been under way.
+    /// The time for which an instance has been running.
     elapsed: &'a dyn Fn(InstanceId) -> Option<Rational>,
 }
 
 impl Room<'_> {
     fn reading(&self, constraint: &Constraint) -> Reading {
         let plan = &self.mission.plan;
-        // What does not reckon with any more deviations may tell actions other durations too.
+        // With share 0, no more deviations are assumed, and the executor may command other
+        // durations.
         if let Some(planned) = plan.told_by(constraint)
             && !self.share.is_zero()
         {
@@ -357,7 +362,8 @@ impl Room<'_> {
         let Some(elapsed) = (self.elapsed)(instance) else {
             return Reading::Contingent { lower, upper };
         };
-        // Inside the envelope it may still be where it has had its share: then its share is one of what is left.
+        // An action may have exceeded its share and still be inside the envelope. Then the share
+        // applies to the rest of its interval.
         let has_had_it = upper.as_ref().is_some_and(|upper| *upper < elapsed);
         let upper = if self.is_inside && has_had_it {
             let all = self.interval(parameter, &Rational::ONE).1;
@@ -385,7 +391,7 @@ impl Room<'_> {
         }
     }
 
-    /// A share of the envelope around what is planned.
+    /// Returns a share of a parameter's interval in the envelope, around the planned value.
     fn interval(&self, id: ParameterId, share: &Rational) -> (Rational, Option<Rational>) {
         let planned = &self.values[id];
         if share.is_zero() {
@@ -400,7 +406,7 @@ impl Room<'_> {
         let lower = interval.lower.value().map_or(Rational::ZERO, within);
         let upper = match interval.upper.value() {
             Some(upper) => Some(within(upper)),
-            // A share of infinitely much room is in proportion to what is planned.
+            // A share of an infinite interval is proportional to the planned value.
             None if *share == Rational::ONE => None,
             None => Some(planned + planned * share * Rational::from(16)),
         };

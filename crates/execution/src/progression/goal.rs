@@ -1,4 +1,4 @@
-//! What becomes of the goal if nothing more is done: [`Outlook`].
+//! Forecast for the goal if no more actions are executed: [`Outlook`].
 
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::Condition;
@@ -6,20 +6,21 @@ use elbowroom_num::Rational;
 
 use super::Progression;
 
-/// What becomes of the goal if nothing more is done. It counts after all timed initials, so it is
-/// not decided before the last of those that change what it reads.
+/// Forecast for the goal if no more actions are executed. The goal counts after all timed initials,
+/// so it is not decided before the last one that changes a fact or fluent it reads.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Outlook {
-    /// It holds, and no timed initial changes what it reads any more.
+    /// The goal holds, and no coming timed initial affects it.
     Reached,
-    /// It will hold from then on: timed initials to come change what it reads.
+    /// The goal will hold at this time, after the last timed initial that affects it.
     Awaited(Rational),
     /// It will not hold, or that cannot be said.
     Unmet,
 }
 
 impl Progression {
-    /// What becomes of the goal if nothing more is done, and what is under way has no effect.
+    /// Returns the forecast for the goal if no more actions are executed and the running ones have
+    /// no effect.
     pub(crate) fn outlook(&self) -> Outlook {
         let (last, state) = self.in_the_end();
         if state.is_goal() != Ok(true) {

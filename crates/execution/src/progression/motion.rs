@@ -1,4 +1,4 @@
-//! How fluents move between happenings: polynomials in time.
+//! Continuous change of fluents between happenings, as polynomials in time.
 
 use std::collections::BTreeMap;
 
@@ -20,9 +20,9 @@ pub(super) struct Rate<'a> {
 pub(super) struct Motion(BTreeMap<FluentId, Polynomial>);
 
 impl Motion {
-    /// What these rates bring about.
+    /// Returns the motion that results from these rates.
     ///
-    /// A rate may read fluents that move themselves, as long as none depends on itself in the end.
+    /// A rate may read fluents that move themselves, as long as there is no cycle.
     pub(super) fn of(
         rates: &[Rate<'_>],
         now: &dyn Fn(FluentId) -> Result<Rational, Unreadable>,
@@ -56,7 +56,7 @@ impl Motion {
         Ok(motion)
     }
 
-    /// Whether nothing moves.
+    /// Returns `true` if no fluent moves.
     pub(super) fn is_still(&self) -> bool {
         self.0.is_empty()
     }
@@ -66,7 +66,8 @@ impl Motion {
         self.0.contains_key(&fluent)
     }
 
-    /// A fluent's value as a function of time; `now` is what it is where it does not move.
+    /// Returns a fluent's value as a function of time. `now` returns the present value of a fluent
+    /// that does not move.
     pub(super) fn value(
         &self,
         fluent: FluentId,

@@ -6,7 +6,7 @@ use elbowroom_num::Rational;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Polynomial(Vec<Rational>);
 
-/// Part of an open interval in which none of some polynomials changes its sign.
+/// Part of an open interval in which no polynomial of a set changes its sign.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Cell {
     /// An open piece, by a point in it.
@@ -209,7 +209,7 @@ impl Sturm {
         self.0[0].at(time).is_zero()
     }
 
-    /// How often the signs change along the sequence.
+    /// Returns the number of sign changes along the sequence.
     fn changes_at(&self, time: &Rational) -> usize {
         let signs = self.0.iter().map(|p| p.at(time).signum());
         let signs: Vec<i32> = signs.filter(|sign| *sign != 0).collect();
@@ -251,7 +251,7 @@ mod tests {
             signs(&[line.clone(), parabola.clone()], 3),
             [[-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1]]
         );
-        // The interval is open: what is zero at its ends has one sign in it.
+        // The interval is open, so a polynomial that is zero only at its ends has one sign in it.
         assert_eq!(signs(&[line], 2), [[-1]]);
         assert_eq!(signs(&[polynomial(&[0, 1])], 2), [[1]]);
         // A double zero touches.

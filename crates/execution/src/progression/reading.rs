@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 
 use super::Progression;
 
-/// Why a condition or an expression says nothing.
+/// Reason for which a condition or an expression has no value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unreadable {
     /// The fluent has no value.
@@ -26,7 +26,7 @@ pub enum Unreadable {
     Open,
 }
 
-/// The state, for conditions in which `?duration` may stand.
+/// The state, for conditions that may contain `?duration`.
 struct Reading<'a> {
     state: &'a Progression,
     duration: Option<&'a Rational>,
@@ -80,10 +80,10 @@ impl Moment<Unreadable> for Reading<'_> {
 }
 
 impl Progression {
-    /// Whether a condition holds now; `duration` is what `?duration` stands for.
+    /// Returns `true` if a condition holds now; `duration` is the value of `?duration`.
     ///
     /// # Errors
-    /// When that cannot be said.
+    /// If the condition cannot be evaluated.
     pub fn holds(
         &self,
         condition: &Condition,
@@ -92,11 +92,11 @@ impl Progression {
         self.read(condition, duration, Mode::Now)
     }
 
-    /// Whether a condition held on arrival at the present moment, before anything happened at it:
-    /// what counts for all that happens now.
+    /// Returns `true` if a condition held on arrival at the present moment, before any happening of
+    /// it. All happenings of the moment use this state.
     ///
     /// # Errors
-    /// When that cannot be said.
+    /// If the condition cannot be evaluated.
     pub fn held_on_arrival(
         &self,
         condition: &Condition,

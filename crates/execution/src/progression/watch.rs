@@ -19,7 +19,7 @@ use crate::event::Ticket;
 enum Span<'a> {
     /// All that come soon enough.
     Soon,
-    /// All until so much later, which itself is left out.
+    /// All moments before this much later.
     Until(&'a Rational),
 }
 
@@ -28,7 +28,7 @@ enum Span<'a> {
 struct Lost {
     /// Parts of over-all conditions.
     conditions: Vec<(Ticket, Vec<usize>)>,
-    /// Guards: of which action, which effect, and whether it is one of its end.
+    /// Guards: the ticket of the action, the index of the effect, and `true` for an end effect.
     guards: Vec<(Ticket, usize, bool)>,
 }
 
@@ -88,7 +88,7 @@ impl Progression {
         Some(((moment / grid).floor() + Rational::ONE) * grid)
     }
 
-    /// Notes what will not have held when so much time has passed.
+    /// Records the conditions that fail within the next `elapsed` time.
     pub(super) fn watch(&mut self, motion: &Motion, elapsed: &Rational) {
         let lost = self.lost(motion, Span::Until(elapsed));
         for (ticket, parts) in lost.conditions {
@@ -135,8 +135,8 @@ impl Progression {
         lost
     }
 
-    /// Whether a condition of a running action holds in a span, and now if that lies inside the
-    /// action.
+    /// Returns `true` if a condition of a running action holds throughout a span, and also now
+    /// unless the action starts now.
     fn lasts(
         &self,
         condition: &Condition,
@@ -187,7 +187,7 @@ impl View<'_> {
         }
     }
 
-    /// Where these are zero, comparisons that the condition reads may turn.
+    /// Returns polynomials at whose zeros the comparisons of a condition may change.
     pub(super) fn boundaries(&self, condition: &Condition) -> Vec<super::polynomial::Polynomial> {
         let mut found = Vec::new();
         let mut note = |left: &Expression, right: &Expression| {

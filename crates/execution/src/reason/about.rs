@@ -1,4 +1,4 @@
-//! What a reason is about: [`About`], and its words.
+//! The subject of a reason: [`About`], and its text.
 
 use std::fmt;
 
@@ -6,8 +6,7 @@ use elbowroom_num::Rational;
 
 /// The quantity, condition, moment or state of affairs that a [`Reason`](super::Reason) is about.
 ///
-/// Its [`Display`](fmt::Display) is the one place where it becomes words; what can be told apart is
-/// told apart by its data.
+/// Only its [`Display`](fmt::Display) turns it into text. Cases that differ have different data.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum About {
@@ -25,11 +24,11 @@ pub enum About {
     End(String),
     /// A time point of the plan, as the plan describes it.
     TimePoint(String),
-    /// The same, of a start that has failed so often in a row and is tried again.
+    /// The same, of a start that has failed `failures` times in a row and is tried again.
     Retry {
         /// The time point, if it is still to come.
         of: Option<String>,
-        /// How often it has failed.
+        /// Number of failures.
         failures: u32,
     },
     /// These conditions, as the problem writes them.
@@ -38,17 +37,17 @@ pub enum About {
     Throughout(Vec<String>),
     /// This fact or fluent, which was seen.
     Seen(String),
-    /// An observation made when the world was asked to look at the goal.
+    /// An observation from the [look](crate::World::look) at the goal.
     SeenAtTheEnd,
     /// The next observation, of any kind.
     AnyObservation,
     /// The last timed initial that changes what the goal reads.
     GoalSettled,
-    /// The end of what is under way.
+    /// The end of the running actions.
     EndOfRunning,
-    /// The start of what was told to start.
+    /// The start of the commanded actions.
     StartOfOrdered,
-    /// The end of what was told to stop.
+    /// The end of the cancelled actions.
     EndOfCancelled,
     /// The next start of the order that is executed.
     NextStart,
@@ -73,7 +72,7 @@ pub enum About {
     WithoutEndOf(String),
     /// It was cancelled.
     Cancelled,
-    /// It has failed so often in a row that its likelihoods do not explain it.
+    /// It has failed several times in a row, and its likelihoods do not explain that.
     FailedInARow {
         /// The world's explanation of the last failure; `None`: it was cancelled.
         why: Option<String>,

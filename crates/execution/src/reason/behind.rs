@@ -1,4 +1,4 @@
-//! What stands behind a reason: [`Behind`], and its words.
+//! The explanation of a reason: [`Behind`], and its text.
 
 use std::fmt;
 
@@ -28,7 +28,7 @@ pub enum Behind {
     Timed {
         /// The changes.
         changes: Vec<Changed>,
-        /// When, where that is told.
+        /// The time, if it is given.
         at: Option<Rational>,
     },
     /// More constraints, between the one before and the one after.

@@ -1,4 +1,4 @@
-//! What a run has to do before its executor is asked again.
+//! Agenda of a run: the tasks before the next decision of its executor.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub(super) enum Todo {
     Decide,
     /// Cancel actions.
     Cancel(Vec<Ticket>),
-    /// Tell the world what is on record.
+    /// Send a recorded command to the world.
     Send(Command),
     /// Let time pass.
     Pass(Rational),
@@ -34,7 +34,7 @@ pub(super) enum Todo {
     Settle(Option<Vec<Ticket>>),
     /// Wait until these actions have ended, unless the goals change or the number of doubts does.
     Linger(Vec<Ticket>, usize),
-    /// See what is to be done instead of the plan.
+    /// Decide how to continue without the plan.
     Replan(Reason),
     /// Make a plan from here.
     Plan(Reason),
@@ -42,11 +42,11 @@ pub(super) enum Todo {
     Adopt(Box<Made>),
     /// Begin with a plan that is ready.
     TakeUp(Box<Mission>),
-    /// Begin with a plan with which another run has begun, of this task.
+    /// Begin with a plan that another run has begun with, for this task.
     TakeUpAgain(Arc<Task>, Box<TakesUp>),
-    /// Events that happened while the plan was made, of which it does not know.
+    /// Report events that happened while the plan was made, and that it does not account for.
     Tell(Vec<News>),
-    /// Wait until then for what was told to stop, and end the run.
+    /// Wait until then for cancelled actions to stop, and end the run.
     Close(Rational),
 }
 
@@ -62,8 +62,8 @@ pub(super) struct Made {
 }
 
 impl Run<'_> {
-    /// Does something, which may bring more onto the agenda. What is returned, the world must be
-    /// told before anything else is done.
+    /// Performs a task, which may add more tasks. Returns a command that the world must receive
+    /// before anything else is done.
     pub(super) fn perform(&mut self, todo: Todo) -> Result<Option<Command>, Stop> {
         match todo {
             Todo::Begin(Some(plan)) => {

@@ -20,14 +20,14 @@ use crate::record::Entry;
 pub(super) struct Course<'p> {
     pub(super) plan: &'p TimeTriggeredPlan,
     pub(super) situation: &'p Situation,
-    /// The tickets of what is under way there.
+    /// The tickets of the actions that are running there.
     pub(super) running: &'p [Ticket],
-    /// What of it has begun since, before it is taken up.
+    /// The steps that have begun between the plan's start and its adoption.
     pub(super) begun: &'p [Ticket],
 }
 
 impl<'p> Course<'p> {
-    /// A plan of which nothing has begun yet.
+    /// Creates the course of a plan with no step begun.
     pub(super) fn of(
         plan: &'p TimeTriggeredPlan,
         situation: &'p Situation,
@@ -84,13 +84,13 @@ impl Run<'_> {
             self.account.begin_plan(&BTreeMap::new());
             return self.replan(&reason);
         }
-        // What has ended while the plan was made, the plan still waits for.
+        // The plan still waits for actions that ended while it was made.
         let mut missed: Vec<(Rational, News)> = Vec::new();
         for (step, ticket) in mission.running.iter().map(|(step, it)| (*step, *it)) {
             missed.extend(self.ending(step, ticket));
         }
         if !mission.begun.is_empty() {
-            // In the order in which they were told to start.
+            // In the order of their commands.
             let mut begun: Vec<_> = mission
                 .begun
                 .iter()
@@ -107,8 +107,9 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// The steps of a plan that these are: of each action the first ones that are not under way where
-    /// the plan begins. `None` if it does not have one of them.
+    /// Returns the steps of a plan to which these starts belong: of each action, the first ones
+    /// that are not running at the beginning of the plan. `None` if the plan does not have all of
+    /// them.
     pub(super) fn steps_of(
         &self,
         mission: &Mission,

@@ -1,8 +1,9 @@
-//! Why no plan reaches the goal any more: what can never become true again, and since when.
+//! Explanation of a dead end: the parts of the goal that can never become true again, and since
+//! when.
 //!
-//! What can become true at all is asked of [`reachability`], which ignores deletions and time: what
-//! is out of its reach, no plan reaches. The history of the run is lived through again to find the
-//! event after which part of the goal was out of reach and before which it was not.
+//! [`reachability`] computes what can become true at all. It ignores deletions and time, so no plan
+//! reaches anything that is outside of its result. The history of the run is replayed to find the
+//! event that made part of the goal unreachable.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -79,7 +80,7 @@ impl Run<'_> {
         explained.collect()
     }
 
-    /// What was believed after so many events of the history.
+    /// Returns the belief after the first `count` events of the history.
     pub(super) fn believed_after(&self, count: usize) -> Progression {
         self.past().after(count)
     }
@@ -108,7 +109,8 @@ struct Past<'a> {
 }
 
 impl Past<'_> {
-    /// The parts of the goal that were out of reach after so many events, if that can be said.
+    /// Returns the parts of the goal that were unreachable after the first `count` events, if that
+    /// can be computed.
     fn unreachable_after(&mut self, count: usize) -> Option<Vec<Condition>> {
         if let Some(known) = self.known.get(&count) {
             return known.clone();
@@ -155,8 +157,8 @@ impl Past<'_> {
         self.between(open, reason, goal)
     }
 
-    /// The goal was in reach after so many events, and after one more it was not; or time has
-    /// passed.
+    /// Explains a part of the goal that was reachable after `count` events, and unreachable after
+    /// one more or because time has passed.
     fn between(&self, count: usize, reason: Reason, goal: &Condition) -> Reason {
         let next = self.history.get(count);
         let until = next.map_or(self.now, |next| &next.time).clone();

@@ -24,7 +24,7 @@ pub enum Next {
         /// By the world's clock.
         until: Rational,
     },
-    /// The world is to look at these, if it can; then [`Run::see`].
+    /// The world is to look at these, if it can; the answer goes to [`Run::see`].
     Look {
         /// Facts.
         facts: Vec<FactId>,
@@ -143,10 +143,10 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// What was seen of that which [`Next::Look`] has asked for; nothing, if the world cannot look.
+    /// Takes the observations that [`Next::Look`] has requested; none if the world cannot look.
     ///
     /// # Errors
-    /// When the run has not asked for it; then nothing is made of it.
+    /// If the run has not requested them. They are ignored then.
     pub fn see(&mut self, observations: Vec<Observation>) -> Result<(), NotAsked> {
         if !matches!(self.asked, Some(Next::Look { .. })) {
             let what = "a look";

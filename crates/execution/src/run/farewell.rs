@@ -9,7 +9,7 @@ use crate::executor::News;
 use crate::reason::{About, Cause, Reason};
 use crate::record::Entry;
 
-/// How many seconds of the world's time cancelled actions have to stop when a run ends.
+/// Time that cancelled actions have to stop at the end of a run, in seconds of the world's clock.
 pub const FAREWELL: i64 = 5;
 
 /// The closing phase of a run, while running actions are cancelled.
@@ -23,7 +23,7 @@ pub(super) struct Closing {
 }
 
 impl Run<'_> {
-    /// Whether the run was asked to end.
+    /// Ends the run if that was requested.
     pub(super) fn heed(&mut self) -> Result<(), Stop> {
         if !(self.is_to_end)() {
             return Ok(());
@@ -79,14 +79,14 @@ impl Run<'_> {
             return;
         }
         self.progress.begin_plan();
-        // What stops at once is told at once.
+        // Immediate ends are reported at once.
         self.agenda.push(Todo::Close(self.now.clone()));
         let running = open.into_iter();
         let running = running.filter(|ticket| !self.account.is_cancelled(*ticket));
         self.agenda.push(Todo::Cancel(running.collect()));
     }
 
-    /// Waits for what was told to stop, if there is something left.
+    /// Waits for the cancelled actions that have not stopped, or ends the run if there are none.
     pub(super) fn close(&mut self, until: Rational) {
         if self.account.open_tickets().next().is_some() {
             self.asked = Some(Next::Wait { until });
@@ -158,9 +158,9 @@ impl Run<'_> {
 }
 
 impl<'a> Run<'a> {
-    /// The same run, which was over so many times, each time without its goal
-    /// ([`Verdict::NoPlan`], [`Verdict::PlannerFailed`]), and was then gone on with: another plan is looked for, from where it
-    /// was over. [`Run::go`] goes on so often by itself.
+    /// Makes the run continue up to `times` times after it was over without its goal
+    /// ([`Verdict::NoPlan`], [`Verdict::PlannerFailed`]): another plan is searched for, from the
+    /// situation at its end. [`Run::go`] does that by itself.
     #[must_use]
     pub fn reopened(self, times: usize) -> Run<'a> {
         Self {

@@ -188,7 +188,8 @@ impl Run<'_> {
         }
     }
 
-    /// How the goals have changed, if they have: in words, and whether they have only become more.
+    /// Returns the change of the goals in words, and `true` if goals were only added. `None` if
+    /// they have not changed.
     pub(super) fn turn_in_words(&self) -> Option<(String, bool)> {
         let turn = self.lasting.as_ref()?.change.as_ref()?;
         let words = turn.reason.about.as_ref().map(ToString::to_string);

@@ -36,7 +36,7 @@ pub(super) enum NextAttempt {
 }
 
 impl Run<'_> {
-    /// Brings what is running to where a new plan can begin: see [`RunningRule`].
+    /// Brings the running actions to a state from which a new plan can start: see [`RunningRule`].
     pub(super) fn settle(&mut self) {
         match self.settings.running {
             RunningRule::Keep => {
@@ -78,8 +78,8 @@ impl Run<'_> {
         }
     }
 
-    /// Waits until the next time-out or its warning at the latest, and goes on with this then. If nothing can time out,
-    /// nothing is running.
+    /// Waits until the next time-out or its warning at the latest, and performs `todo` then. If
+    /// nothing can time out, nothing is running.
     fn wait_until_timeout(&mut self, todo: Todo) {
         let Some(until) = self.next_timeout() else {
             return;
@@ -90,7 +90,8 @@ impl Run<'_> {
         self.agenda.push(Todo::Pass(until));
     }
 
-    /// A plan can only go on with what has started, and with what it may go on doing.
+    /// Returns the actions with which no plan can continue: those that have not started, and those
+    /// whose over-all condition fails.
     fn what_cannot_go_on(&self) -> Vec<Ticket> {
         let breaking = self.belief.breaking().into_iter();
         let breaking: BTreeSet<Ticket> = breaking.map(|(ticket, _)| ticket).collect();
@@ -272,12 +273,13 @@ impl Run<'_> {
         self.take_up(Course::of(&made.plan, &made.situation, &made.running));
     }
 
-    /// Where things will stand when the new plan can begin: after the time that planning is
-    /// expected to take, and ε after whatever happens last before that.
+    /// Returns the situation when the new plan can start: after the expected planning time, and ε
+    /// after the last event before that.
     pub(super) fn situation(&self, allowance: &Rational, guess: Guess) -> (Situation, Vec<Ticket>) {
         let epsilon = self.task.epsilon();
         let mut time = &self.now + allowance;
-        // Another goal makes another problem, which is written anew for planners that read files.
+        // With other goals, the problem is a different one, and is written again for planners that
+        // read files.
         if self.now.is_positive() || self.account.started() > 0 || self.has_other_goals() {
             time += epsilon;
         }

@@ -1,4 +1,4 @@
-//! Where a run stands: the situation for a plan from here, and what is left of the present plan.
+//! Present situation of a run: the start of a new plan, and the remaining plan.
 
 use std::sync::Arc;
 
@@ -21,8 +21,8 @@ pub enum Guess {
     Cancelled,
 }
 
-/// Where things will stand at `time` if nothing ends before that, or ε after the timed initials
-/// that come just before it; and the tickets of what is under way, in the situation's order.
+/// Returns the situation at `time`, or ε after timed initials that come just before it, if no
+/// action ends until then; and the tickets of the running actions, in the situation's order.
 pub fn situation_at(
     belief: &Progression,
     mut time: Rational,
@@ -83,8 +83,9 @@ pub fn a_quarter_longer(belief: &Progression, ticket: Ticket, now: &Rational) ->
     now + longer
 }
 
-/// The plan that continues what is under way and then does what is left, all of it as much later as
-/// the latest of it is late; `None` if the judge finds that it does not work.
+/// Returns the plan that continues the running actions and then executes the remaining steps. All
+/// steps are shifted by the greatest delay of any of them. `None` if the validator rejects the
+/// plan.
 pub fn rest_of(
     task: &Task,
     situation: &Situation,

@@ -37,11 +37,11 @@ pub fn is_correction(remark: &str) -> bool {
 /// The objection to a report on a ticket that was not given out.
 const NEVER_STARTED: &str = "nothing of that number was started";
 
-/// The objection to a report on what is no longer known.
+/// Objection to a report on a start that is no longer known.
 const LONG_PAST: &str = "it had ended, and was long past";
 
 impl Run<'_> {
-    /// Believes what is reported, as far as it can be believed, and notes what is new.
+    /// Updates the belief with the reports, as far as they are credible, and records the news.
     pub(super) fn take_in(&mut self, observations: Vec<Observation>) {
         let timed_before = self.belief.timed_past();
         // The earliest time of each observation and those behind it; the last one comes first.
@@ -158,8 +158,8 @@ impl Run<'_> {
         }
     }
 
-    /// The belief is never taken back in time, so a late report changes the present state. What is
-    /// reported of one time is one group.
+    /// Advances the belief to the time of a report. The belief never goes back in time, so a late
+    /// report changes the present state. Reports with the same time form one group.
     pub(super) fn believe_until(&mut self, time: &Rational) {
         let _ = self.belief.arrive(time);
     }
@@ -325,7 +325,8 @@ impl Run<'_> {
         });
     }
 
-    /// The present plan does not know of an action of an earlier one, but may read what it wrote.
+    /// Reports the effects of an action of an earlier plan as news. The present plan does not
+    /// contain the action, but may read its effects.
     pub(super) fn tell_effects(&mut self, ticket: Ticket, is_end: bool) {
         let Some(entry) = self.account.get(ticket) else {
             return;

@@ -1,4 +1,4 @@
-//! Plans that are made beside the run: what goes on meanwhile, and how they take over.
+//! Background planning: execution during a search, and the switch to the new plan.
 
 mod fit;
 mod ready;
@@ -33,21 +33,21 @@ use crate::record::Entry;
 use crate::request::{RequestId, Urgency};
 use ready::Readying;
 
-/// So many searches in a row are ended at once because goals were abandoned. The next one is let go on
-/// for a while ([`Run::end_of_patience`]): somebody who keeps changing goals does not keep the run from
-/// acting.
+/// Number of searches in a row that end at once when goals are abandoned. The next one continues
+/// for a limited time ([`Run::end_of_patience`]), so that frequent changes of goals do not block
+/// the run.
 const MOST_ENDED: usize = 3;
 
-/// For so many seconds of the world's time a search for goals that were abandoned may go on after that,
-/// or for twice as long as planning is expected to take; and for twice as long again each time that this
-/// is over before there is a plan.
+/// Minimum time for which a search may continue although its goals were abandoned, in seconds of
+/// the world's clock. The time is at least twice the expected planning time. It doubles each time
+/// that it passes before there is a plan.
 const PATIENCE: i64 = 5;
 
-/// So many times at most it becomes twice as long.
+/// Maximum number of doublings of that time.
 const MOST_DOUBLINGS: u32 = 20;
 
-/// For so many seconds of the world's time, at most, a plan that is there waits for the world to say
-/// what was told to start has started.
+/// Maximum time for which a finished plan waits for the reports that commanded actions have
+/// started, in seconds of the world's clock.
 const WORD: i64 = 1;
 
 /// A plan in the making, or one that waits to take over.
@@ -62,33 +62,34 @@ pub(super) struct Search {
     task: Arc<Task>,
     /// These goals, as they were given.
     goals: Goals,
-    /// Where it begins.
+    /// The situation from which the plan starts.
     situation: Situation,
-    /// What is under way there. Tickets that were not given out when it was begun are those of
-    /// what the present plan is expected to start.
+    /// The actions running there. Tickets that were not issued when the search began are those of
+    /// expected starts of the present plan.
     running: Vec<Ticket>,
-    /// What the present plan is expected to start until then.
+    /// The expected starts of the present plan until then.
     expected: Vec<Expected>,
     begun: Rational,
     /// Since when its situation is expected: before it was begun where it was foreseen.
     since: Rational,
-    /// Whether its situation was foreseen, and things stood otherwise by a little when it was begun.
+    /// `true` if the situation was foreseen, and the real one differed slightly when the search
+    /// began.
     is_guess: bool,
     course: Goes,
     /// The number of timed initials after which the goal was last known not to be out of reach.
     timed: usize,
     is_made: bool,
-    /// Whether something has happened since that nobody expected.
+    /// `true` if an unexpected event has happened since.
     is_overtaken: bool,
     /// The plan, and since when it is there.
     plan: Option<(TimeTriggeredPlan, Rational)>,
     /// The plan as it is made ready.
     readying: Option<Readying>,
-    /// How often that was begun.
+    /// Number of preparations so far.
     tries: usize,
-    /// Steps of the plan before that were started, once that plan is let go of.
+    /// The started steps of the earlier plan, once that plan was abandoned.
     left_behind: BTreeMap<StepId, Ticket>,
-    /// Which change of the goals the plan is kept for, if none was looked for.
+    /// The change of the goals for which the plan is kept, if no other plan is searched for.
     kept_for: Option<Turn>,
 }
 
@@ -124,19 +125,19 @@ impl Search {
     }
 }
 
-/// What goes on during a search.
+/// Execution during a search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Goes {
     /// The present plan, until then if there is an end.
     Plan { until: Option<Rational> },
-    /// What is under way.
+    /// Only the running actions continue.
     UnderWay,
 }
 
-/// What became of earlier searches and of the present plan, since one was taken up.
+/// Results of earlier searches, and state of the present plan, since a plan was last adopted.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lost {
-    /// Whether the present plan works no more.
+    /// `true` if the present plan is infeasible.
     pub(super) plan: bool,
     /// The doubts that the world has been asked about.
     pub(super) inquiry: Inquiry,
@@ -149,19 +150,19 @@ pub(super) struct Lost {
     pub(super) sought_in_vain: bool,
     /// `true` if goals were closed during the last search.
     pub(super) has_closed_goals: bool,
-    /// How many plans in a row were outdated when they came.
+    /// Number of plans in a row that were outdated when they were finished.
     outdated: usize,
-    /// How many searches in a row were ended because goals were abandoned.
+    /// Number of searches in a row that ended because goals were abandoned.
     ended: usize,
-    /// How many of these had been let go on for a while.
+    /// Number of these that had continued for a limited time.
     ended_late: u32,
-    /// How many times in a row the plan was to be kept for other goals, and was outdated when it was
-    /// ready.
+    /// Number of times in a row that the plan was to be kept for other goals, and was outdated when
+    /// it was prepared.
     kept: usize,
 }
 
 impl Run<'_> {
-    /// Whether plans are made beside the run, from now on.
+    /// Returns `true` if plans are made in the background from now on.
     pub(super) fn plans_aside(&self) -> bool {
         let has_begun = self.now.is_positive() || self.account.started() > 0;
         let is_waited_for = !has_begun && !self.goes_on_after(&Verdict::GoalReached);
@@ -179,8 +180,8 @@ impl Run<'_> {
         }
     }
 
-    /// What is believed, with the goals that the present plan is for: until another plan takes over, it
-    /// need not reach the goals that were given since. `None` where these are the same.
+    /// Returns the belief with the goals of the present plan, which need not reach the goals that
+    /// were given since. `None` if the goals are the same.
     pub(super) fn belief_of_the_plan(&self) -> Option<Progression> {
         let (_, task) = (self.search.as_ref()?, self.plan_task.as_ref()?);
         let mut belief = self.belief.clone();
@@ -188,7 +189,7 @@ impl Run<'_> {
         Some(belief)
     }
 
-    /// Something has happened that nobody expected.
+    /// Records that an unexpected event has happened.
     pub(super) fn note_surprise(&mut self) {
         if let Some(search) = &mut self.search {
             search.is_overtaken = true;
@@ -196,7 +197,7 @@ impl Run<'_> {
         self.note_disagreement();
     }
 
-    /// A plan is needed, and there is none that could go on.
+    /// Begins a search when a plan is needed and the present one cannot continue.
     pub(super) fn search_from_here(&mut self, reason: &Reason) {
         self.let_go_of_plan();
         self.news.clear();
@@ -205,14 +206,14 @@ impl Run<'_> {
         }
     }
 
-    /// Another plan is needed, because the goals have changed, and the present one goes on until it
-    /// is there; whether that can be.
+    /// Begins a search because the goals have changed, while the present plan continues. Returns
+    /// `false` if the plan cannot continue.
     pub(super) fn search_while_the_plan_goes_on(&mut self, reason: &Reason) -> Result<bool, Stop> {
         let goes_on = self.plans_aside()
             && self.settings.running == super::RunningRule::Keep
             && !self.lost.plan
             && self.present_plan().is_some()
-            // Others number what they start as they like.
+            // These executors choose their own step numbers.
             && self.ports.executor.need() != Need::PartialOrder
             && self.needs_no_plan().is_none_or(|it| it == Outlook::Unmet);
         if !goes_on {
@@ -315,7 +316,7 @@ impl Run<'_> {
         }
     }
 
-    /// What the present plan would start is not started any more.
+    /// Abandons the present plan: none of its remaining steps is started.
     pub(super) fn let_go_of_plan(&mut self) {
         // It was for a better plan than this one.
         self.give_up_optional_search();
@@ -370,10 +371,10 @@ impl Run<'_> {
         }
     }
 
-    /// Until when a search goes on though goals that it is for were abandoned.
+    /// Returns the time until which a search continues although its goals were abandoned.
     ///
-    /// It may be one that never ends, so that this has to be bounded; and if plans take longer than that,
-    /// one must be let come some time, though goals change all the while. So it becomes longer each time.
+    /// It is bounded because a search may never end. It grows with each such search, so that a plan
+    /// can be finished even if the goals change all the time.
     fn end_of_patience(&self, search: &Search) -> Rational {
         let expected = &self.allowance * &Rational::from(2);
         let patience = expected.max(Rational::from(PATIENCE));
@@ -446,7 +447,7 @@ impl Run<'_> {
         }
     }
 
-    /// Lets time pass, if nothing goes on but what is under way.
+    /// Waits for the plan if only running actions continue. Returns `true` if it does.
     fn waits_for_plan(&mut self) -> bool {
         let search = self.search.as_ref();
         let waits = search.is_some_and(|search| search.course == Goes::UnderWay);

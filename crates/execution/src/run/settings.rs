@@ -1,4 +1,4 @@
-//! How to run, and how a run ended.
+//! Settings and results of runs.
 
 use std::fmt;
 use std::str::FromStr;
@@ -17,30 +17,30 @@ pub struct RunSettings {
     pub running: RunningRule,
     /// The planning time, as it passes in the world.
     pub planning_time: PlanningTime,
-    /// How often a new plan may be made.
+    /// Maximum number of new plans.
     pub most_replans: usize,
     /// The rule that sets the time-out of each action.
     pub timeout: TimeoutRule,
-    /// Whether the room of what is under way is watched. Then there is a warning before a late
-    /// action makes a new plan necessary ([`Entry::Warning`](crate::Entry::Warning)), and an action
-    /// that no plan can bear any longer has failed: it is cancelled, and the next plan does without.
-    /// Otherwise, that no plan can bear it is the end of the run.
+    /// `true` if the slack of running actions is monitored. Then there is a warning before a late
+    /// action makes a new plan necessary ([`Entry::Warning`](crate::Entry::Warning)). An action
+    /// whose delay no plan tolerates any more is cancelled and counts as failed, and the next plan
+    /// does without it. If `false`, such a delay ends the run.
     pub watches_room: bool,
-    /// Whether plans are made beside the run ([`Planner::begin`](crate::Planner::begin)), while it
-    /// goes on: [`Run`](super::Run) has the rules. The first plan of a run that ends with its goal is
-    /// waited for.
+    /// `true` if plans are made in the background ([`Planner::begin`](crate::Planner::begin)),
+    /// while the run continues; [`Run`](super::Run) has the rules. The first plan of a run is
+    /// awaited, unless the run is an executive.
     pub plans_aside: bool,
-    /// Whether such plans are made ready beside the run, too
-    /// ([`Preparer::begin`](crate::Preparer::begin)). Then a plan takes over as soon as it is ready,
-    /// and what the present one begins until then is part of it.
+    /// `true` if such plans are also prepared in the background
+    /// ([`Preparer::begin`](crate::Preparer::begin)). Then a plan takes over as soon as it is
+    /// prepared, and actions that the present plan starts until then are part of it.
     pub readies_aside: bool,
     /// The time limit of the run, by the world's clock.
     pub time_limit: Rational,
 }
 
 impl Default for RunSettings {
-    /// Running actions go on; planning takes as long as it takes; at most 10
-    /// new plans, as in paper 1's experiments; a million seconds.
+    /// Running actions continue, planning time is measured, at most 10 new plans as in paper 1's
+    /// experiments, and a time limit of a million seconds.
     fn default() -> Self {
         Self {
             running: RunningRule::Keep,
@@ -62,11 +62,11 @@ pub enum RunningRule {
     Cancel,
     /// They are awaited, and the plan begins when they have ended.
     Await,
-    /// They go on, and the plan goes on with them: it takes them to last as long as they were
-    /// planned to, or, if they are overdue, a quarter longer than so far. Those whose over-all
-    /// condition has failed are cancelled: no plan can go on with them. So are, where their room is
-    /// watched ([`RunSettings::watches_room`]), overdue ones with which no plan is found, even if
-    /// they end at once.
+    /// They continue, and are part of the plan. They are assumed to take as long as planned or, if
+    /// they are overdue, a quarter longer than so far. Actions whose over-all condition has failed
+    /// are cancelled, because no plan can continue with them. If slack is monitored
+    /// ([`RunSettings::watches_room`]), overdue actions are also cancelled if no plan is found even
+    /// for the case that they end at once.
     #[default]
     Keep,
 }
@@ -109,7 +109,7 @@ pub enum PlanningTime {
 }
 
 impl PlanningTime {
-    /// How [`Self::Measured`] is written.
+    /// Text of [`Self::Measured`].
     const MEASURED: &str = "measured";
 }
 
@@ -158,16 +158,16 @@ pub enum Verdict {
     /// No plan reaches the goal from where the run ended, with a certificate
     /// ([`PlanAnswer::Unsolvable`](crate::PlanAnswer::Unsolvable)).
     Unsolvable,
-    /// There may be a plan, but there is none to go on with.
+    /// There may be a plan, but none was found or can be executed.
     NoPlan {
         /// The reason.
         why: String,
         /// The kind of the reason, which decides on the advice.
         missing: MissingPlan,
     },
-    /// The planner has failed, so that nobody knows whether there is a plan.
+    /// The planner has failed, so it is unknown whether there is a plan.
     PlannerFailed {
-        /// How.
+        /// The error.
         why: String,
     },
     /// The limit on new plans was reached.
@@ -211,7 +211,7 @@ impl MissingPlan {
 }
 
 impl Verdict {
-    /// The word by which traces and tables name it.
+    /// Returns the name used in traces and tables.
     pub fn name(&self) -> &'static str {
         match self {
             Self::GoalReached => "goal-reached",
@@ -256,7 +256,7 @@ impl Verdict {
 /// The report on a finished run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// How it ended.
+    /// The outcome.
     pub verdict: Verdict,
     /// The time, by the world's clock.
     pub time: Rational,
@@ -264,8 +264,9 @@ pub struct Report {
     pub replans: usize,
     /// The reason.
     pub reasons: Vec<Reason>,
-    /// Where no plan reaches the goal any more: what can never become true again, and since when,
-    /// as far as that is known ([`Run::explaining`](super::Run::explaining)).
+    /// If no plan reaches the goal any more: the parts of the goal that can never become true
+    /// again, and since when, as far as that is known
+    /// ([`Run::explaining`](super::Run::explaining)).
     pub dead_end: Vec<Reason>,
     /// The number of actions started.
     pub starts: usize,

@@ -1,4 +1,4 @@
-//! What the starts of a plan wait for.
+//! Predecessors that the starts of a plan wait for.
 
 use std::collections::BTreeMap;
 
@@ -10,16 +10,16 @@ use crate::executor::{Mission, StepId};
 /// The start of a step of a plan, or, where that is true, its end.
 pub(super) type Moment = (StepId, bool);
 
-/// What a start of the present plan waits for.
+/// A predecessor that a start of the present plan waits for.
 #[derive(Clone, Debug)]
 pub(super) struct Wait {
     pub(super) moment: Moment,
-    /// How long after that it comes at the soonest.
+    /// Minimum distance of the start after it.
     pub(super) least: Rational,
 }
 
-/// What the starts of a plan wait for: starts and ends that its network has before them. Times by the
-/// clock are not among these.
+/// Returns the predecessors that each start of a plan waits for, by the plan's network: starts and
+/// ends, without fixed times.
 pub(super) fn waits_of(mission: &Mission) -> BTreeMap<StepId, Vec<Wait>> {
     let plan = &mission.plan.plan;
     let moment = |node: NodeId| match plan.nodes[node.index()] {

@@ -1,5 +1,5 @@
-//! What every executor in the registry owes: to a world that keeps its word, and to one that does
-//! not. Nothing but this crate and a plan is needed for that.
+//! Requirements on all executors in the registry, with worlds that satisfy their contract and
+//! worlds that violate it. The tests need only this crate and a plan.
 
 mod scene;
 
@@ -14,7 +14,7 @@ use elbowroom_execution::{
 use elbowroom_num::Rational;
 use scene::{Scene, Toy, Whims};
 
-/// Keeps each entry as a text; of a plan, that it was taken up.
+/// Recorder that keeps each entry as text; of a plan, only its adoption.
 #[derive(Clone, Default)]
 struct Notes(Arc<Mutex<Vec<String>>>);
 
@@ -36,7 +36,7 @@ impl Notes {
     }
 }
 
-/// What was started and neither ended nor was cancelled.
+/// Started actions that have neither ended nor been cancelled.
 #[derive(Default)]
 struct Books {
     open: BTreeSet<Ticket>,

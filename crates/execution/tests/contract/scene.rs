@@ -36,7 +36,7 @@ const PLAN: &str = "0: (boil) [10]\n0: (chop) [4]\n10.001: (cook) [8]";
 pub(crate) struct Scene {
     task: Arc<Task>,
     plan: TimeTriggeredPlan,
-    /// What executors tell each other about orders, if they do.
+    /// Orders shared between executors, if any.
     pub(crate) orders: Option<Orders>,
 }
 
@@ -79,8 +79,8 @@ impl Scene {
     }
 }
 
-/// Makes plans ready without a solver: each duration may take up to twice as long as planned, which
-/// in this plan, without deadlines, is right.
+/// Prepares plans without a solver: each duration may be up to twice as long as planned. For this
+/// plan, which has no deadlines, that is correct.
 struct ByHand;
 
 impl Preparer for ByHand {
@@ -125,7 +125,7 @@ impl Region for Everywhere {
     }
 }
 
-/// How a world deviates.
+/// Deviations of a world.
 #[derive(Clone, Copy)]
 pub(crate) enum Whims {
     /// Not at all.
@@ -134,7 +134,7 @@ pub(crate) enum Whims {
     Seeded(u64),
 }
 
-/// A world in which actions take as long as they are told to, but for its whims.
+/// World in which actions take the commanded durations, apart from its deviations.
 pub(crate) struct Toy {
     now: Rational,
     coming: Vec<Observation>,
@@ -156,7 +156,7 @@ impl Toy {
         }
     }
 
-    /// Whether something happens that does so once in `times`; xorshift.
+    /// Returns `true` once in `times` calls on average; xorshift.
     fn one_in(&mut self, times: u64) -> bool {
         if matches!(self.whims, Whims::None) {
             return false;

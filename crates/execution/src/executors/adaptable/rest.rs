@@ -23,18 +23,19 @@ use crate::progression::Progression;
 use crate::reason::{About, Behind, Cause, Reason};
 use crate::separation::Separation;
 
-/// A search looks at so many happenings at most, sequences times the plan's length; then the best
-/// order so far is taken. Plans of some twenty happenings are searched to the end.
+/// Work limit of a search, in happenings: the number of sequences times the plan's length. When it
+/// is reached, the best order so far is used. Plans of about twenty happenings are searched
+/// completely.
 const MOST_HAPPENINGS: usize = 200_000;
 
-/// An action is given up when it has failed so often in a row that this is how likely that was.
+/// An action is abandoned when the probability of its failures in a row falls below this value.
 const TOO_UNLIKELY: f64 = 1e-6;
 
 /// However unlikely it is to start, it is not tried more often than this in a row: where starts
 /// take no time, neither does trying again.
 const MOST_FAILURES: i32 = 1000;
 
-/// So often in a row a failure is put down to a condition that does not hold.
+/// Number of failures in a row that are attributed to an unmet condition.
 const MOST_EXPLAINED: i32 = 3;
 
 /// An action that succeeds more often than this at one time, by the same order, does not lead on.
@@ -47,7 +48,7 @@ const MOST_RECONSIDERED: u32 = 3;
 /// An action that succeeds more often than this in the same state does not lead on, and the plan is abandoned.
 const MOST_REPEATED: u32 = 20;
 
-/// So often an action is stopped before its end for good reasons.
+/// Number of times that an action may be cancelled in favour of a likelier order.
 const MOST_LET_GO: u32 = 3;
 
 /// A plan, and how it stands.
@@ -57,7 +58,8 @@ pub(super) struct Rest {
     /// The plan's steps in the order of the model's instances.
     steps: Arc<[Step]>,
     chooser: Chooser,
-    /// Instances that were told to start and have not ended, with their starts on the plan's clock.
+    /// Instances that were commanded to start and have not ended, with their starts on the plan's
+    /// clock.
     under_way: BTreeMap<StepId, (InstanceId, Option<Rational>)>,
     /// The timed initials, on the plan's clock.
     timed: Vec<(NodeId, Rational)>,
@@ -68,7 +70,7 @@ pub(super) struct Rest {
     recent: Vec<(NodeId, Rational)>,
     /// The happenings that starts and planned ends are separated from, with changes by the world.
     separation: Separation,
-    /// How often each instance has failed in a row.
+    /// Number of failures in a row, by instance.
     failures: BTreeMap<InstanceId, i32>,
     /// The time of each instance's latest success, and the number of its successes at that time.
     successes: BTreeMap<InstanceId, (Rational, u32)>,
@@ -81,17 +83,17 @@ pub(super) struct Rest {
     is_ahead: bool,
     /// `true` if the table of a small world has led to the same state repeatedly.
     is_table_circling: bool,
-    /// Steps that were told to stop and have not.
+    /// Steps that were cancelled and have not ended.
     let_go: BTreeSet<StepId>,
-    /// How often each instance was told to stop.
+    /// Number of cancellations, by instance.
     times_let_go: BTreeMap<InstanceId, u32>,
     /// The number of the next order.
     next_step: u32,
 }
 
 impl Rest {
-    /// A plan that has just been taken up: `steps` are the actions in the order of the model's
-    /// instances.
+    /// Creates the state of a plan that is being adopted. `steps` are the actions in the order of
+    /// the model's instances.
     pub(super) fn new(
         mission: &Mission,
         chooser: Chooser,
@@ -119,7 +121,7 @@ impl Rest {
         let mut separation =
             Separation::new(&mission.task, &mission.origin).with_failures(Arc::clone(likelihoods));
         for (step, (instance, _)) in &under_way {
-            // The steps of running actions are what is left of them.
+            // The steps of running actions are only their remainders.
             let rest = &steps[instance.index()];
             let end = rest.duration.clone().unwrap_or_default();
             separation.expect(step.0, (&mission.task, &rest.action), end);
@@ -151,7 +153,8 @@ impl Rest {
         self.is_table_circling
     }
 
-    /// The window of a step under way; when the others happen is decided then.
+    /// Returns the window of the end of a running step. All other times are decided at the last
+    /// moment.
     pub(super) fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
         let (instance, start) = self.under_way.get(&step)?;
         let start = start.as_ref().filter(|_| is_end)?;
@@ -395,8 +398,8 @@ impl Rest {
             },
             Ok(Choice::Next(next)) => self.carry_on(&next, moment, &now, (&state, &running)),
             Ok(Choice::Replan) if self.awaits_ends(&now) => {
-                // What is under way is ended before a plan is given up: a robot that is let go
-                // between two places is at neither. And it may change what can be done.
+                // Running actions are awaited before the plan is abandoned: a robot whose move is
+                // cancelled is at neither place, and an end may make another order possible.
                 let until = self.first_overdue().map(|time| self.world(&time));
                 wait(until, About::EndOfRunning)
             }
@@ -453,13 +456,13 @@ impl Rest {
         }
     }
 
-    /// Whether something is under way, and nothing overdue.
+    /// Returns `true` if an action is running and none is overdue.
     fn awaits_ends(&self, now: &Rational) -> bool {
         let is_overdue = self.first_overdue().is_some_and(|time| time <= *now);
         !self.under_way.is_empty() && !is_overdue
     }
 
-    /// The time at which the first of the actions under way is later than it can be.
+    /// Returns the time at which the first running action becomes overdue.
     fn first_overdue(&self) -> Option<Rational> {
         let plan = self.chooser.search().model().plan();
         let ends = self.under_way.values().filter_map(|(instance, start)| {
@@ -485,8 +488,8 @@ impl Rest {
         let world = |time: &Rational| time + &origin;
         let starting = self.starting(next);
         let Some(first) = starting.first() else {
-            // An end, or timed initials: it comes when it comes. When it is too late for the order,
-            // another one is looked for.
+            // The next happening is an end or a timed initial, so the executor waits for it. If it
+            // is too late for the order, another order is searched for.
             let late = next
                 .slot
                 .latest
@@ -561,8 +564,8 @@ impl Rest {
     }
 }
 
-/// Why an action is given up that has failed so often in a row: it is tried again as long as its
-/// likelihoods explain that.
+/// Returns the reason to abandon the plan if an action has failed too often in a row. An action is
+/// retried as long as its likelihoods explain the failures.
 fn failed(
     step: &Step,
     failures: i32,
@@ -586,7 +589,7 @@ fn failed(
     Some(Reason::new(Cause::Failed).of(&action.name).about(about))
 }
 
-/// Whether what an action needs is known not to hold: no wonder that it has failed.
+/// Returns `true` if a condition of the action is known not to hold, which explains its failure.
 fn lacks_something(step: &Step, has_started: bool, belief: &Progression) -> bool {
     let needs = match &step.action.body {
         Body::Instantaneous(snap) => vec![&snap.condition],

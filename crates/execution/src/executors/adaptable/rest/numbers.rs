@@ -23,7 +23,8 @@ pub(super) struct Lack {
 }
 
 impl Rest {
-    /// Returns what is lacking if this happening is a start that is due; `None` if it can start as far as numbers go.
+    /// Returns the unmet conditions if this happening is a start that is due; `None` if the numbers
+    /// allow the start.
     pub(super) fn lack(
         &self,
         next: &NextHappening,
@@ -47,7 +48,8 @@ impl Rest {
         })
     }
 
-    /// Returns `true` if another order is to be searched for: no waiting changes what is lacking.
+    /// Returns `true` if the conditions will not become true by waiting, so that another order is
+    /// needed.
     pub(super) fn is_lacking_for_good(
         &self,
         next: &NextHappening,
@@ -58,7 +60,8 @@ impl Rest {
         lack.is_some_and(|lack| !lack.is_moving)
     }
 
-    /// Waits for numbers that change with time, or for what is running; if nothing is, the plan is abandoned.
+    /// Waits for numbers that change with time, or for the end of a running action. If no action is
+    /// running, the plan is abandoned.
     pub(super) fn await_numbers(
         &mut self,
         lack: &Lack,
