@@ -13,9 +13,9 @@ use rand_distr::{Distribution as _, Exp1, Gamma, LogNormal, Normal, Triangular};
 pub enum Purpose {
     /// The duration of an action.
     Duration = 1,
-    /// How long after the command an action starts.
+    /// The delay between the command and the start of an action.
     Delay = 2,
-    /// Whether an action fails.
+    /// The failure of an action.
     Failure = 3,
     /// When something happens by itself.
     Exogenous = 4,
@@ -23,13 +23,13 @@ pub enum Purpose {
     Report = 5,
     /// By how much an action changes a fluent; the fluent is part of the instance.
     Amount = 6,
-    /// Whether effects of actions take place.
+    /// The effects of an action.
     Effect = 7,
     /// A change by itself from one step to the next.
     Change = 8,
     /// When a fact changes by itself that does so at a rate.
     Hazard = 9,
-    /// What a failure leaves behind.
+    /// The outcome of a failure.
     Outcome = 10,
 }
 
@@ -92,7 +92,7 @@ pub enum Distribution {
     Exponential {
         /// The least value.
         from: f64,
-        /// The mean of what is added.
+        /// The mean of the part above `from`.
         mean: f64,
     },
     /// `from`, and what a gamma distribution adds.
@@ -186,7 +186,7 @@ pub fn rounded(value: f64, resolution: &Rational) -> Rational {
     {
         return exact;
     }
-    // Only what is no number at all is left to be bounded.
+    // After this, only NaN is not bounded.
     let bounded = steps.clamp(-MOST_STEPS, MOST_STEPS);
     #[allow(clippy::cast_possible_truncation, reason = "just bounded, and whole")]
     let steps = bounded as i64;

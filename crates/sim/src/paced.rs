@@ -1,4 +1,4 @@
-//! Worlds in which somebody else decides how long actions take, as they go.
+//! Worlds whose action durations are decided from outside, during execution.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,15 +9,16 @@ use elbowroom_num::Rational;
 
 use crate::sim::SimWorld;
 
-/// Decides when actions end that are under way.
+/// Decides when running actions end.
 pub trait Pace: Send {
     /// An action has started.
     fn begun(&mut self, now: &Rational, begun: &Begun<'_>);
 
-    /// An action has ended, whether it was told to or has failed or been cancelled.
+    /// Called when an action has ended: because of [`ends_now`](Self::ends_now), by a failure, or
+    /// by a cancellation.
     fn over(&mut self, now: &Rational, ticket: Ticket);
 
-    /// Which actions end now. It is asked each time that something has happened, and at each
+    /// Returns the actions that end now. Called after each event, and at each
     /// [look](Self::next_look).
     fn ends_now(&mut self, now: &Rational) -> Vec<Ticket>;
 
@@ -28,15 +29,16 @@ pub trait Pace: Send {
 /// An action that has started.
 #[derive(Clone, Copy, Debug)]
 pub struct Begun<'a> {
-    /// Which start it is.
+    /// The ticket of the start.
     pub ticket: Ticket,
     /// The action.
     pub action: &'a Action,
-    /// How many of that name had been told to start before.
+    /// Number of earlier commands to start an action of that name.
     pub occurrence: u64,
     /// The planned duration; `None` if it takes no time.
     pub planned: Option<&'a Rational>,
-    /// Whether it ends when the [`Pace`] says; if not, it takes no time or is going to fail.
+    /// `true` if it ends when the [`Pace`] says; if `false`, it is instantaneous or is going to
+    /// fail.
     pub is_open: bool,
 }
 
@@ -48,8 +50,7 @@ pub struct Paced<'a, P> {
     world: SimWorld<'a>,
     pace: P,
     now: Rational,
-    /// The actions that were told to start and have not, with their number among those of the same
-    /// name.
+    /// Commanded actions that have not started, with their number among those of the same name.
     ordered: BTreeMap<Ticket, Ordered>,
     occurrences: BTreeMap<String, u64>,
 }
@@ -83,7 +84,7 @@ impl<'a, P: Pace> Paced<'a, P> {
         &self.pace
     }
 
-    /// An action that was told to start has started.
+    /// Notifies the pace that a commanded action has started.
     fn begin(&mut self, ticket: Ticket, time: &Rational, is_open: bool) {
         if let Some(ordered) = self.ordered.remove(&ticket) {
             let begun = Begun {
@@ -168,7 +169,7 @@ impl<P: Pace> World for Paced<'_, P> {
 pub struct Durations {
     /// For each action's name, how long it takes the first time, the second time, …
     durations: BTreeMap<String, Vec<Rational>>,
-    /// The time at which each action under way ends.
+    /// The end of each running action.
     ends: BTreeMap<Ticket, Rational>,
 }
 

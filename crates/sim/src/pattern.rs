@@ -1,10 +1,10 @@
-//! Which actions, or which fluents, a rule is about.
+//! Patterns for the actions, fluents and facts to which a rule applies.
 
 use std::fmt;
 
 use elbowroom_model::Problem;
 
-/// `*`, a name, or `(name object _ …)`, where `_` stands for any object.
+/// `*`, a name, or `(name object _ …)`; `_` matches any object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ActionPattern {
     /// `None`: any.
@@ -37,7 +37,7 @@ pub(crate) enum Names {
 }
 
 impl ActionPattern {
-    /// Reads a pattern, and checks that what it names is there.
+    /// Reads a pattern, and checks that its names exist.
     pub(crate) fn read(text: &str, names: Names, problem: &Problem) -> Result<Self, String> {
         let text = text.trim();
         if text == "*" {
@@ -85,13 +85,13 @@ impl ActionPattern {
         self.name.as_deref()
     }
 
-    /// Whether something of that name may be meant, whatever its objects.
+    /// Returns `true` if the pattern may match something of that name, for some objects.
     pub(crate) fn may_match(&self, name: &str) -> bool {
         let mine = self.name.as_deref();
         mine.is_none_or(|mine| mine.eq_ignore_ascii_case(name))
     }
 
-    /// Whether a ground name, `(name object …)`, is meant.
+    /// Returns `true` if the pattern matches a ground name, `(name object …)`.
     pub fn matches(&self, ground: &str) -> bool {
         let Some(name) = &self.name else {
             return true;

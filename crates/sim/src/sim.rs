@@ -20,29 +20,30 @@ use crate::model::{ExogenousChange, Failure, Outcome, WorldModel};
 pub use amid::Seen;
 use hazards::Chance;
 
-/// A simulated world: true state, and what is going to happen.
+/// A simulated world: the true state, and the coming events.
 ///
-/// It is PDDL that happens, as the judge sees it: all that happens at one time is a group, whose
-/// conditions and amounts are read in the state on arrival. What is started at a moment belongs to
-/// its group, as long as the world has not been told to go on.
+/// It follows the semantics of PDDL, as the validator does. All happenings at one time form a
+/// group, whose conditions and amounts are read in the state on arrival. An action that is started
+/// at a moment belongs to its group until the world is asked to wait.
 ///
-/// An action whose start condition does not hold does not start; one whose end condition does not
-/// hold fails when it would have ended; one whose over-all condition does not hold at some moment
-/// strictly between start and end, fails at once, or, where numbers move, at the next multiple of
-/// the world's resolution, unless something happens before that.
+/// An action whose start condition does not hold does not start. An action whose end condition does
+/// not hold fails when it would have ended. An action whose over-all condition does not hold at
+/// some moment strictly between start and end fails at once. If the condition fails because numbers
+/// change continuously, the action fails at the next multiple of the world's resolution, unless an
+/// event comes before that.
 #[derive(Debug)]
 pub struct SimWorld<'a> {
     model: &'a WorldModel,
     seed: u64,
     truth: Progression,
     now: Rational,
-    /// The coming happenings, by time, and then in the order in which they were decided.
+    /// The coming happenings, by time and then in the order of their insertion.
     agenda: BTreeMap<(Rational, u64), Coming>,
     /// The number of things put on the agenda.
     decided: u64,
     /// The happenings that have not been reported.
     untold: Vec<Observation>,
-    /// How often each action was started.
+    /// Number of starts, by action.
     occurrences: BTreeMap<String, u64>,
     /// The actions that were started, until they have ended.
     actions: BTreeMap<Ticket, Commanded<'a>>,
@@ -56,9 +57,9 @@ struct Commanded<'a> {
     planned: Option<Rational>,
     occurrence: u64,
     has_started: bool,
-    /// What its failure leaves behind, if it is one that leaves something.
+    /// The outcome of its failure, if it has one.
     outcome: Option<&'a Outcome>,
-    /// Whether it can only fail any more, and holds things up until it does.
+    /// `true` if it can only fail any more, and delays the failure.
     is_broken: bool,
 }
 
@@ -126,7 +127,7 @@ impl<'a> SimWorld<'a> {
         });
     }
 
-    /// Time passes until `until`, or until something is told, if that `is_enough`.
+    /// Lets time pass until `until`, or until something is reported, if that `is_enough`.
     fn proceed(&mut self, until: &Rational, is_enough: bool) {
         loop {
             self.happen_now();
@@ -142,7 +143,7 @@ impl<'a> SimWorld<'a> {
                 return;
             }
             let coming = self.agenda.keys().next().map(|(time, _)| time);
-            // Timed initials can break what is under way.
+            // Timed initials can make running actions fail.
             let next = coming.into_iter().chain(self.truth.next_timed());
             let next = next.chain([until]).min().unwrap_or(until).clone();
             let broken = self.truth.next_break(&next, &self.model.resolution);

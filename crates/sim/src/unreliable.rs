@@ -16,8 +16,8 @@ use crate::draw::{Purpose, keyed};
 use crate::model::{Reports, WorldModel};
 use crate::sim::{Seen, SimWorld};
 
-/// Loses, repeats, delays and contradicts the reports of another world. What is looked at on
-/// purpose ([`World::look`]) is seen as it is.
+/// Decorator that loses, repeats, delays and contradicts the reports of another world. Answers to
+/// [`World::look`] are not changed.
 #[derive(Debug)]
 pub struct Unreliable<W> {
     inner: W,
@@ -43,8 +43,8 @@ impl WorldModel {
 }
 
 impl WorldModel {
-    /// One way in which the world may go on from what is believed: [`SimWorld::amid`], which
-    /// reports as well or badly as the model says.
+    /// Creates a sample of the world that continues from a belief: [`SimWorld::amid`], with the
+    /// model's reliability of reports.
     pub fn world_amid(&self, belief: &Progression, seed: u64, past: &Seen) -> Box<dyn World + '_> {
         let sim = SimWorld::amid(belief, self, seed, past);
         if self.reports.is_perfect() {

@@ -21,7 +21,7 @@ fn task() -> Arc<Task> {
     Arc::new(Task::new(problem))
 }
 
-/// All changes that a world tells of until then: when, which fact, and what it became.
+/// Returns all changes that a world reports until then: time, fact, and new truth.
 fn changes(task: &Arc<Task>, hazards: &str, seed: u64, until: i64) -> Vec<(f64, String, bool)> {
     let text = format!("format = \"elbowroom-world\"\nversion = 1\n{hazards}");
     let model = WorldModel::read(text.as_str(), task.problem()).expect("a correct world");

@@ -1,4 +1,4 @@
-//! World files: what they may say, and where their mistakes are.
+//! World files: valid contents, and the positions of mistakes.
 
 use elbowroom_model::Problem;
 use elbowroom_pddl::{Source, read_problem};
@@ -122,7 +122,7 @@ fn every_mistake_has_its_line_and_says_what_to_do() {
     }
 }
 
-/// What a section has and cannot use was once ignored: each line is the one that says too much.
+/// Regression: superfluous keys were once ignored. Each line is the one with the superfluous key.
 #[test]
 fn nothing_in_a_file_is_ignored() {
     let cases = [

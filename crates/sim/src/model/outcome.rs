@@ -1,34 +1,34 @@
-//! What a failure leaves behind, and how long it holds things up.
+//! Outcomes of failures: changes, and a delay of the failure.
 
 use elbowroom_num::Rational;
 use rand::Rng;
 
 use super::Failing;
 
-/// One of the ways in which things may stand when an action has failed.
+/// A possible outcome of a failure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// How likely it is, given that the action fails.
+    /// The probability of the outcome, given that the action fails.
     pub probability: f64,
-    /// What changes, in this order, when the action is told to have failed.
+    /// The changes, in this order, at the time at which the failure is reported.
     pub changes: Vec<OutcomeChange>,
-    /// For how many seconds more the action is under way: it fails that much later, and until then
-    /// nobody can start it again or cancel it.
+    /// The delay of the failure, in seconds. The action is running until then, and can neither be
+    /// started again nor be cancelled.
     pub delay: Rational,
-    /// Whether the world reports the changes.
+    /// `true` if the world reports the changes.
     pub is_reported: bool,
 }
 
 /// A fact or a fluent that a failure changes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutcomeChange {
-    /// Which one.
+    /// The fact or fluent.
     pub what: Template,
-    /// What becomes of it.
+    /// Its change.
     pub becomes: Becoming,
 }
 
-/// What becomes of a fact or a fluent.
+/// A change of a fact or a fluent.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Becoming {
     /// The fact becomes true or false.
@@ -54,8 +54,8 @@ pub(super) enum Word {
 }
 
 impl Template {
-    /// What is meant when the action is `(name object …)`: `(predicate object …)`, or
-    /// `(function object …)`.
+    /// Returns the ground name, `(predicate object …)` or `(function object …)`, for the action
+    /// `(name object …)`.
     pub fn of(&self, action: &str) -> String {
         let action: Vec<&str> = action
             .trim_matches(['(', ')'])
@@ -76,7 +76,7 @@ impl Template {
 }
 
 impl Failing {
-    /// Which of its outcomes a failure has; `None`: none of them.
+    /// Draws the outcome of a failure; `None` if none of them applies.
     pub fn outcome(&self, rng: &mut impl Rng) -> Option<&Outcome> {
         let mut left = rng.random::<f64>();
         self.outcomes.iter().find(|outcome| {

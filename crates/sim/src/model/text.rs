@@ -21,7 +21,7 @@ type Found = (Span, Distribution, Limit, Limit);
 /// A minimum or a maximum, where it stands.
 type Limit = Option<(Span, f64)>;
 
-/// The text, and what its names stand for.
+/// The text, and the problem that defines its names.
 struct Reader<'a> {
     source: &'a Source,
     problem: &'a Problem,

@@ -1,4 +1,4 @@
-//! Failures that nothing but chance explains, and what they leave behind.
+//! Failures by chance, and their outcomes.
 
 use std::sync::Arc;
 

@@ -9,9 +9,9 @@ use rand_distr::Exp1;
 use super::{Coming, SimWorld};
 use crate::draw::{Purpose, keyed, rounded};
 
-/// The moments at which a fact changes unless it already is so: a Poisson process. Cut down to
-/// those moments at which the fact has the other value, it has no memory either, and it does not
-/// depend on what anybody does.
+/// The moments at which a fact changes unless it already has that value: a Poisson process.
+/// Restricted to the moments at which the fact has the other value, it is memoryless as well, and
+/// independent of the executor's actions.
 #[derive(Clone, Debug)]
 pub(super) struct Chance {
     fact: FactId,

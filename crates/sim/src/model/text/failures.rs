@@ -1,4 +1,4 @@
-//! Failures of actions, and what they leave behind.
+//! Failures of actions, and their outcomes.
 
 use elbowroom_model::problem::{Schema, TypeId, Variable};
 use elbowroom_num::Rational;
@@ -10,7 +10,7 @@ use crate::model::outcome::Word;
 use crate::model::{Becoming, Failing, Failure, Outcome, OutcomeChange, Template};
 use crate::pattern::{ActionPattern, Names};
 
-/// How a number changes a fluent.
+/// Operation of a number on a fluent.
 #[derive(Clone, Copy)]
 enum How {
     Assign,

@@ -1,4 +1,4 @@
-//! World files as they stand, and what may stand where.
+//! Structure of world files, and the keys that each section permits.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -61,7 +61,7 @@ pub(super) struct Section {
 /// Names of facts or fluents where they stand, and numbers.
 pub(super) type Numbers = BTreeMap<Spanned<String>, Spanned<f64>>;
 
-/// What a failure may leave behind.
+/// An outcome of a failure.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct OutcomeSection {
@@ -101,7 +101,7 @@ const DISTRIBUTION: &[&str] = &[
 ];
 
 impl Section {
-    /// Everything that stands in it, and where.
+    /// Returns all keys that are present, with their positions.
     fn given(&self) -> Vec<(&'static str, Range<usize>)> {
         fn at<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
@@ -162,13 +162,13 @@ impl Section {
         Some((span, message))
     }
 
-    /// Whether it says how something is distributed.
+    /// Returns `true` if it contains a distribution.
     pub(super) fn is_distributed(&self) -> bool {
         let mut given = self.given().into_iter();
         given.any(|(key, _)| DISTRIBUTION.contains(&key))
     }
 
-    /// Where its distribution stands.
+    /// Returns the position of its distribution.
     pub(super) fn place(&self) -> Option<Range<usize>> {
         let is_limit = |key: &str| key == "minimum" || key == "maximum";
         let mut given = self.given().into_iter();
