@@ -50,7 +50,7 @@ pub(crate) enum Sight {
 /// For each part of the network, the position of the plan's constraint that it comes from.
 #[derive(Clone, Debug)]
 struct Sources {
-    /// For each constraint of the network; `None` if it comes from none.
+    /// For each constraint of the network; `None` if it comes from no constraint of the plan.
     requirements: Vec<Option<usize>>,
     /// For each contingent link.
     links: Vec<usize>,
@@ -65,7 +65,8 @@ impl Sources {
     }
 }
 
-/// No executor could keep to the plan's network.
+/// Returns the reason for rejecting a plan whose network is not controllable: the conflicting
+/// constraints.
 fn contradiction(mission: &Mission, sources: &Sources, behind: &[NetworkLimit]) -> Reason {
     let mut reason = Reason::new(Cause::Late).about(About::NoTimes);
     let indices = behind.iter().filter_map(|behind| sources.of(*behind));
@@ -76,7 +77,7 @@ fn contradiction(mission: &Mission, sources: &Sources, behind: &[NetworkLimit]) 
     reason
 }
 
-/// A plan being dispatched.
+/// State of the dispatch of a plan.
 #[derive(Clone, Debug)]
 pub(crate) struct Dispatch {
     task: Arc<Task>,
@@ -89,9 +90,9 @@ pub(crate) struct Dispatch {
     epsilon: Rational,
     horizon: Horizon,
     sources: Sources,
-    /// For each instance its start and end; twice the same if it is instantaneous.
+    /// Start and end node of each instance; the same node twice if it is instantaneous.
     ends: Vec<[NodeId; 2]>,
-    /// For each instance, the bounds on its duration.
+    /// Bounds on the duration of each instance.
     durations: Vec<Bounds>,
     progress: Progress,
     /// See [`watch::numbers_of_durations`].
@@ -99,11 +100,11 @@ pub(crate) struct Dispatch {
     /// The times, on the plan's clock, at which instances were commanded whose start has not been
     /// observed.
     told: BTreeMap<InstanceId, Rational>,
-    /// Timed initials that have not happened, the last one first, with their times.
+    /// Coming timed initials with their times, the last one first.
     timed: Vec<(Rational, NodeId)>,
     /// Instances that were running before the plan began. The plan contains only their remainder.
     resumed: BTreeSet<InstanceId>,
-    /// Starts that have failed and are to be tried again.
+    /// Failed starts that are to be retried.
     retries: BTreeMap<NodeId, Retry>,
     /// Violations of the network's bounds since the network was last known to be executable.
     strain: Strain,
@@ -112,11 +113,11 @@ pub(crate) struct Dispatch {
 }
 
 impl Dispatch {
-    /// Takes up a plan. `bounds` says what a constraint of the plan is taken for; all windows are
-    /// taken for the executor's to choose from.
+    /// Creates the dispatch of a plan. `bounds` returns the bounds of each constraint. The executor
+    /// is assumed to choose all times.
     ///
     /// # Errors
-    /// When no times satisfy these.
+    /// If no times satisfy the bounds.
     pub(crate) fn new(
         mission: &Mission,
         sight: Sight,
@@ -258,9 +259,9 @@ impl Dispatch {
         })
     }
 
-    /// The latest time at which a running action can end so that there are times for all the rest, on the world's clock.
-    /// Each contingent link takes any time within its reading. `None` if there is no limit, or if there are no such
-    /// times. Takes time in proportion to the plan.
+    /// Returns the latest end of a running action with which the remaining plan has a schedule, on
+    /// the world's clock. Contingent links may take any time within their reading. `None` if there
+    /// is no limit, or no schedule. Takes time in proportion to the plan.
     pub(crate) fn latest_end(
         &self,
         id: InstanceId,
@@ -270,7 +271,7 @@ impl Dispatch {
         self.latest_end_in(&self.possible_times(now, reading)?, id)
     }
 
-    /// The same in a network that [`Dispatch::possible_times`] returned.
+    /// Returns the same for a network from [`Dispatch::possible_times`].
     pub(crate) fn latest_end_in(
         &self,
         network: &ConsistentNetwork,
@@ -282,8 +283,8 @@ impl Dispatch {
         Some(self.world(&latest))
     }
 
-    /// The possible times of the rest of the plan, where each contingent link takes any time within its reading; `None`
-    /// if there are none.
+    /// Returns the schedules of the remaining plan as a consistent network; `None` if there are
+    /// none. Contingent links may take any time within their reading.
     pub(crate) fn possible_times(
         &self,
         now: &Rational,
@@ -350,7 +351,7 @@ impl Dispatch {
     /// Marks time 0 and the starts of the running actions as executed.
     fn begin(&mut self, running: &BTreeMap<StepId, crate::event::Ticket>) {
         if let Horizon::Dispatchable(_) = self.horizon {
-            // To the others the origin has always happened.
+            // In other horizons, the origin is always executed.
             let _ = self
                 .horizon
                 .fix(network_node(NodeId::ZERO), &Rational::ZERO);
@@ -360,7 +361,7 @@ impl Dispatch {
         for step in running.keys() {
             let id = step.instance();
             let start = self.ends[id.index()][0];
-            // The rest of a running action begins with the plan itself.
+            // The plan contains the remainder of a running action, which begins with the plan.
             let _ = self.horizon.fix(network_node(start), &Rational::ZERO);
             self.progress.happen(&self.plan, start, &Rational::ZERO);
             self.progress.ready.remove(&start);
@@ -368,7 +369,7 @@ impl Dispatch {
         }
     }
 
-    /// It is `now`, by the plan's clock: timed initials have happened by then, as the problem says.
+    /// Executes the timed initials up to `now`, on the plan's clock.
     fn pass_time(&mut self, now: &Rational) {
         while let Some((time, node)) = self.timed.pop_if(|(time, _)| *time <= *now) {
             if let Horizon::Dispatchable(_) = self.horizon {
@@ -377,28 +378,28 @@ impl Dispatch {
         }
     }
 
-    /// The plan.
+    /// Returns the plan.
     pub(crate) fn plan(&self) -> &StnPlan {
         &self.plan
     }
 
-    /// The action of an instance.
+    /// Returns the action of an instance.
     pub(crate) fn action(&self, id: InstanceId) -> &Arc<Action> {
         &self.actions[id.index()]
     }
 
-    /// The planned duration of an instance.
+    /// Returns the planned duration of an instance.
     pub(crate) fn nominal_duration(&self, id: InstanceId) -> Rational {
         let [start, end] = self.ends[id.index()];
         &self.nominal[end] - &self.nominal[start]
     }
 
-    /// Start and end of an instance.
+    /// Returns the start and the end node of an instance.
     pub(crate) fn nodes_of(&self, id: InstanceId) -> [NodeId; 2] {
         self.ends[id.index()]
     }
 
-    /// The ground of the plan's own bounds on an instance's duration.
+    /// Returns the name of the plan's own bounds on an instance's duration, for reasons.
     fn duration_of(&self, id: InstanceId) -> About {
         if self.resumed.contains(&id) {
             About::RestOfDuration
@@ -407,7 +408,7 @@ impl Dispatch {
         }
     }
 
-    /// The time at which a node happened, on the plan's clock.
+    /// Returns the time at which a node was executed, on the plan's clock.
     pub(crate) fn happened(&self, node: NodeId) -> Option<&Rational> {
         self.progress.happened[node.index()].as_ref()
     }
@@ -417,29 +418,29 @@ impl Dispatch {
         &self.progress.running
     }
 
-    /// The time at which a node happens if nothing deviates, on the plan's clock.
+    /// Returns the time at which a node happens if nothing deviates, on the plan's clock.
     pub(crate) fn nominal_time(&self, node: NodeId) -> &Rational {
         &self.nominal[node]
     }
 
-    /// The window of a node, by the world's clock.
+    /// Returns the window of a node, on the world's clock.
     pub(crate) fn window_of(&self, node: NodeId) -> Bounds {
         let (earliest, latest) = self.horizon.window(network_node(node));
         let world = |time: Rational| self.world(&time);
         (earliest.map(world), latest.map(world))
     }
 
-    /// The time by the plan's clock.
+    /// Converts a time from the world's clock to the plan's clock.
     pub(crate) fn local(&self, time: &Rational) -> Rational {
         time - &self.origin
     }
 
-    /// The time by the world's clock.
+    /// Converts a time from the plan's clock to the world's clock.
     pub(crate) fn world(&self, time: &Rational) -> Rational {
         time + &self.origin
     }
 
-    /// The window of a step's start or end, by the world's clock.
+    /// Returns the window of a step's start or end, on the world's clock.
     pub(crate) fn planned(&self, step: StepId, is_end: bool) -> Option<Planned> {
         let node = self.ends.get(step.instance().index())?[usize::from(is_end)];
         let (earliest, latest) = self.window_of(node);
@@ -447,7 +448,7 @@ impl Dispatch {
     }
 }
 
-/// For each instance, the bounds on its duration.
+/// Returns the bounds on the duration of each instance.
 fn durations(plan: &StnPlan, bounds: &dyn Fn(&Constraint) -> Bounds) -> Vec<Bounds> {
     let mut durations = vec![(None, None); plan.instances.len()];
     for constraint in &plan.constraints {
@@ -467,7 +468,7 @@ fn bounds_of(reading: Reading) -> Bounds {
     }
 }
 
-/// The intersection of both.
+/// Returns the intersection of both.
 fn both(one: Bounds, other: Bounds) -> Bounds {
     let lower = one.0.into_iter().chain(other.0).max();
     (lower, one.1.into_iter().chain(other.1).min())
@@ -486,7 +487,8 @@ fn ends_of(plan: &StnPlan) -> Vec<[NodeId; 2]> {
     ends
 }
 
-/// The plan's network, and where each of its constraints comes from.
+/// Returns the network of a plan and, for each of its constraints, the position of the plan's
+/// constraint that it comes from.
 fn network(
     plan: &StnPlan,
     bounds: &dyn Fn(&Constraint) -> Bounds,
@@ -517,7 +519,7 @@ fn network(
     (network, sources)
 }
 
-/// The bounds of a constraint without parameters.
+/// Returns the bounds of a constraint without parameters.
 pub(crate) fn given(constraint: &Constraint) -> Bounds {
     let value = |bound: &Bound| match bound {
         Bound::Finite(value) => Some(value.clone()),

@@ -1,4 +1,4 @@
-//! The port through which a run asks what to do next.
+//! Port: decision making during a run.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,16 +19,14 @@ pub enum Need {
     /// The orderings that facts require. There are no open parameters, and numeric conditions are
     /// not guaranteed. This is the information of `ROSPlan`'s dispatcher.
     Orderings,
-    /// The same, and the partial order of the plan's happenings, whose layers can be executed in
-    /// more than one order.
+    /// The orderings, and the partial order of the plan's happenings, whose layers can be executed
+    /// in more than one order.
     PartialOrder,
-    /// The orderings, with as many differences of times fixed as it takes for every schedule to
-    /// work.
+    /// The orderings, with enough fixed differences of times that every schedule works.
     Network,
-    /// The same, with quantities left open, and for which values the plan is guaranteed to work if
-    /// that can be found out.
+    /// The network with open parameters, and the envelope of their values if it can be computed.
     OpenNetwork,
-    /// The same; without knowing for which values the plan is guaranteed to work it is of no use.
+    /// The network with open parameters and their envelope, which is required.
     Envelope,
 }
 
@@ -46,22 +44,22 @@ impl From<InstanceId> for StepId {
 }
 
 impl StepId {
-    /// The instance, for executors that number steps by the instances of their plan.
+    /// Returns the instance, for executors that number steps by the instances of their plan.
     pub fn instance(self) -> InstanceId {
         InstanceId(self.0)
     }
 }
 
-/// Chooses what to do next. No clock, no input or output, no randomness: the same history leads to
-/// the same decisions.
+/// Makes the decisions of a run. Implementations use no clock, no input or output and no
+/// randomness: the same history leads to the same decisions.
 pub trait Executor: Send {
-    /// The form of a plan that it requires.
+    /// Returns the form of a plan that it requires.
     fn need(&self) -> Need;
 
-    /// Takes up a plan, and forgets the one before.
+    /// Adopts a plan, and forgets the previous one.
     ///
     /// # Errors
-    /// When the plan cannot be executed (any more): why.
+    /// The reason for which the plan cannot be executed (any more).
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>>;
 
     /// Returns the next decision. The run calls this again until the decision is
@@ -74,7 +72,8 @@ pub trait Executor: Send {
         false
     }
 
-    /// Continues with that plan, without any guarantee, because no other one was found. Returns whether it does.
+    /// Continues with that plan, without any guarantee, because no other one was found. Returns
+    /// `false` if it does not.
     fn carry_on(&mut self, _now: &Rational) -> bool {
         false
     }
@@ -90,7 +89,7 @@ pub trait Executor: Send {
         false
     }
 
-    /// The window of a time point of a step at present, for the record; in the world's time.
+    /// Returns the present window of a step's start or end for the record, on the world's clock.
     fn window(&self, _step: StepId, _is_end: bool) -> Option<Planned> {
         None
     }
@@ -123,28 +122,28 @@ pub struct Planned {
     pub latest: Option<Rational>,
 }
 
-/// A plan made ready to be executed.
+/// A plan prepared for execution.
 #[derive(Clone, Debug)]
 pub struct Mission {
-    /// The rest of the task, with a clock of its own.
+    /// The remaining task, with its own clock.
     pub task: Arc<Task>,
     /// The time on the world's clock when the task's clock reads 0.
     pub origin: Rational,
     /// The present time on the world's clock; the plan cannot begin earlier.
     pub now: Rational,
-    /// The plan as the planner made it, on the task's clock.
+    /// The planner's plan, on the task's clock.
     pub time_triggered: TimeTriggeredPlan,
-    /// The plan with room, and with quantities left open.
+    /// The deordered plan, with open parameters.
     pub plan: ParametrizedPlan,
     /// For each step of `time_triggered`, its instance in `plan`.
     pub instances: Vec<InstanceId>,
     /// The time of each event if nothing deviates, on the task's clock.
     pub nominal: Schedule,
-    /// In which values of the open quantities the plan is guaranteed to work.
+    /// The values of the open parameters for which the plan is guaranteed to work.
     pub envelope: Option<DecoupledEnvelope>,
-    /// Forms of the plan's network that executors have asked for before.
+    /// Cache of the dispatchable forms of the plan's networks.
     pub forms: Forms,
-    /// The partial order of the plan's happenings, for those that need it
+    /// The partial order of the plan's happenings, for executors that need it
     /// ([`Need::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
     /// The running actions, which continue in the plan: see [`StepId`].
@@ -154,7 +153,7 @@ pub struct Mission {
     pub begun: BTreeMap<StepId, Ticket>,
 }
 
-/// A moment at which to decide.
+/// Input of a decision.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
     /// The present time, by the world's clock.
@@ -197,11 +196,11 @@ pub enum News {
         /// The action.
         action: String,
     },
-    /// Nothing has been heard of an action for longer than the run's patience.
+    /// An action has timed out.
     Silence {
         /// The action.
         action: String,
-        /// Since when it should have ended.
+        /// The time at which it should have ended.
         since: Rational,
     },
 }
@@ -216,14 +215,14 @@ impl News {
     }
 }
 
-/// An amount that was measured, and what the domain's expression for it reads.
+/// A measured amount, with the inputs of the domain's expression for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Amount {
-    /// The quantity that was measured.
+    /// The measured quantity.
     pub measured: Measured,
     /// The value of `?duration`: the action's actual duration, or, at its start, the planned one.
     pub duration: Option<Rational>,
-    /// The fluents in the expression, as they were before.
+    /// The values of the fluents in the expression before the effect.
     pub values: Vec<(FluentId, Rational)>,
 }
 
@@ -241,14 +240,14 @@ pub struct Decided {
 pub enum Decision {
     /// Start these actions now.
     Start(Vec<Order>),
-    /// Nothing before `until`, unless something is observed earlier; `None`: whenever that is.
+    /// Wait until `until`, or until the next observation if that is earlier; `None` for no limit.
     Wait {
-        /// By the world's clock.
+        /// On the world's clock.
         until: Option<Rational>,
     },
-    /// Stop these.
+    /// Cancel these steps.
     Cancel(Vec<StepId>),
-    /// Give up the plan, and make another one.
+    /// Abandon the plan, and request another one.
     Replan,
     /// The goal is reached.
     GoalReached,
@@ -257,13 +256,13 @@ pub enum Decision {
 /// An action to start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Order {
-    /// By which news refer to it.
+    /// The identifier for news.
     pub step: StepId,
     /// The action.
     pub action: Arc<Action>,
     /// The planned duration; `None` for an instantaneous action.
     pub duration: Option<Rational>,
-    /// When it may start.
+    /// The window of its start.
     pub planned: Planned,
 }
 

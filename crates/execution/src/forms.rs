@@ -1,4 +1,4 @@
-//! Dispatchable forms that have been computed before.
+//! Cache of dispatchable forms.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,7 +8,7 @@ use elbowroom_stn::uncertain::{Dispatchable, UncertainNetwork};
 
 use crate::horizon::{NetworkLimit, grounds};
 
-/// The number of networks remembered; an executor asks for one of a few.
+/// Number of networks that are kept; an executor uses a few.
 const MOST: usize = 8;
 
 /// The dispatchable form of a network, or the conflict that shows that there is none.
@@ -17,7 +17,7 @@ pub(crate) type Form = Result<Arc<Dispatchable<Rational>>, Vec<NetworkLimit>>;
 /// A network that was converted before.
 #[derive(Clone)]
 enum Known {
-    /// Its form, which has the network.
+    /// Its form, which contains the network.
     Controllable(Arc<Dispatchable<Rational>>),
     /// The network, and the conflict.
     Refused(Arc<UncertainNetwork>, Vec<NetworkLimit>),
@@ -47,7 +47,7 @@ impl Known {
 }
 
 impl Forms {
-    /// The form of a network.
+    /// Returns the form of a network.
     pub(crate) fn of(&self, network: UncertainNetwork) -> Form {
         let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let same = known()

@@ -8,7 +8,7 @@ use elbowroom_stn::{
     ConsistentNetwork, Constraint, ConstraintId, MovingWindows, Network, NodeId, WindowEnd,
 };
 
-/// The window of a time point, its ends `None` where they are infinite.
+/// Window of a time point; an end is `None` if it is infinite.
 pub(crate) type Ends = (Option<Rational>, Option<Rational>);
 
 /// The time windows of time points, given those that have been executed.
@@ -24,7 +24,7 @@ pub(crate) enum Horizon {
     Dispatchable(Box<Dispatcher>),
 }
 
-/// The origin of one end of a time window.
+/// Cause of one end of a time window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NetworkLimit {
     /// A constraint of the network.
@@ -40,12 +40,12 @@ pub(crate) struct OneHop {
     happened: Vec<Option<Rational>>,
 }
 
-/// A time that a window does not allow.
+/// Violation of a time window.
 #[derive(Clone, Debug)]
 pub(crate) struct Missed {
-    /// The end that was missed.
+    /// The violated end.
     pub(crate) end: WindowEnd,
-    /// The amount by which the window is missed.
+    /// The amount of the violation.
     pub(crate) by: Rational,
     /// `true` if only the bounds of the contingent link that ends there are violated. Then the
     /// remaining plan may still work.
@@ -63,7 +63,7 @@ impl Horizon {
         Self::OneHop(OneHop { network, happened })
     }
 
-    /// A network in a form that can be dispatched.
+    /// Creates the horizon of a network in dispatchable form.
     pub(crate) fn dispatchable(form: Arc<Dispatchable<Rational>>) -> Self {
         Self::Dispatchable(Box::new(Dispatcher::new(form)))
     }
@@ -86,8 +86,8 @@ impl Horizon {
         }
     }
 
-    /// The time at which a time point that is ready may happen if nothing happens before. `Err` if
-    /// it has to wait for the end of that link, however late it comes.
+    /// Returns the earliest time of a time point that is ready, if no event comes before. `Err` if
+    /// it has to wait for the end of that link, however late that is.
     pub(crate) fn earliest(&self, node: NodeId) -> Result<Option<Rational>, LinkId> {
         match self {
             Self::Whole(_) | Self::OneHop(_) => Ok(self.window(node).0),
@@ -106,8 +106,8 @@ impl Horizon {
         }
     }
 
-    /// The node happens, or happened, at `time`. But for [`Horizon::Whole`], it
-    /// does in any case.
+    /// Executes a node at `time`. If that is outside its window, [`Horizon::Whole`] does not record
+    /// it; the others do.
     pub(crate) fn fix(&mut self, node: NodeId, time: &Rational) -> Result<(), Missed> {
         match self {
             Self::Whole(windows) => windows.fix(node, time).map_err(|out| Missed {
@@ -187,7 +187,7 @@ impl Horizon {
         }
     }
 
-    /// The grounds of one end of a window, beginning far away from the node.
+    /// Returns the causes of one end of a window, the one farthest from the node first.
     pub(crate) fn grounds(&self, node: NodeId, end: WindowEnd) -> Vec<NetworkLimit> {
         match self {
             Self::Whole(windows) => windows
@@ -209,7 +209,7 @@ impl Horizon {
     }
 }
 
-/// The grounds of one end of a window of a node, or of its link if that is tighter.
+/// Returns the causes of one end of a node's window, or of its link if that is tighter.
 fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<NetworkLimit> {
     let (earliest, latest) = dispatcher.window(node);
     let (least, most) = dispatcher.bounds(node);
@@ -222,13 +222,13 @@ fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<NetworkL
     }
     let mut behind = grounds(&dispatcher.behind(node, end));
     if end == WindowEnd::Earliest {
-        // These lead from the node back to the event.
+        // These lead from the node back to the cause.
         behind.reverse();
     }
     behind
 }
 
-/// The parts of a network behind these steps.
+/// Returns the parts of a network that justify these steps.
 pub(crate) fn grounds(steps: &[Step]) -> Vec<NetworkLimit> {
     let ground = |step: &Step| match step.ground {
         Ground::Requirement(id) => NetworkLimit::Constraint(id),
@@ -243,7 +243,7 @@ impl OneHop {
         (time(WindowEnd::Earliest), time(WindowEnd::Latest))
     }
 
-    /// The constraint that says most about one end of the window.
+    /// Returns the tightest constraint on one end of the window.
     fn grounds(&self, node: NodeId, end: WindowEnd) -> Option<ConstraintId> {
         let limit = |id| Some((self.limit(id, end)?, id));
         let most = match end {
@@ -253,7 +253,8 @@ impl OneHop {
         most.map(|(_, id)| id)
     }
 
-    /// The bound that one constraint sets, if the time point at its other end has happened.
+    /// Returns the bound that a constraint sets, if the time point at its other end has been
+    /// executed.
     fn limit(&self, id: ConstraintId, end: WindowEnd) -> Option<Rational> {
         let Constraint { from, to, bound } = self.network.constraint(id);
         match end {

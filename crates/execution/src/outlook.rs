@@ -10,7 +10,7 @@ use crate::progression::Progression;
 /// Computes the probability of reaching the goal in time for each move. It knows the distributions
 /// of the world, but not what will happen.
 ///
-/// Time is divided into periods of equal length, the first of which begins at time 0 of the world's
+/// Time is divided into periods of equal length. The first period begins at time 0 of the world's
 /// clock. Moves are made at the beginning of a period.
 pub trait Outlook: Send + Sync {
     /// The length of a period, in seconds.
@@ -34,7 +34,7 @@ pub struct Standing<'a> {
     pub running: Vec<(&'a str, usize)>,
     /// Spontaneous changes of facts, in the order of their observation.
     pub changed: &'a [(FactId, bool)],
-    /// An action that is thought of as started now.
+    /// An action that is assumed to be started now.
     pub started: Option<&'a str>,
 }
 
@@ -49,24 +49,25 @@ pub struct Weighed {
     pub is_overdue: bool,
 }
 
-/// Something that can be done at the beginning of a period.
+/// A move at the beginning of a period.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Move {
-    /// To start this action, planned to take that long.
+    /// Start this action, with this planned duration.
     Start(Arc<Action>, Option<Rational>),
-    /// To let the action of that name go.
+    /// Cancel the action of this name.
     Cancel(String),
-    /// To do nothing until the next period.
+    /// Wait for the next period.
     Wait,
 }
 
 impl Weighed {
-    /// The probability to reach the goal in time by the best move.
+    /// Returns the probability of reaching the goal in time by the best move.
     pub fn best(&self) -> f64 {
         self.moves.first().map_or(0.0, |(_, value)| *value)
     }
 
-    /// The same by waiting for the next period; 0 where it is never best to.
+    /// Returns the probability of reaching the goal in time by waiting for the next period; 0 if
+    /// that is never best.
     pub fn by_waiting(&self) -> f64 {
         let mut moves = self.moves.iter();
         let found = moves.find(|(choice, _)| *choice == Move::Wait);

@@ -5,9 +5,9 @@ use elbowroom_num::Rational;
 
 /// Makes plans.
 pub trait Planner: Send {
-    /// A plan from here. See [`Situation`] for what such a plan looks like.
+    /// Makes a plan from this situation. See [`Situation`] for the form of such a plan.
     ///
-    /// The plan's facts and fluents are those of `task`, whose table may grow for that.
+    /// The plan's facts and fluents are those of `task`, whose table may grow.
     fn plan(&mut self, task: &Task, situation: &Situation) -> Planned;
 
     /// Announces that a plan from this situation will probably be requested soon. Planners that can
@@ -102,19 +102,20 @@ pub struct Planned {
     pub shortfall: Shortfall,
 }
 
-/// Reasons for which there is no plan, as far as the planner knows any.
+/// Reasons for which there is no plan, as far as the planner knows them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Shortfall {
     /// The deadlines that cannot be met, or for which no plan was found.
     pub late: Vec<Lateness>,
-    /// Conjuncts of the goal that exclude each other, as a certificate proves; none is known to be needless for that.
+    /// Conjuncts of the goal that exclude each other, as a certificate proves. None of them is
+    /// known to be redundant.
     pub conflict: Vec<String>,
 }
 
 /// A deadline that is missed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lateness {
-    /// Its position among the deadlines of the task ([`Task::deadlines`]).
+    /// Index of the deadline in [`Task::deadlines`].
     pub place: usize,
     /// The time at which the earliest plan found without deadlines reaches the goal.
     pub reached: Option<Rational>,
@@ -155,7 +156,7 @@ impl Lateness {
 }
 
 impl From<PlanAnswer> for Planned {
-    /// Without a clock, and nothing to say about it.
+    /// Creates an answer without a planning time and a remark.
     fn from(answer: PlanAnswer) -> Self {
         Self {
             answer,
@@ -171,19 +172,19 @@ impl From<PlanAnswer> for Planned {
 pub enum PlanAnswer {
     /// A plan.
     Plan(TimeTriggeredPlan),
-    /// No plan exists, with a certificate that the verifier of such claims accepts.
+    /// No plan exists, with a certificate that the verifier accepts.
     Unsolvable,
     /// No plan has been found; there may be one.
     NotFound {
         /// The reason.
         why: String,
     },
-    /// The planner has failed, which says nothing about plans: it has crashed, for example.
+    /// The planner has failed, for example crashed. Plans may exist.
     Failed {
         /// The error.
         why: String,
     },
-    /// There is no planner to ask.
+    /// There is no planner in this run.
     NoPlanner,
 }
 
@@ -198,7 +199,7 @@ impl PlanAnswer {
         }
     }
 
-    /// The plan.
+    /// Returns the plan.
     pub fn plan(&self) -> Option<&TimeTriggeredPlan> {
         match self {
             Self::Plan(plan) => Some(plan),
@@ -209,7 +210,7 @@ impl PlanAnswer {
     }
 }
 
-/// Answers that there is no plan to be had: for runs of a single given plan.
+/// Planner without plans, for runs of a single given plan.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoPlanner;
 

@@ -19,20 +19,20 @@ use crate::event::Ticket;
 use crate::executor::{Mission, Need, StepId};
 use crate::forms::Forms;
 
-/// A plan made ready to be executed.
+/// A plan prepared for execution.
 #[derive(Clone, Debug)]
 pub struct Prepared {
-    /// The plan with room.
+    /// The deordered plan, with open parameters.
     pub plan: ParametrizedPlan,
-    /// For each step of the plan that was made ready, its instance.
+    /// For each step of the given plan, its instance.
     pub instances: Vec<InstanceId>,
     /// The time of each event if nothing deviates.
     pub nominal: Schedule,
-    /// For which values it is guaranteed to work, if that was asked for.
+    /// The values for which it is guaranteed to work, if they were requested.
     pub envelope: Option<DecoupledEnvelope>,
-    /// Forms of the plan's network that executors have asked for before.
+    /// Cache of the dispatchable forms of the plan's networks.
     pub forms: Forms,
-    /// The partial order of its happenings, if that was asked for ([`Need::PartialOrder`]).
+    /// The partial order of its happenings, if it was requested ([`Need::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
 }
 
@@ -41,24 +41,24 @@ pub struct Prepared {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PrepareError {
-    /// The judge rejects the plan.
+    /// The validator rejects the plan.
     #[error("the plan is not valid: {0}")]
     Invalid(Box<Violation>),
     /// The plan has no order.
     #[error(transparent)]
     Deorder(#[from] DeorderError),
-    /// Something cannot be left open.
+    /// A quantity cannot be left open.
     #[error(transparent)]
     Parametrize(#[from] ParametrizeError),
     /// The plan is not guaranteed to work even if nothing deviates.
     #[error("the plan is not guaranteed to work even if nothing deviates")]
     NoGuarantee,
-    /// The analyst cannot decide about this plan: the reason.
+    /// The analysis cannot decide about this plan: the reason.
     #[error("{0}")]
     Beyond(String),
 }
 
-/// Makes plans ready.
+/// Prepares plans for execution.
 pub trait Preparer: Send {
     /// Removes unnecessary orderings from a plan, and computes the form that is needed.
     ///
@@ -92,20 +92,20 @@ pub trait Preparer: Send {
     fn give_up(&mut self) {}
 }
 
-/// A plan that is to be made ready, and where it begins.
+/// A plan to be prepared, with the situation from which it starts.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
     /// The task, with the goals of the plan.
     pub task: &'a Task,
     /// The plan, on the world's clock.
     pub plan: &'a TimeTriggeredPlan,
-    /// From where.
+    /// The situation from which the plan starts.
     pub situation: &'a Situation,
     /// The tickets of the actions that are running there, in its order.
     pub running: &'a [Ticket],
-    /// The present time: it is not begun earlier.
+    /// The present time; the plan does not begin earlier.
     pub now: &'a Rational,
-    /// The form that is asked for.
+    /// The requested form.
     pub need: Need,
 }
 
@@ -160,7 +160,7 @@ impl<P: Preparer + ?Sized> Preparer for &mut P {
     }
 }
 
-/// Knows which values a plan survives.
+/// Decides for which parameter values a plan is guaranteed to work.
 pub trait Region: Send {
     /// Returns the reason for which the plan is not guaranteed to work for these values; `None` if
     /// it is.
@@ -171,8 +171,8 @@ pub trait Region: Send {
         values: &Valuation,
     ) -> Option<String>;
 
-    /// Returns a box around these values in which the plan is guaranteed to work. The box may be as
-    /// small as the values themselves, depending on the effort. If the plan is beyond exact
+    /// Returns a box around these values for which the plan is guaranteed to work. Depending on the
+    /// effort, the box may contain only the values themselves. If the plan is beyond exact
     /// analysis, the values are returned, unless they are known to fail.
     ///
     /// # Errors
@@ -215,7 +215,7 @@ pub trait Region: Send {
         })
     }
 
-    /// One more of it; `None` if it cannot be had.
+    /// Returns a copy; `None` if it cannot be copied.
     fn fork(&self) -> Option<Box<dyn Region>> {
         None
     }

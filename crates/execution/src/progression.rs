@@ -1,11 +1,11 @@
-//! A state that follows what happens: progression, as planners call it.
+//! Progression: a state that follows the events of an execution.
 //!
-//! The same type is what an executor's side *believes* and what a simulated world *is*. As for the
-//! judge, all that happens at one time is a group: conditions, guards and amounts are read in the
-//! state on arrival, before anything of that time has changed it, and over-all conditions count
-//! strictly between start and end, at the time of a group in between as it leaves things. Whether
-//! two happenings of a group interfere is not asked here: that makes the executed plan invalid,
-//! which the judge says.
+//! The same type is the *belief* of the executing side and the *true state* of a simulated world.
+//! As in the validator, all happenings at one time form a group. Conditions, guards and amounts are
+//! read in the state on arrival, before any change at that time. Over-all conditions must hold
+//! strictly between start and end; at the time of a group in between, in the state after it.
+//! Interference between happenings of a group is not checked here: it makes the executed plan
+//! invalid, which the validator reports.
 
 mod effects;
 mod goal;
@@ -42,9 +42,9 @@ pub struct Progression {
     values: Vec<Option<Rational>>,
     /// The time of the present group: [`Progression::time`], or earlier for late reports.
     group: Rational,
-    /// Facts that have changed since the beginning of the present group, as they were on arrival.
+    /// Truth on arrival of the facts that have changed since the beginning of the present group.
     facts_on_arrival: BTreeMap<FactId, bool>,
-    /// The values on arrival, likewise.
+    /// The same for values.
     values_on_arrival: BTreeMap<FluentId, Option<Rational>>,
     /// Facts that an action may have changed: see [`Progression::doubt`].
     doubtful_facts: BTreeMap<FactId, Vec<Doubt>>,
@@ -62,29 +62,31 @@ pub struct Underway {
     pub action: Arc<Action>,
     /// The time at which it started.
     pub start: Rational,
-    /// The planned duration: what `?duration` means until it has ended.
+    /// The planned duration, which is the value of `?duration` until the action has ended.
     pub planned: Rational,
-    /// For each end effect, whether the part of its guard that concerns start and interval holds.
+    /// For each end effect, `true` if the part of its guard that concerns the start and the
+    /// interval holds.
     end_guards: Vec<bool>,
-    /// For each continuous effect, whether it is at work.
+    /// For each continuous effect, `true` if it is active.
     continuous: Vec<bool>,
-    /// The conjuncts of the over-all condition that have not held at some moment since the start.
+    /// Conjuncts of the over-all condition that have failed at some moment since the start.
     broken: BTreeSet<usize>,
 }
 
-/// The reason why facts or values are in doubt.
+/// Reason for which facts or values are in doubt.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Doubt {
-    /// Since when.
+    /// Beginning of the doubt.
     pub since: Rational,
-    /// The start of the action.
+    /// The ticket of the action's start.
     pub ticket: Ticket,
-    /// The name of the action that may or may not have come to its end.
+    /// The name of the action whose end may or may not have happened.
     pub action: String,
 }
 
 impl Underway {
-    /// The parts of the over-all condition that have not held at some moment since the start.
+    /// Returns the conjuncts of the over-all condition that have failed at some moment since the
+    /// start.
     pub fn broken_parts(&self) -> Vec<&Condition> {
         let Some(body) = self.action.durative() else {
             return Vec::new();
@@ -96,7 +98,7 @@ impl Underway {
 }
 
 impl Progression {
-    /// The beginning of a task.
+    /// Creates the initial state of a task.
     pub fn new(task: Arc<Task>) -> Self {
         let mut facts = vec![false; task.fact_count()];
         let mut values = vec![None; task.fluent_count()];
@@ -121,7 +123,7 @@ impl Progression {
         }
     }
 
-    /// The task whose facts these are.
+    /// Returns the task, which defines the facts.
     pub fn task(&self) -> &Arc<Task> {
         &self.task
     }
@@ -137,17 +139,17 @@ impl Progression {
         }
     }
 
-    /// The same state, of a task that differs in its goal alone.
+    /// Replaces the task by one that differs only in its goal.
     pub(crate) fn pursue(&mut self, task: &Arc<Task>) {
         self.task = Arc::clone(task);
     }
 
-    /// The moment.
+    /// Returns the present time.
     pub fn time(&self) -> &Rational {
         &self.time
     }
 
-    /// The running actions.
+    /// Returns the running actions.
     pub fn running(&self) -> &BTreeMap<Ticket, Underway> {
         &self.running
     }
@@ -174,12 +176,12 @@ impl Progression {
         &self.doubtful_values
     }
 
-    /// A fluent's value.
+    /// Returns a fluent's value.
     pub fn value(&self, fluent: FluentId) -> Option<&Rational> {
         self.values.get(fluent.index()).and_then(Option::as_ref)
     }
 
-    /// A fluent's value on arrival at the present moment, before anything happened at it.
+    /// Returns a fluent's value on arrival at the present moment, before any happening of it.
     pub fn value_on_arrival(&self, fluent: FluentId) -> Option<&Rational> {
         match self.values_on_arrival.get(&fluent) {
             Some(value) => value.as_ref(),
@@ -187,7 +189,7 @@ impl Progression {
         }
     }
 
-    /// Facts and values as the model knows them.
+    /// Returns facts and values as a state of the model.
     pub fn state(&self) -> State {
         let facts = (0..self.facts.len()).map(|index| FactId(narrow(index)));
         let values = self.values.iter().enumerate();
@@ -199,7 +201,7 @@ impl Progression {
         }
     }
 
-    /// The time at which the next timed initials happen.
+    /// Returns the time of the next timed initials.
     pub fn next_timed(&self) -> Option<&Rational> {
         self.task.timed().get(self.timed).map(|timed| &timed.time)
     }
@@ -247,11 +249,11 @@ impl Progression {
         }
     }
 
-    /// An action starts now, or happens, if it is instantaneous. `measured` overrides the amounts
-    /// that the domain has.
+    /// Starts an action now, or executes it if it is instantaneous. Amounts in `measured` replace
+    /// those of the domain.
     ///
     /// # Errors
-    /// When an effect reads a fluent without a value; the other effects take place.
+    /// If an effect reads a fluent without a value. The other effects take place.
     pub fn start(
         &mut self,
         ticket: Ticket,
@@ -285,7 +287,7 @@ impl Progression {
         }
     }
 
-    /// A running action ends now, as the domain says. Nothing if it is not running.
+    /// Ends a running action successfully. Has no effect if it is not running.
     ///
     /// # Errors
     /// As [`Progression::start`].
@@ -305,12 +307,13 @@ impl Progression {
         )
     }
 
-    /// A running action stops without its end taking place.
+    /// Stops a running action without its end effects.
     pub fn stop(&mut self, ticket: Ticket) {
         self.running.remove(&ticket);
     }
 
-    /// A fact is seen; whether that is news. It counts as having been so on arrival.
+    /// Records an observed fact, also for the state on arrival. Returns `true` if it differs from
+    /// the belief, or was in doubt.
     pub fn see_fact(&mut self, fact: FactId, truth: bool) -> bool {
         let was_doubtful = self.doubtful_facts.remove(&fact).is_some();
         let is_news = self.fact(fact) != truth;
@@ -319,7 +322,8 @@ impl Progression {
         is_news || was_doubtful
     }
 
-    /// A value is seen; whether that is news. It counts as having been so on arrival.
+    /// Records an observed value, also for the state on arrival. Returns `true` if it differs from
+    /// the belief, or was in doubt.
     pub fn see_value(&mut self, fluent: FluentId, value: &Rational) -> bool {
         let was_doubtful = self.doubtful_values.remove(&fluent).is_some();
         let is_news = self.value(fluent) != Some(value);
@@ -328,19 +332,20 @@ impl Progression {
         is_news || was_doubtful
     }
 
-    /// A fact becomes true or false by itself.
+    /// Changes a fact spontaneously.
     pub fn change_fact(&mut self, fact: FactId, truth: bool) {
         self.set_fact(fact, truth);
     }
 
-    /// A fluent gets a value by itself.
+    /// Changes a value spontaneously.
     pub fn change_value(&mut self, fluent: FluentId, value: &Rational) {
         self.doubtful_values.remove(&fluent);
         self.set_value(fluent, Some(value.clone()));
     }
 
-    /// It is unknown whether these effects have taken place. Until that is known, the facts that they write count as
-    /// false, for planners as for executors, and the fluents keep their values; a goal that reads them is not reached.
+    /// Marks the effects as doubtful: it is unknown whether they have taken place. Until that is
+    /// known, the facts that they write count as false, for planners and for executors, and the
+    /// fluents keep their values. A goal that reads them is not reached.
     pub fn doubt(&mut self, snap: &SnapAction, doubt: &Doubt) {
         for effect in &snap.effects {
             match effect.change {
@@ -388,16 +393,17 @@ impl Progression {
                 Change::Add(fact) | Change::Delete(fact) => facts.contains(fact),
                 Change::Update { fluent, .. } => fluents.contains(fluent),
             });
-            // An effect that cannot be computed leaves its fluent as it was.
+            // An effect that cannot be computed does not change its fluent.
             let _ = self.happen(&snap, Some(duration), None, measured);
         }
         (self.doubtful_facts, self.doubtful_values) = others;
         (facts, fluents)
     }
 
-    /// The first running action whose over-all condition has not held at some moment that has
-    /// passed since it started; [`Underway::broken_parts`] has what. What fails just now has not
-    /// failed yet, as long as more can happen at this moment: see [`Progression::breaking`].
+    /// Returns the first running action whose over-all condition has failed at some past moment
+    /// since its start; [`Underway::broken_parts`] has the conjuncts. A condition that fails at the
+    /// present moment does not count yet, as long as more can happen at this moment: see
+    /// [`Progression::breaking`].
     pub fn broken(&self) -> Option<(Ticket, &Underway)> {
         let mut running = self.running.iter();
         running
@@ -420,7 +426,7 @@ impl Progression {
         }
     }
 
-    /// From the present group on until `to`, where another one may come.
+    /// Advances the time from the present group to `to`, where the next one may begin.
     fn drift(&mut self, to: &Rational) -> Result<(), Unreadable> {
         if *to <= self.time {
             return Ok(());

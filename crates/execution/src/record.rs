@@ -1,4 +1,4 @@
-//! The record of a run: everything that came in and went out, in order.
+//! Record of a run: all inputs and outputs, in order.
 
 use elbowroom_model::{Situation, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -37,7 +37,7 @@ pub enum WarningCause {
     Timeout,
 }
 
-/// Takes the record of a run as it comes about.
+/// Receives the record of a run, entry by entry.
 pub trait Recorder: Send {
     /// Records an entry. Persistent recorders must write the entry before this returns, so that the
     /// record of an interrupted run is complete.
@@ -85,7 +85,7 @@ impl<R: Recorder + ?Sized> Recorder for Box<R> {
     }
 }
 
-/// Keeps nothing.
+/// Recorder that keeps nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoRecord;
 
@@ -98,27 +98,27 @@ impl Recorder for NoRecord {
 pub enum Entry<'a> {
     /// A plan is adopted; its times are relative to [`Mission::origin`].
     Mission(&'a Mission),
-    /// The executor decided.
+    /// A decision of the executor.
     Decided {
         /// The time.
         now: &'a Rational,
         /// The decision and its reason.
         decided: &'a Decided,
     },
-    /// The world was given a command.
+    /// A command to the world.
     Command {
         /// The time.
         now: &'a Rational,
         /// The command.
         command: &'a Command,
-        /// When that was planned.
+        /// The planned window.
         planned: &'a Planned,
         /// The time-out of an action that is started; `None` if time-outs are off.
         timeout: Option<&'a Rational>,
     },
-    /// Time has passed, up to `now`, which `until` would have been the end of.
+    /// The answer to a wait: time has passed up to `now`.
     Passed {
-        /// Until when the world was asked to wait at most.
+        /// The end of the requested wait.
         until: &'a Rational,
         /// The present time.
         now: &'a Rational,
@@ -138,7 +138,7 @@ pub enum Entry<'a> {
         now: &'a Rational,
         /// The observation.
         observation: &'a Observation,
-        /// When that was planned.
+        /// The planned window.
         planned: &'a Planned,
         /// The objection, if the report was ignored or corrected.
         remark: Option<&'a str>,
@@ -149,14 +149,14 @@ pub enum Entry<'a> {
         now: &'a Rational,
         /// The reason.
         reason: &'a Reason,
-        /// From where.
+        /// The situation from which the plan starts.
         situation: &'a Situation,
     },
-    /// A plan has been made, or not.
+    /// The answer of the planner.
     Planned {
-        /// The time, planning time included.
+        /// The time, including planning time.
         now: &'a Rational,
-        /// The time that it took, by the world's clock.
+        /// The planning time, on the world's clock.
         took: &'a Rational,
         /// The plan, on the task's clock.
         plan: Option<&'a TimeTriggeredPlan>,
@@ -175,11 +175,12 @@ pub enum Entry<'a> {
     Warning {
         /// The time.
         now: &'a Rational,
-        /// Its start.
+        /// The ticket of its start.
         ticket: Ticket,
         /// Its name.
         action: &'a str,
-        /// When a new plan is needed, or when the action times out, if it has not ended.
+        /// The time at which a new plan is needed, or at which the action times out, unless it ends
+        /// before.
         until: &'a Rational,
         /// The cause of the warning.
         cause: WarningCause,
@@ -193,7 +194,7 @@ pub enum Entry<'a> {
         /// The change of the goals, or the reason for abandoning the plan.
         reason: &'a Reason,
     },
-    /// One of several goals of a lasting run is closed, set aside, or pursued again.
+    /// One of several goals of an executive is closed, set aside, or pursued again.
     Goal {
         /// The time.
         now: &'a Rational,
@@ -202,18 +203,18 @@ pub enum Entry<'a> {
         /// The change.
         change: GoalChange<'a>,
     },
-    /// A lasting run has nothing to do, or cannot do it, and waits for a change.
+    /// An executive is idle: it has nothing to do, or no plan, and waits for a change.
     Resting {
         /// The time.
         now: &'a Rational,
         /// The verdict on the goals; `None` if there were none.
         verdict: Option<&'a Verdict>,
-        /// The goals by name: those that were reached, or else those that are open.
+        /// The names of the reached goals, or else of the open ones.
         goals: &'a [String],
         /// The parts of the goal that can never become true again, as in [`Report::dead_end`].
         dead_end: &'a [Reason],
     },
-    /// Somebody asked the run to end.
+    /// The end of the run was requested.
     Interrupted {
         /// The time.
         now: &'a Rational,

@@ -18,7 +18,7 @@ use crate::progression::Progression;
 /// The result depends on the scene alone: no clock is read, and the random numbers are determined
 /// by the scene.
 pub trait Rehearsal: Send {
-    /// The facts whose changes are to be remembered for [`Scene::seen`].
+    /// Returns the facts whose changes are to be recorded for [`Scene::seen`].
     fn watched(&self, task: &Task) -> Vec<FactId>;
 
     /// Returns the events of a successful action that carry information about the world. By default
@@ -53,13 +53,13 @@ pub struct Tells {
 pub struct Scene<'a> {
     /// The believed state, at the present time.
     pub belief: &'a Progression,
-    /// The changes so far of the [watched](Rehearsal::watched) facts.
+    /// Changes of the [watched](Rehearsal::watched) facts until now.
     pub seen: &'a [SeenChange],
     /// The present executor, before it receives the news.
     pub present: &'a dyn Executor,
     /// The news for that executor.
     pub news: &'a [News],
-    /// See there.
+    /// The tickets of its running steps.
     pub running: &'a BTreeMap<StepId, Ticket>,
     /// `true` if that executor abandons the plan now.
     pub is_given_up: bool,
@@ -71,12 +71,12 @@ pub struct Scene<'a> {
     pub replans: usize,
 }
 
-/// A change of a fact that was seen.
+/// An observed change of a fact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeenChange {
-    /// When it was seen.
+    /// The time of the observation.
     pub time: Rational,
-    /// Of which fact.
+    /// The fact.
     pub fact: FactId,
     /// The truth of the fact after the change.
     pub truth: bool,
@@ -88,16 +88,16 @@ pub struct SeenChange {
 pub struct Rehearsed {
     /// The choice.
     pub choice: Rehearsing,
-    /// The share of samples in which the choice reaches the goal.
+    /// The share of samples where the choice reaches the goal.
     pub value: Rational,
-    /// The same of what would be done without any choice.
+    /// The share of samples in which the decision of the present executor reaches the goal.
     pub present: Rational,
     /// `true` if no alternatives were tried, because continuing reaches the goal in almost all
     /// samples.
     pub is_fine: bool,
 }
 
-/// Something that can be done with a plan.
+/// A choice for a plan.
 pub enum Rehearsing {
     /// The decision of its executor is carried out: it continues or abandons the plan.
     AsDecided,
@@ -105,6 +105,6 @@ pub enum Rehearsing {
     HandsOver(Box<dyn Executor>, Box<Mission>),
     /// Another plan is made.
     Replans,
-    /// Nothing is begun until then.
+    /// Nothing is started until then.
     WaitsUntil(Rational),
 }

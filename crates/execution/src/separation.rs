@@ -1,4 +1,4 @@
-//! The least separation of happenings that interfere, for executors whose networks do not order them.
+//! Minimum separation of interfering happenings, for executors whose networks do not order them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,12 +10,14 @@ use elbowroom_probability::Likelihoods;
 
 /// Recent and expected happenings, on the plan's clock.
 ///
-/// An executor that knows only orderings starts an action as soon as possible. [`separated`](Self::separated)
-/// delays it until neither its start nor its planned end is less than ε from something that interferes.
+/// An executor that knows only orderings starts an action as soon as possible.
+/// [`separated`](Self::separated) delays the start until neither it nor the planned end is less
+/// than ε from an interfering happening.
 #[derive(Clone, Debug)]
 pub(crate) struct Separation {
     epsilon: Rational,
-    /// Changes of the last ε, each with the first time at which something that interferes may happen.
+    /// Changes of the last ε, each with the first time at which an interfering happening is
+    /// permitted.
     recent: Vec<(Footprint, Rational)>,
     /// The planned ends of running actions, by a number that the executor chooses.
     expected: BTreeMap<u32, Expected>,

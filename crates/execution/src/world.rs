@@ -1,4 +1,4 @@
-//! Port: the world in which plans are executed.
+//! Port: worlds that execute plans.
 
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
@@ -27,14 +27,14 @@ pub trait World: Send {
     /// If the world is gone, or does not understand the command.
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError>;
 
-    /// Lets time pass until something is observed, but not beyond `until`.
+    /// Waits until an event is observed, or until `until`.
     ///
     /// # Errors
-    /// When the world is gone, or says what cannot be understood.
+    /// If the world is gone, or its answer cannot be read.
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError>;
 
-    /// Looks at facts and fluents on purpose, before the goal is taken as reached. A world that
-    /// cannot look, says nothing.
+    /// Looks at facts and fluents, before the goal is accepted as reached. A world that cannot look
+    /// returns no observations.
     ///
     /// # Errors
     /// As [`World::wait`].
@@ -47,12 +47,12 @@ pub trait World: Send {
     }
 }
 
-/// Time that has passed.
+/// Answer to a wait.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Passage {
     /// The present time.
     pub now: Rational,
-    /// The observations since the last call, in the order in which they were reported.
+    /// The observations since the last call, in the order of their reports.
     pub observations: Vec<Observation>,
 }
 

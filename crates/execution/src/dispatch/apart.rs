@@ -1,4 +1,5 @@
-//! Separation of starts and planned ends where the network does not order what interferes.
+//! Separation of starts and planned ends from interfering happenings that the network does not
+//! order.
 
 use std::sync::Arc;
 
@@ -11,8 +12,9 @@ use crate::executor::StepId;
 use crate::separation::Separation;
 
 impl Dispatch {
-    /// Keeps ε between starts and planned ends and all that interferes with them, also where the network does not
-    /// order them. Happenings before `now`, on the plan's clock, count from the last ε on.
+    /// Keeps starts and planned ends at least ε away from all interfering happenings, also if the
+    /// network does not order them. Past happenings count if they are less than ε before `now`, on
+    /// the plan's clock.
     pub(crate) fn keeping_apart(mut self, now: &Rational) -> Self {
         let mut separation = Separation::new(&self.task, &self.origin);
         for (index, &[start, end]) in self.ends.iter().enumerate() {
@@ -32,7 +34,7 @@ impl Dispatch {
                 separation.note(Footprint::of_end(action.0, action.1), time);
             }
             if self.progress.running.contains(&id) {
-                // With the plan, the rest of a running action begins.
+                // The remainder of a running action begins with the plan.
                 let begun = self.happened(start).cloned().unwrap_or_default();
                 let end = begun + self.nominal_duration(id);
                 separation.expect(StepId::from(id).0, action, end);

@@ -12,7 +12,7 @@ use crate::reason::{Behind, Changed};
 /// Number of constraints of a long chain that are named.
 const MOST_NAMED: usize = 4;
 
-/// A constraint of a plan; of timed initials, without their time.
+/// Describes a constraint of a plan; a timed initial without its time.
 pub(super) fn named(task: &Task, plan: &StnPlan, index: usize) -> Behind {
     let constraint = &plan.constraints[index];
     if let elbowroom_plan::Reason::Timed(timed) = constraint.reason {
@@ -68,7 +68,7 @@ impl Dispatch {
     }
 }
 
-/// Bounds as an interval.
+/// Converts bounds to an interval.
 pub(super) fn interval(bounds: &Bounds) -> Interval {
     let end = |bound: &Option<Rational>| bound.clone().map_or(End::Infinite, End::Closed);
     Interval {

@@ -159,12 +159,12 @@ impl Dispatch {
         reason
     }
 
-    /// An action has started, in time or not.
+    /// Records the start of an action, whether in time or not.
     pub(crate) fn note_start(&mut self, id: InstanceId, time: &Rational) {
         let _ = self.started(id, time);
     }
 
-    /// An action has ended as the domain says, in time or not.
+    /// Records the successful end of an action, whether in time or not.
     pub(crate) fn note_end(&mut self, id: InstanceId, time: &Rational) {
         let _ = self.ended(id, time, &Ending::Succeeded);
     }

@@ -1,4 +1,4 @@
-//! Going on by the same network where something happened outside its bounds, or is overdue.
+//! Continuation with the present network after violations of its bounds, and with overdue actions.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId, network_node};
@@ -16,7 +16,7 @@ pub(super) struct Strain {
 }
 
 impl Strain {
-    /// A node happened at a time that its window does not allow.
+    /// Records a node that was executed outside its window.
     pub(super) fn missed(&mut self, node: NodeId, missed: &Missed) {
         if missed.is_only_link {
             self.ends.push(node);
@@ -29,7 +29,7 @@ impl Strain {
 /// An action that should have ended by now.
 pub(crate) struct Overdue {
     pub(crate) instance: InstanceId,
-    /// When it began, on the plan's clock.
+    /// Its start, on the plan's clock.
     pub(crate) begun: Rational,
     /// The planned duration.
     pub(crate) planned: Rational,
@@ -38,11 +38,11 @@ pub(crate) struct Overdue {
 /// Assumption about the end of an overdue action, on the plan's clock.
 #[derive(Clone, Debug)]
 pub(crate) enum Until {
-    /// Whenever it likes.
+    /// It ends at any time.
     ForEver,
-    /// By then.
+    /// It ends by this time.
     At(Rational),
-    /// By then, or as much earlier as it takes.
+    /// It ends by this time, or as much earlier as the network requires.
     AtMost(Rational),
 }
 
@@ -95,15 +95,15 @@ impl Dispatch {
             return false;
         }
         if self.missing(now).is_some() {
-            // Nobody was in time to decide on it.
+            // The executor has missed a time point.
             return false;
         }
         self.strain.ends.clear();
         true
     }
 
-    /// Returns the latest end of a running action, at most `most`, with which the present network
-    /// is still executable, on the world's clock.
+    /// Returns the latest end of a running action, at most `most`, for which the present network
+    /// remains executable, on the world's clock.
     pub(crate) fn prolongable(
         &self,
         id: InstanceId,

@@ -6,25 +6,26 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, StnPlan, network_node};
 use elbowroom_stn::Network;
 
-/// The executed part of a plan.
+/// Execution progress of a plan.
 #[derive(Clone, Debug)]
 pub(super) struct Progress {
-    /// The time at which each node happened, on the plan's clock.
+    /// The time at which each node was executed, on the plan's clock.
     pub(super) happened: Vec<Option<Rational>>,
-    /// For each node, how many of those that come before it have not happened.
+    /// For each node, the number of its predecessors that have not been executed.
     pub(super) missing: Vec<u32>,
-    /// For each node, those that come after it.
+    /// For each node, its successors.
     pub(super) successors: Vec<Vec<NodeId>>,
-    /// Starts that have everything behind them that must come before.
+    /// Starts whose predecessors have all been executed.
     pub(super) ready: BTreeSet<NodeId>,
     /// Instances that were commanded to start and have not ended.
     pub(super) running: BTreeSet<InstanceId>,
-    /// Instances that have not ended.
+    /// Number of instances that have not ended.
     pub(super) left: usize,
 }
 
 impl Progress {
-    /// Nothing has happened. `constraints` are the plan's, without parameters.
+    /// Creates the progress of a plan without any executed node. `constraints` are the plan's,
+    /// without parameters.
     pub(super) fn new(plan: &StnPlan, constraints: &[Constraint]) -> Self {
         let count = plan.nodes.len();
         let mut progress = Self {
@@ -40,7 +41,7 @@ impl Progress {
         let mut order = |earlier: NodeId, later: NodeId, least: &Rational| {
             let is_end = is_end_to_wait_for(plan, &together, earlier, later);
             let is_timed = matches!(plan.nodes[earlier.index()], Node::Timed(_));
-            // Starts that have to fall together do not wait for each other.
+            // Simultaneous starts do not wait for each other.
             let follows = is_end || together[earlier.index()] != together[later.index()];
             let waits = least.is_positive() || (least.is_zero() && follows);
             if waits && !is_timed && earlier != NodeId::ZERO {
@@ -104,7 +105,8 @@ fn is_end_to_wait_for(plan: &StnPlan, together: &[usize], node: NodeId, later: N
     }
 }
 
-/// For each node, a number that it shares with those that have to happen at the same time.
+/// Returns, for each node, a number that it shares with the nodes that must happen at the same
+/// time.
 fn falling_together(count: usize, constraints: &[Constraint]) -> Vec<usize> {
     let mut network = Network::with_nodes(count);
     let node = |id: NodeId| network_node(id);

@@ -1,4 +1,4 @@
-//! Starts that have failed and are tried again.
+//! Retries of failed starts.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId};
@@ -15,14 +15,13 @@ pub(super) struct Retry {
     pub(super) failures: u32,
 }
 
-/// The number of failures in a row after which the wait does not grow any more: ε · 2⁴⁰ is 35
-/// years.
+/// Number of failures in a row after which the wait does not grow any more: ε · 2⁴⁰ is 35 years.
 const MOST_DOUBLINGS: u32 = 40;
 
 impl Dispatch {
-    /// A start has failed: it is ready again, ε later after its first failure, and after each
-    /// further one in a row twice as late as before. So a start that always fails is tried a few
-    /// dozen times in the longest of runs, and one that fails now and then loses next to no time.
+    /// Makes a failed start ready again, ε after its first failure; the wait doubles with each
+    /// further failure in a row. So a start that always fails is tried a few dozen times in the
+    /// longest of runs, and one that fails occasionally loses almost no time.
     pub(crate) fn try_again(&mut self, id: InstanceId, failed: &Rational) {
         let [start, _] = self.nodes_of(id);
         let known = self.retries.get(&start);
@@ -38,7 +37,7 @@ impl Dispatch {
         self.progress.ready.insert(start);
     }
 
-    /// The time at which a start may be tried again, if it has failed.
+    /// Returns the time at which a failed start may be retried.
     pub(super) fn held_until(&self, start: NodeId) -> Option<Rational> {
         self.retries
             .get(&start)

@@ -15,12 +15,13 @@ use crate::reason::{About, Cause, Reason};
 
 /// Instance that was commanded and may be running, although its start was not reported.
 struct Silent {
-    /// Until when it may be, on the plan's clock; `None` if there is no such time.
+    /// The latest time at which it may be running, on the plan's clock; `None` if there is no
+    /// limit.
     until: Option<Rational>,
 }
 
 impl Dispatch {
-    /// The decision at this moment, after all news have been taken in.
+    /// Returns the decision at this moment. All news must have been processed.
     pub(crate) fn next(&mut self, moment: &Moment<'_>) -> Decided {
         if self.progress.left == 0 {
             return at_the_end(moment);
@@ -31,7 +32,7 @@ impl Dispatch {
         self.go_on(moment)
     }
 
-    /// The same without looking at what should have ended by now, and at over-all conditions.
+    /// Returns the decision without checks for overdue time points and broken over-all conditions.
     pub(crate) fn go_on(&mut self, moment: &Moment<'_>) -> Decided {
         if self.progress.left == 0 {
             return at_the_end(moment);
@@ -53,7 +54,7 @@ impl Dispatch {
                 continue;
             }
             let (_, latest) = self.horizon.window(network_node(node));
-            // Who waits for something that the world does is woken up by it.
+            // A start that waits for an event of the world needs no wake-up time.
             if let Ok(earliest) = self.horizon.earliest(network_node(node)) {
                 let earliest = earliest.max(self.held_until(node));
                 match earliest.filter(|earliest| *earliest > now) {
@@ -80,7 +81,7 @@ impl Dispatch {
                 }
                 continue;
             }
-            // One that is past has been noticed, or does not matter to the executor.
+            // A window that has closed was reported before, or does not matter to the executor.
             let latest = self.horizon.window(network_node(node)).1;
             if let Some(latest) = latest.filter(|latest| *latest >= now) {
                 wake_at(latest + &self.epsilon, node);
@@ -170,7 +171,7 @@ impl Dispatch {
             .max(Rational::ZERO)
     }
 
-    /// The node of a running instance that is to be observed next: its end, or still its start.
+    /// Returns the node of a running instance that is to be observed next: its start or its end.
     fn awaited(&self, id: InstanceId) -> NodeId {
         let [start, end] = self.ends[id.index()];
         if self.happened(start).is_some() {
@@ -251,7 +252,8 @@ impl Dispatch {
     }
 }
 
-/// The plan is done: is the goal reached, or will it be without any more doing?
+/// Decides when the plan is done: the goal is reached, it will be reached without further actions,
+/// or a new plan is needed.
 fn at_the_end(moment: &Moment<'_>) -> Decided {
     let belief = moment.belief;
     match belief.outlook() {
@@ -270,7 +272,7 @@ fn at_the_end(moment: &Moment<'_>) -> Decided {
     }
 }
 
-/// An over-all condition of something running that does not hold.
+/// Returns the reason if an over-all condition of a running action does not hold.
 fn broken(moment: &Moment<'_>) -> Option<Reason> {
     let (_, underway) = moment.belief.broken()?;
     let unmet = underway.broken_parts();

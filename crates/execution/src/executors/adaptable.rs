@@ -105,7 +105,7 @@ impl Executor for Adaptable {
 }
 
 impl Adaptable {
-    /// Looks ahead.
+    /// Creates `lookahead`.
     pub(super) fn with_foresight(likelihoods: Arc<Likelihoods>, foresight: Foresight) -> Self {
         Self {
             initial: Initial::of(&likelihoods),
@@ -127,8 +127,8 @@ impl Adaptable {
         }
         let table = foresight.table(&mission.task, &self.likelihoods)?;
         let steps = table.steps().to_vec();
-        // The world may have gone where, by the likelihoods, it cannot: the plan then needs actions that the
-        // table left out.
+        // The world may have left the states that the likelihoods permit. The plan then needs
+        // actions that the table does not have.
         let is_known = |planned: &Step| {
             let mut actions = steps.iter().map(|step| &step.action);
             let planned = &planned.action;
@@ -146,7 +146,7 @@ impl Adaptable {
         Some((chooser, steps))
     }
 
-    /// The orders of a plan, with its steps.
+    /// Returns the search for orders of a plan, with its steps.
     fn orders(&self, mission: &Mission) -> Result<(Chooser, Vec<Step>), Box<Reason>> {
         let looks_ahead = self.foresight.is_some();
         let Some(plan) = mission.order.clone() else {
@@ -176,7 +176,8 @@ impl Adaptable {
             let about = About::Said(missing.to_string());
             Box::new(Reason::new(Cause::NoOrder).about(about))
         })?;
-        // On a clock facts do not change with steps: an order that counts on that would repeat steps in vain.
+        // On a clock, facts do not change from step to step. An order that relies on such changes
+        // would repeat steps in vain.
         let model = if looks_ahead {
             model.without_luck()
         } else {

@@ -25,7 +25,8 @@ pub(super) const REGISTERED: Registered = Registered {
     make: |_, _| Box::new(Esterel { dispatch: None }),
 };
 
-/// See [`REGISTERED`]. Without time it is [`untimed::Esterel`](crate::untimed::Esterel).
+/// See [`REGISTERED`]. The variant for worlds without time is `untimed::Esterel` in
+/// `elbowroom-laboratory`.
 #[derive(Clone, Debug)]
 struct Esterel {
     dispatch: Option<Dispatch>,
@@ -40,12 +41,13 @@ impl Executor for Esterel {
         let plan = &mission.plan.plan;
         let bounds = |constraint: &Constraint| -> Bounds {
             if plan.duration_of(constraint).is_some() {
-                // An end comes when it comes.
+                // Ends are awaited without bounds.
                 return (None, None);
             }
             orderings(constraint)
         };
-        // Its orderings hold for planned durations; the world's may bring an end close to a start.
+        // The orderings hold for planned durations; real durations may bring an end close to a
+        // start.
         let dispatch =
             Dispatch::new(mission, Sight::Whole, &bounds)?.keeping_apart(&Rational::ZERO);
         self.dispatch = Some(dispatch);
@@ -133,8 +135,8 @@ fn learn(dispatch: &mut Dispatch, news: &News) -> Option<Reason> {
     }
 }
 
-/// Returns the bounds by which a constraint orders its time points: the minimum distance between
-/// them, without the maximum distance.
+/// Returns the bounds by which a constraint orders its time points. They contain the minimum
+/// distance, but not the maximum distance.
 fn orderings(constraint: &Constraint) -> Bounds {
     let value = |bound: &Bound| match bound {
         Bound::Finite(value) => Some(value.clone()),

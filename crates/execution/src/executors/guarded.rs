@@ -34,14 +34,14 @@ struct Guard {
     dispatch: Dispatch,
     mission: Mission,
     envelope: DecoupledEnvelope,
-    /// The box that dispatching keeps: smaller than the envelope, if that requires knowing values
-    /// in advance.
+    /// The guarantee that dispatching maintains. It covers less than the envelope if the whole
+    /// envelope would require knowing values in advance.
     promise: Promise,
     /// `true` if the plan's conditions are more than single facts, for example numeric.
     reads_more_than_facts: bool,
     /// The weakest promise with which the plan is continued.
     least: Promise,
-    /// The values observed, and the nominal ones of the rest.
+    /// The observed values, and nominal ones for the rest.
     values: Valuation,
 }
 
@@ -127,9 +127,9 @@ impl Executor for Guarded {
 }
 
 impl Guard {
-    /// Returns the latest end of a running action, beyond its present window, with which the plan
-    /// can be continued. It lies within the action's interval if the plan was adopted with its
-    /// whole envelope.
+    /// Returns the latest end of a running action, beyond its present window, that does not require
+    /// a new plan. It lies within the action's interval if the plan was adopted with its whole
+    /// envelope.
     fn bears_until(&self, instance: InstanceId, now: &Rational) -> Option<Rational> {
         let [start, _] = self.dispatch.nodes_of(instance);
         let begun = self.dispatch.happened(start)?;
@@ -221,8 +221,9 @@ impl Guard {
         Some(reason.since(now.clone()))
     }
 
-    /// The amounts that come about while each of several parameters is in its interval. Which
-    /// values they had is not known, but that they had some of these is all the guarantee asks.
+    /// Returns the amounts that are possible while all of their parameters lie in their intervals.
+    /// The values of the individual parameters are unknown, but the guarantee only requires that
+    /// such values exist.
     fn guaranteed(&self, reading: &Reading) -> Interval {
         let mut amounts = Interval::point(reading.constant.clone());
         for (parameter, slope) in &reading.slopes {
@@ -240,7 +241,7 @@ impl Guard {
     }
 }
 
-/// The end of an interval moved by `slope` times another one.
+/// Returns the end of an interval, moved by `slope` times another end.
 fn moved(end: &End, by: &End, slope: &Rational) -> End {
     match (end.value(), by.value()) {
         (Some(value), Some(by_value)) => {

@@ -58,10 +58,10 @@ pub(super) const REGISTERED: Registered = Registered {
 /// See [`REGISTERED`].
 struct Live {
     region: Box<dyn Region>,
-    /// The source of likelier plans, and by how much one must be likelier.
+    /// The comparison of plans, and the advantage that another plan must have.
     odds: Option<(Box<dyn Odds>, Rational)>,
     state: Option<Rest>,
-    /// The hope for the plan for which another one was requested.
+    /// The hope for the plan that was abandoned last.
     hope: Hope,
     /// A plan that is executed without a guarantee.
     carried_on: Option<CarriedOn>,
@@ -72,12 +72,12 @@ struct Live {
 #[derive(Clone)]
 struct Rest {
     dispatch: Dispatch,
-    /// The guarantee of the rest of the plan.
+    /// The guarantee of the remaining plan.
     promise: Promise,
     /// The guarantee when a better plan was last searched for, or when the plan began.
     sought_at: Promise,
     mission: Arc<Mission>,
-    /// The values observed, and the nominal ones of the rest.
+    /// The observed values, and nominal ones for the rest.
     values: Valuation,
     /// Duration parameters by instance, and the parameters that occur in constraints.
     durations: BTreeMap<InstanceId, ParameterId>,
@@ -344,7 +344,7 @@ impl Rest {
         None
     }
 
-    /// Computes a box in which the remaining plan works. Returns the reason if the plan fails even
+    /// Computes a box of values for the remaining plan. Returns the reason if the plan fails even
     /// when executed nominally. The reason names `instance`, whose news led to the query.
     fn ask(
         &mut self,
@@ -476,7 +476,7 @@ impl Rest {
         (plan, values)
     }
 
-    /// The values at which nothing deviates any more.
+    /// Returns the values if nothing deviates any more.
     fn values_at(&self, now: &Rational) -> Valuation {
         let mut values = self.values.clone();
         let now = self.dispatch.local(now);
@@ -504,7 +504,7 @@ fn in_constraints(plan: &ParametrizedPlan) -> BTreeSet<ParameterId> {
     parameters.collect()
 }
 
-/// The bounds of a parameter's values.
+/// Returns the bounds of a parameter's values.
 fn range(plan: &ParametrizedPlan, parameter: ParameterId) -> Bounds {
     let range = &plan.parameter(parameter).range;
     (range.lower.value().cloned(), range.upper.value().cloned())
@@ -518,7 +518,7 @@ fn instance_of(news: &News) -> Option<InstanceId> {
     }
 }
 
-/// The step whose news can move the rest of a plan out of its envelope.
+/// Returns the step of a news item that can move the remaining plan out of its envelope.
 fn may_matter(news: &News) -> Option<StepId> {
     match news {
         News::Ended { step, .. } => Some(*step),
@@ -527,7 +527,7 @@ fn may_matter(news: &News) -> Option<StepId> {
     }
 }
 
-/// Puts the amount that was measured in place of what the domain says.
+/// Replaces the amount of the domain by the measured one.
 fn set_amount(action: &mut Action, is_end: bool, measured: &Measured) {
     let effects: &mut [Effect] = match &mut action.body {
         Body::Instantaneous(snap) => &mut snap.effects,

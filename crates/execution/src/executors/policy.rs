@@ -1,5 +1,5 @@
-//! `policy`: the plan while its guarantee costs no probability, then the likeliest move, on a
-//! clock.
+//! `policy`, on a clock: follows the plan while its guarantee costs no success probability, then
+//! makes the most likely move.
 
 mod moves;
 mod rehearsed;
@@ -76,17 +76,17 @@ struct Policy {
     plan: Box<dyn Executor>,
     /// `true` while the plan is followed.
     follows: bool,
-    /// Success probability lost so far by following the plan.
+    /// Loss of success probability by following the plan, in total.
     forgone: f64,
     /// Commanded actions that have not ended.
     steps: BTreeMap<StepId, Ordered>,
-    /// The facts that the world has changed by itself.
+    /// Spontaneous changes of facts.
     changed: Vec<(FactId, bool)>,
-    /// When something happened last.
+    /// The time of the last happening.
     last: Option<Rational>,
-    /// The last period at whose beginning it was decided to wait.
+    /// The last period at whose beginning the decision was to wait.
     waited: Option<usize>,
-    /// When something was ordered last, and how often at that time.
+    /// The time of the last command, and the number of decisions with commands at that time.
     ordered: Option<(Rational, u32)>,
     /// The number of the next order.
     next_step: u32,
@@ -103,11 +103,11 @@ struct Ordered {
     is_let_go: bool,
 }
 
-/// When moves are weighed.
+/// Time of the next evaluation of moves.
 enum Turn {
     /// Now, in this period.
     Now(usize),
-    /// At the beginning of this one.
+    /// At the beginning of this period.
     At(usize),
 }
 
@@ -249,7 +249,8 @@ impl Policy {
         });
     }
 
-    /// The decision, if moves can be weighed; `kept` is what the plan says.
+    /// Returns the decision by the values of the moves. `kept` is the decision of the plan's
+    /// executor.
     fn weigh(
         &mut self,
         moment: &Moment<'_>,
@@ -257,7 +258,7 @@ impl Policy {
         outlook: &dyn Outlook,
     ) -> Decided {
         let kept = self.still_kept(kept);
-        // What counts is that the goal holds, whatever the plan would still do.
+        // The goal holds, so the remaining steps of the plan are not needed.
         if moment.belief.outlook() == Prospect::Reached {
             self.follows = false;
             return self.finish();
@@ -289,7 +290,7 @@ impl Policy {
             return match (kept, turn) {
                 (Some(kept), _) => kept,
                 (None, Turn::Now(_)) => self.hopeless(moment.now),
-                // Before it begins, something may happen still.
+                // Until it begins, an event may still help.
                 (None, Turn::At(period)) => {
                     let until = begins(period, outlook.period());
                     wait(Some(until), About::NextDecision(0.0))
@@ -351,7 +352,7 @@ impl Policy {
         Some(kept)
     }
 
-    /// Nobody knows a way from here: another plan may.
+    /// Requests a new plan, because no move is known to lead to the goal.
     fn hopeless(&self, now: &Rational) -> Decided {
         let reason = self.lost.clone();
         replan(reason.unwrap_or_else(|| Reason::new(Cause::NoOrder).since(now.clone())))

@@ -21,24 +21,24 @@ const SHARES: [i64; 7] = [16, 15, 12, 8, 4, 2, 1];
 /// A reading of each constraint of a plan.
 type Readings<'a> = dyn Fn(&Constraint) -> Reading + 'a;
 
-/// Possible values of [`slack`], the greatest first, in sixteenths.
+/// Possible values of [`slack`] in sixteenths, the greatest first.
 const SLACKS: [i64; 5] = [16, 8, 4, 2, 1];
 
 /// The assumption about the remaining duration of overdue actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Overrun {
-    /// However long.
+    /// Unlimited.
     ForEver,
     /// A quarter of the planned duration.
     Quarter,
-    /// They are taken to end when it suits.
+    /// They are assumed to end at the most favourable time.
     Suitable,
 }
 
-/// Takes up a plan with the most that can be promised of it.
+/// Creates the dispatch of a plan with the strongest promise.
 ///
 /// # Errors
-/// When no times satisfy the plan's constraints.
+/// If no times satisfy the plan's constraints.
 pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason>> {
     let values = mission.plan.nominal();
     let runs = |instance: InstanceId| mission.running.contains_key(&StepId::from(instance));
@@ -55,7 +55,7 @@ pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason
         let reading = |constraint: &Constraint| room.reading(constraint);
         Dispatch::controlled(mission, &reading)
     };
-    // Without an envelope nothing is known of numbers but what the plan says.
+    // Without an envelope, numeric conditions are only known to hold for the planned values.
     let reads_more_than_facts = mission.plan.reads_more_than_facts(&mission.task);
     let knows_room = mission.envelope.is_some() || !reads_more_than_facts;
     most(reads_more_than_facts, knows_room, &mut attempt)
@@ -77,7 +77,7 @@ pub(super) fn lacks_time(reason: &Reason) -> bool {
 /// The remaining plan.
 pub(super) struct Rest<'a> {
     pub(super) mission: &'a Mission,
-    /// The values observed, and for the rest the planned ones.
+    /// The observed values, and planned ones for the rest.
     pub(super) values: &'a Valuation,
     /// `true` if no quantity has left the envelope, including the durations of running actions.
     /// Then the numeric conditions are guaranteed in all of the envelope.
@@ -154,7 +154,7 @@ pub(super) fn weaken(
     Err(Box::new(lost.since(now.clone())))
 }
 
-/// Returns the latest end of a running action with which the remaining plan works if nothing else
+/// Returns the latest end of a running action for which the remaining plan works if nothing else
 /// deviates any more, on the world's clock. `None` if there is none, or no limit. Takes time in
 /// proportion to the plan.
 pub(super) fn bears_until(
@@ -213,7 +213,8 @@ pub(super) fn times_if_faster(
     dispatch.possible_times(now, &reading)
 }
 
-/// The time for which an action has run, on the plan's clock; `None` if it does not run.
+/// Returns the time for which an action has been running, on the plan's clock; `None` if it is not
+/// running.
 fn elapsed(dispatch: &Dispatch, instance: InstanceId, now: &Rational) -> Option<Rational> {
     let [start, end] = dispatch.nodes_of(instance);
     let begun = dispatch.happened(start)?;
@@ -266,13 +267,14 @@ fn slack(
     greatest.unwrap_or_default()
 }
 
-/// When an action that is overdue may end, on the plan's clock, the most that is asked for first.
+/// Returns the assumptions about the end of an overdue action, on the plan's clock, the most
+/// general one first.
 fn ends(rest: &Rest<'_>, overdue: &Overdue, now: &Rational) -> Vec<Until> {
     let plan = &rest.mission.plan;
     if rest.is_inside
         && let Some(envelope) = &rest.mission.envelope
     {
-        // It may be where it has had its share, and is still inside.
+        // The action may have exceeded its share and still be inside the envelope.
         let mut durations = duration_parameters(plan);
         let own = durations.find(|(_, instance)| *instance == overdue.instance);
         let upper = own.and_then(|(parameter, _)| envelope.interval(parameter).upper.value());
@@ -323,12 +325,13 @@ fn most<T, E>(
     attempt(&Rational::ZERO, Overrun::Suitable).map(|done| (done, Promise::Luck))
 }
 
-/// The room that the rest of a plan is tried with.
+/// Assumptions about the durations of the remaining plan.
 struct Room<'a> {
     mission: &'a Mission,
-    /// The box that gives each duration its room. Without one, it is as much again as the planned duration.
+    /// The box with the intervals of the durations. Without one, each duration may deviate by up to
+    /// its planned value.
     envelope: Option<&'a DecoupledEnvelope>,
-    /// The values observed, and the nominal ones of the rest.
+    /// The observed values, and nominal ones for the rest.
     values: &'a Valuation,
     /// The share of the envelope around the planned values; 1 is all of it.
     share: &'a Rational,
@@ -414,7 +417,7 @@ impl Room<'_> {
     }
 }
 
-/// The parameter that a constraint says is a duration or the time of a timed initial.
+/// Returns the parameter if the constraint sets a duration or the time of a timed initial to it.
 fn duration(plan: &ParametrizedPlan, constraint: &Constraint) -> Option<ParameterId> {
     match (&constraint.lower, &constraint.upper) {
         (Bound::Parameter(lower), Bound::Parameter(upper))

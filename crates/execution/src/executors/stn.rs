@@ -81,7 +81,7 @@ fn reads_planned_duration(mission: &Mission) -> bool {
 /// The party that chooses a duration which the domain leaves open.
 #[derive(Clone, Copy, Debug)]
 enum Open {
-    /// The world, as long as the domain allows.
+    /// The world, within the bounds of the domain.
     World,
     /// The executor, which commands the planned duration at the start.
     Planned,

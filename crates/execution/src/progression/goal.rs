@@ -14,7 +14,7 @@ pub(crate) enum Outlook {
     Reached,
     /// The goal will hold at this time, after the last timed initial that affects it.
     Awaited(Rational),
-    /// It will not hold, or that cannot be said.
+    /// The goal will not hold, or cannot be evaluated.
     Unmet,
 }
 
@@ -39,7 +39,7 @@ impl Progression {
         state.is_goal() != Ok(true) && state.holds(self.task.goal(), None) == Ok(true)
     }
 
-    /// The parts of the goal that will not hold in the end, or say nothing.
+    /// Returns the conjuncts of the goal that will not hold at the end, or cannot be evaluated.
     pub(crate) fn unmet_in_the_end(&self) -> Vec<&Condition> {
         let goal = self.task.goal();
         let (_, state) = self.in_the_end();
@@ -48,8 +48,7 @@ impl Progression {
         parts
     }
 
-    /// The state after the last timed initial to come that changes what the goal reads, and when
-    /// that is.
+    /// Returns the state after the last coming timed initial that affects the goal, and its time.
     fn in_the_end(&self) -> (Option<Rational>, Self) {
         let goal = Footprint::of_condition(&self.task, self.task.goal());
         let to_come = self.task.timed().get(self.timed..).unwrap_or(&[]);
@@ -59,7 +58,7 @@ impl Progression {
         let last = last.map(|timed| timed.time.clone());
         let mut state = self.clone();
         if let Some(last) = &last {
-            // What cannot be computed shows as a goal that says nothing.
+            // A value that cannot be computed shows up as a goal that cannot be evaluated.
             let _ = state.advance(last);
         }
         (last, state)

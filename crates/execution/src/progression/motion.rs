@@ -8,14 +8,14 @@ use elbowroom_num::Rational;
 use super::Unreadable;
 use super::polynomial::Polynomial;
 
-/// A continuous effect at work.
+/// An active continuous effect.
 pub(super) struct Rate<'a> {
     pub(super) fluent: FluentId,
     pub(super) per_time: &'a Expression,
     pub(super) duration: Option<&'a Rational>,
 }
 
-/// The values that move, as functions of the time that passes from now on.
+/// Continuously changing values, as functions of the time from now on.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Motion(BTreeMap<FluentId, Polynomial>);
 
@@ -79,7 +79,7 @@ impl Motion {
         }
     }
 
-    /// The values after `elapsed`.
+    /// Returns the values after `elapsed`.
     pub(super) fn after(&self, elapsed: &Rational) -> Vec<(FluentId, Rational)> {
         let moved = self.0.iter();
         moved
@@ -156,7 +156,7 @@ impl Fraction {
         self.plus(&other)
     }
 
-    /// The same, if nothing that moves divides it.
+    /// Returns the fraction as a polynomial, if its denominator is constant.
     fn as_polynomial(&self) -> Result<Polynomial, Unreadable> {
         let divisor = self.denominator.as_constant().ok_or(Unreadable::Quotient)?;
         let factor = divisor.reciprocal().ok_or(Unreadable::DivisionByZero)?;

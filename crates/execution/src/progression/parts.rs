@@ -13,7 +13,7 @@ use crate::event::Ticket;
 /// A [`Progression`] without its task and without the actions of its running instances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parts {
-    /// The moment.
+    /// The present time.
     pub time: Rational,
     /// The time of the last group of happenings.
     pub group: Rational,
@@ -23,7 +23,7 @@ pub struct Parts {
     pub values: Vec<Option<Rational>>,
     /// The truth on arrival of the facts that have changed in that group.
     pub facts_on_arrival: BTreeMap<FactId, bool>,
-    /// The values on arrival, likewise.
+    /// The same for values.
     pub values_on_arrival: BTreeMap<FluentId, Option<Rational>>,
     /// Facts that are in doubt ([`Progression::doubt`]); `facts` has their truth before.
     pub doubtful_facts: BTreeMap<FactId, Vec<Doubt>>,
@@ -35,7 +35,7 @@ pub struct Parts {
     pub running: BTreeMap<Ticket, UnderwayParts>,
 }
 
-/// An [`Underway`], but for its action.
+/// An [`Underway`] without its action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnderwayParts {
     /// The time at which it started.
@@ -44,7 +44,7 @@ pub struct UnderwayParts {
     pub planned: Rational,
     /// The decided guards.
     pub guards: Guards,
-    /// The conjuncts of the over-all condition that have not held at some moment since the start.
+    /// Conjuncts of the over-all condition that have failed at some moment since the start.
     pub broken: BTreeSet<usize>,
 }
 
@@ -139,7 +139,7 @@ impl Guards {
         })
     }
 
-    /// The running action of this action.
+    /// Returns the running action with these guards.
     pub fn running(&self, action: &Action, start: Rational, duration: Interval) -> RunningAction {
         let mut action = action.clone();
         if let Body::Durative(body) = &mut action.body {

@@ -1,4 +1,4 @@
-//! Reading conditions and expressions in a state.
+//! Evaluation of conditions and expressions in a state.
 
 use elbowroom_model::derivation::{Moment, holds};
 use elbowroom_model::ground::{Condition, Expression, FactId, FluentId};
@@ -16,13 +16,13 @@ pub enum Unreadable {
     DoubtfulFact(FactId),
     /// The value of the fluent is in doubt.
     DoubtfulValue(FluentId),
-    /// Something is divided by zero.
+    /// Division by zero.
     DivisionByZero,
-    /// A rate is divided by something that moves.
+    /// A rate of change is divided by a moving value.
     Quotient,
-    /// The rates of change depend on each other in a circle.
+    /// The rates of change depend on each other in a cycle.
     Circular(FluentId),
-    /// A number is left open.
+    /// A quantity is left open.
     Open,
 }
 
@@ -36,7 +36,7 @@ struct Reading<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Now,
-    /// On arrival, before anything of the present group.
+    /// On arrival, before the present group.
     OnArrival,
     /// Now, without assumptions about doubtful facts and values.
     Certain,
@@ -141,7 +141,7 @@ impl Progression {
         self.read(condition, None, Mode::Certain)
     }
 
-    /// The parts of a condition that do not hold, or say nothing.
+    /// Returns the conjuncts of a condition that do not hold, or cannot be evaluated.
     pub fn unmet<'c>(
         &self,
         condition: &'c Condition,
@@ -152,7 +152,7 @@ impl Progression {
         parts
     }
 
-    /// The parts of a condition that did not hold on arrival, or say nothing.
+    /// Returns the conjuncts of a condition that did not hold on arrival, or cannot be evaluated.
     pub fn unmet_on_arrival<'c>(
         &self,
         condition: &'c Condition,
@@ -176,7 +176,7 @@ impl Progression {
     }
 }
 
-/// The value of an expression.
+/// Returns the value of an expression.
 pub(super) fn evaluate<'v>(
     expression: &Expression,
     duration: Option<&Rational>,

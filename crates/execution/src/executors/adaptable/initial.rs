@@ -76,7 +76,7 @@ impl Initial {
         }
     }
 
-    /// From now on the fact is what reports and effects say.
+    /// Marks a fact as observed: only reports and effects determine it from now on.
     fn is_known(&mut self, task: &Task, fact: FactId) {
         self.0.remove(&task.atom(fact));
     }
@@ -153,8 +153,8 @@ mod tests {
             measured: Vec::new(),
         };
         initial.learn(&started, Some(&step.action), &task);
-        // It was here, and from now on its being on the floor is what effects and reports say: in
-        // the state of the beginning, it is.
+        // The start needed `here`. The start effect deletes `floor`, so its probability is no
+        // longer applied, and the initial state has it.
         close(believed(&initial, &task), [1.0, 1.0, 0.3, 0.2]);
         let ended = |ending| News::Ended {
             step: StepId(0),

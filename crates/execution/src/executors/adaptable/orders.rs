@@ -12,7 +12,7 @@ use elbowroom_probability::LayerDispatch;
 #[derive(Clone, Debug, Default)]
 pub struct Orders(Arc<Mutex<Vec<Known>>>);
 
-/// A plan, and where nothing of it has been begun.
+/// A plan, with its search before any step has begun.
 #[derive(Debug)]
 struct Known {
     task: Arc<Task>,
@@ -39,7 +39,7 @@ impl Orders {
         own.map(|known| known.dispatch.clone())
     }
 
-    /// Keeps it.
+    /// Adds a plan.
     pub(super) fn put(
         &self,
         task: &Arc<Task>,

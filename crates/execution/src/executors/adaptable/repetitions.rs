@@ -1,4 +1,4 @@
-//! Actions that succeed in the same state again and again: [`Repetitions`].
+//! Detection of actions that succeed repeatedly in the same state: [`Repetitions`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -31,7 +31,7 @@ pub(super) struct Repetitions {
 }
 
 impl Repetitions {
-    /// The number of successes of an action after a start in this state.
+    /// Returns the number of successes of an action after a start in this state.
     pub(super) fn count(&self, state: &State, running: &[InstanceId], instance: InstanceId) -> u32 {
         let place = place(state, running, instance);
         self.successes.get(&place).copied().unwrap_or(0)

@@ -1,4 +1,4 @@
-//! A plan being executed by its orders, or all that can be done by a table: [`Rest`].
+//! Execution of a plan by its orders, or of a policy table: [`Rest`].
 
 mod numbers;
 
@@ -31,27 +31,29 @@ const MOST_HAPPENINGS: usize = 200_000;
 /// An action is abandoned when the probability of its failures in a row falls below this value.
 const TOO_UNLIKELY: f64 = 1e-6;
 
-/// However unlikely it is to start, it is not tried more often than this in a row: where starts
-/// take no time, neither does trying again.
+/// Maximum number of failures in a row, however unlikely a start is. Retries take no time if starts
+/// take none.
 const MOST_FAILURES: i32 = 1000;
 
 /// Number of failures in a row that are attributed to an unmet condition.
 const MOST_EXPLAINED: i32 = 3;
 
-/// An action that succeeds more often than this at one time, by the same order, does not lead on.
+/// Maximum number of successes of an action at one time with one order. Beyond it, the plan makes
+/// no progress.
 const MOST_AT_ONCE: u32 = 20;
 
-/// An order is executed to its end, and no longer chosen again at each start, when an action has succeeded this often in
-/// the same state.
+/// Number of successes of an action in the same state after which an order is executed to its end
+/// and no longer chosen again at each start.
 const MOST_RECONSIDERED: u32 = 3;
 
-/// An action that succeeds more often than this in the same state does not lead on, and the plan is abandoned.
+/// Maximum number of successes of an action in the same state. Beyond it, the plan makes no
+/// progress and is abandoned.
 const MOST_REPEATED: u32 = 20;
 
 /// Number of times that an action may be cancelled in favour of a likelier order.
 const MOST_LET_GO: u32 = 3;
 
-/// A plan, and how it stands.
+/// State of the execution of a plan.
 #[derive(Clone)]
 pub(super) struct Rest {
     mission: Arc<Mission>,
@@ -66,7 +68,7 @@ pub(super) struct Rest {
     /// Instances that were running when the plan was adopted. Their steps are only the remainder of an action,
     /// with the remaining duration and without start conditions, so they are never started.
     continued: BTreeSet<InstanceId>,
-    /// Starts and ends that have been observed lately, on the plan's clock.
+    /// Recent starts and ends, on the plan's clock.
     recent: Vec<(NodeId, Rational)>,
     /// The happenings that starts and planned ends are separated from, with changes by the world.
     separation: Separation,
@@ -74,10 +76,10 @@ pub(super) struct Rest {
     failures: BTreeMap<InstanceId, i32>,
     /// The time of each instance's latest success, and the number of its successes at that time.
     successes: BTreeMap<InstanceId, (Rational, u32)>,
-    /// The latest event, before which there was still an order.
+    /// The latest event, for the explanation when no order is left.
     latest: Option<Behind>,
     repetitions: Repetitions,
-    /// The happening that was chosen last.
+    /// The last chosen happening.
     chosen: Option<NodeId>,
     /// `true` if an action has ended before the order expected its end.
     is_ahead: bool,
@@ -217,7 +219,7 @@ impl Rest {
                 }
                 failed(step, failures, ending, likelihoods)
             }
-            // Layers are compared with the belief, which has the change already.
+            // Layers are compared with the belief, which already contains the change.
             News::Fact(_) | News::Value(_) => {
                 self.note_change(news, moment);
                 None
@@ -256,7 +258,7 @@ impl Rest {
             .note(change, &(moment.now - &self.mission.origin));
     }
 
-    /// The action that something new is about.
+    /// Returns the action that a news item concerns.
     pub(super) fn action_of(&self, news: &News) -> Option<&Action> {
         let (News::Started { step, .. } | News::Ended { step, .. }) = news else {
             return None;
@@ -265,7 +267,7 @@ impl Rest {
         Some(&self.steps[instance.index()].action)
     }
 
-    /// The news, by name.
+    /// Returns a news item with names instead of numbers.
     fn named(&self, news: &News, belief: &Progression) -> Option<Behind> {
         let action = |step: &StepId| {
             let (instance, _) = self.under_way.get(step)?;
@@ -295,7 +297,7 @@ impl Rest {
         })
     }
 
-    /// An instance's start or end.
+    /// Returns the node of an instance's start or end.
     fn node(&self, instance: InstanceId, is_end: bool) -> NodeId {
         let model = self.chooser.search().model();
         if is_end {
@@ -305,7 +307,7 @@ impl Rest {
         }
     }
 
-    /// Happenings so recent that those which interfere with them have to wait.
+    /// Returns the happenings of the last ε; interfering happenings have to wait.
     fn lately(&mut self, now: &Rational) -> Vec<(NodeId, Rational)> {
         let epsilon = self.mission.task.epsilon();
         self.recent.retain(|(_, time)| time + epsilon > *now);
@@ -317,7 +319,7 @@ impl Rest {
         lately
     }
 
-    /// The decision at this moment.
+    /// Returns the decision at this moment.
     pub(super) fn next(&mut self, moment: &Moment<'_>, initial: &Initial) -> Decided {
         if !self.let_go.is_empty() {
             return wait(None, About::EndOfCancelled);
@@ -327,7 +329,7 @@ impl Rest {
         }
         let now = moment.now - &self.mission.origin;
         if now.is_negative() {
-            // The plan begins ε after whatever happened before it.
+            // The plan begins ε after the last event before it.
             return wait(Some(self.mission.origin.clone()), About::NextStart);
         }
         let state = moment.belief.state();
@@ -353,8 +355,8 @@ impl Rest {
             }
         };
         let mut choice = self.chooser.choose(&circumstances, &mut most);
-        // Behind an action that ended before the order expected it, only layers before its start may fit. It is not
-        // repeated for that.
+        // After an action ends earlier than the order expected, possibly only layers before its
+        // start fit. The action is not repeated for that.
         if let Ok(Choice::Next(next)) = &choice
             && self.is_ahead
             && let Some(instance) = self.starting(next).first()
@@ -381,7 +383,7 @@ impl Rest {
                 choice = self.chooser.choose(&circumstances, &mut most);
             }
         }
-        // An order that counts on other numbers is dropped.
+        // An order that relies on other numbers is dropped.
         if let Ok(Choice::Next(next)) = &choice
             && self.is_lacking_for_good(next, moment, &now)
             && self.chooser.drop_order(next, false)
@@ -412,7 +414,8 @@ impl Rest {
         }
     }
 
-    /// Reason to abandon a plan because an action succeeds repeatedly after a start in the same state.
+    /// Returns the reason to abandon a plan because an action succeeds repeatedly after a start in
+    /// the same state.
     fn is_circling(&self, instance: InstanceId, count: u32, now: &Rational) -> Reason {
         let name = &self.steps[instance.index()].action.name;
         let about =
@@ -421,7 +424,8 @@ impl Rest {
         reason.since(now.clone())
     }
 
-    /// The actions that start if this is next: several if they need each other. Empty for an end or a timed initial.
+    /// Returns the actions that start if this happening is next: several if they need each other.
+    /// Empty for an end or a timed initial.
     fn starting(&self, next: &NextHappening) -> Vec<InstanceId> {
         let nodes = &self.chooser.search().model().plan().nodes;
         let starting = std::iter::once(&next.node).chain(&next.together);
@@ -432,8 +436,8 @@ impl Rest {
         starting.collect()
     }
 
-    /// Stops an action whose end is not worth waiting for; not again and again, which would take no
-    /// time.
+    /// Cancels an action whose end is not worth waiting for. The number of cancellations is
+    /// limited, because they take no time.
     fn let_go(&mut self, instance: InstanceId, now: &Rational) -> Decided {
         let times = self.times_let_go.entry(instance).or_default();
         if *times >= MOST_LET_GO {
@@ -472,7 +476,7 @@ impl Rest {
         ends.min()
     }
 
-    /// A time of the plan by the world's clock.
+    /// Converts a time of the plan to the world's clock.
     fn world(&self, time: &Rational) -> Rational {
         time + &self.mission.origin
     }
@@ -495,7 +499,7 @@ impl Rest {
                 .latest
                 .as_ref()
                 .map(|latest| latest + self.mission.task.epsilon());
-            // What needs it at the same moment is started then.
+            // Starts that need it at the same moment happen then.
             let moment = (!next.together.is_empty()).then(|| next.slot.earliest.clone());
             let until = late.into_iter().chain(moment).filter(|time| time > now);
             let until = until.min();
@@ -538,7 +542,7 @@ impl Rest {
         }
     }
 
-    /// The order to start an action now.
+    /// Returns the order to start an action now.
     fn start(
         &mut self,
         instance: InstanceId,

@@ -1,4 +1,4 @@
-//! The search for a better plan while the present one is executed.
+//! Search for a better plan while the present one is executed.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::InstanceId;

@@ -18,7 +18,7 @@ use crate::preparation::Region;
 use crate::quantities::{expression, places};
 use crate::reason::{Promise, Reason};
 
-/// The box in which the remaining plan is known to work, and the observations compared with it.
+/// The box of the remaining plan, and the observations compared with it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inside {
     /// The box computed for the remaining plan after an observation left the plan's envelope.
@@ -26,7 +26,7 @@ pub(super) struct Inside {
     found: Option<DecoupledEnvelope>,
     /// `true` if a later observation lies outside the box, or is not covered by it.
     has_left: bool,
-    /// The amounts that were observed since.
+    /// Parameters whose amounts were observed since then.
     amounts: BTreeSet<ParameterId>,
     /// The times, on the plan's clock, at which running actions will have reached their longest
     /// durations in the box: by action, and sorted by time.
@@ -35,13 +35,13 @@ pub(super) struct Inside {
 }
 
 impl Inside {
-    /// Something was observed that the box does not hold.
+    /// Records an observation that the box does not cover.
     pub(super) fn leave(&mut self) {
         self.has_left = true;
     }
 
-    /// Takes note of when an action will have taken as long as the envelope has it; `None` if it is over, or has no
-    /// such time.
+    /// Sets the time at which an action reaches its longest duration in the box; `None` if it is
+    /// over, or has no such time.
     fn set_due(&mut self, instance: InstanceId, time: Option<Rational>) {
         if let Some(old) = self.ends.remove(&instance) {
             self.due.remove(&(old, instance));
@@ -52,14 +52,15 @@ impl Inside {
         }
     }
 
-    /// The actions that have taken as long as the envelope has it by this time, on the plan's clock, and since when.
+    /// Returns the actions that have reached their longest durations in the box by this time, on
+    /// the plan's clock, with the times of that.
     fn due_by(&self, local: &Rational) -> impl Iterator<Item = &(Rational, InstanceId)> {
         self.due.iter().take_while(move |(time, _)| time <= local)
     }
 }
 
 impl Rest {
-    /// Begins with a plan, parts of which may be running.
+    /// Begins with a plan, which may have running actions.
     pub(super) fn begin(&mut self, region: &mut dyn Region) {
         self.await_running();
         let now = self.mission.now.clone();
@@ -68,18 +69,18 @@ impl Rest {
         }
     }
 
-    /// Returns the box in which the remaining plan is known to work, if there is one.
+    /// Returns the box of values for which the remaining plan is known to work, if there is one.
     fn known(&self) -> Option<&DecoupledEnvelope> {
         let found = self.inside.found.as_ref();
         found.or(self.mission.envelope.as_ref())
     }
 
-    /// Returns `true` if there is a box in which the remaining plan is known to work.
+    /// Returns `true` if there is a box of values for which the remaining plan is known to work.
     pub(super) fn is_known(&self) -> bool {
         self.known().is_some()
     }
 
-    /// From now on this box is what the rest of the plan is known to work in.
+    /// Replaces the box of the remaining plan.
     pub(super) fn enter(&mut self, found: DecoupledEnvelope) {
         self.inside = Inside {
             found: Some(found),
@@ -97,7 +98,8 @@ impl Rest {
         }
     }
 
-    /// An action has started or ended: how long it takes, or may take within the envelope.
+    /// Records the duration of an action that has ended, or the longest duration in the box of one
+    /// that has started.
     pub(super) fn observe_duration(&mut self, instance: InstanceId) {
         let [start, end] = self.dispatch.nodes_of(instance);
         let Some(start) = self.dispatch.happened(start).cloned() else {
@@ -111,7 +113,7 @@ impl Rest {
             return;
         };
         let interval = self.known().map(|known| known.interval(parameter));
-        // What ends just before an open end is as good as what ends there: neither is let be over it.
+        // An open end counts like a closed one: in neither case is the action allowed to exceed it.
         let most = interval.and_then(|interval| match &interval.upper {
             End::Closed(most) | End::Open(most) => Some(most),
             End::Infinite => None,
@@ -128,7 +130,7 @@ impl Rest {
         }
     }
 
-    /// An amount was measured that says the value of one parameter.
+    /// Records a measured amount that determines the value of one parameter.
     pub(super) fn observe_amount(&mut self, parameter: ParameterId, value: &Rational) {
         let interval = self.known().map(|known| known.interval(parameter));
         let is_held = interval.is_some_and(|interval| interval.contains(value));
@@ -137,8 +139,8 @@ impl Rest {
         self.inside.has_left |= !is_held || !is_new && self.values[parameter] != *value;
     }
 
-    /// Amounts were measured while it was not known yet how long their actions take: those that depend on it are not
-    /// what the envelope is about.
+    /// Records start amounts that were measured before the durations of their actions were known.
+    /// The envelope does not cover amounts that depend on durations.
     pub(super) fn observe_early_amounts(&mut self, moment: &Moment<'_>) {
         let depends = places(moment.news).any(|place| {
             !place.is_end && self.depends_on_duration(place.instance, place.amount.measured.fluent)
@@ -214,7 +216,7 @@ impl Rest {
         if then < *now || !was_covered {
             let reason = self.ask(instance, now, region);
             if was_covered && reason.is_some() {
-                // It worked then: there is a limit between.
+                // The plan worked with the earlier end, so there is a limit in between.
                 self.find_limit(instance, &then, region);
                 return reason.filter(|_| self.outlived(now).is_none());
             }

@@ -80,7 +80,7 @@ impl Rest {
         })
     }
 
-    /// Has what waits wake up when an action reaches its limit.
+    /// Ends a wait when an action reaches its limit.
     pub(super) fn waking(&self, decided: Decided) -> Decided {
         let Decision::Wait { until } = &decided.decision else {
             return decided;

@@ -1,8 +1,8 @@
-//! Plans that are made again after durations have broken them.
+//! Repeated adoption of the same plan after its durations were violated.
 //!
-//! The planner answers with the same plan in the same state, however often the world's durations have broken it. Where
-//! they deviate in the same way each time, its guarantee is of no use: every other attempt after the second is executed
-//! by the plan's orderings, without a guarantee.
+//! In the same state the planner returns the same plan, however often the world's durations have
+//! violated it. If they deviate in the same way each time, its guarantee is useless. So every other
+//! attempt after the second is executed by the plan's orderings, without a guarantee.
 
 use std::collections::BTreeMap;
 
@@ -15,10 +15,10 @@ use crate::executor::{Mission, News, StepId};
 use crate::preparation::Region;
 use crate::reason::Reason;
 
-/// The number of attempts with a guarantee before the first one without.
+/// Number of attempts with a guarantee before the first one without.
 const GUARANTEED: usize = 2;
 
-/// The attempts in a row to execute the same plan.
+/// Consecutive attempts to execute the same plan.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Repetition {
     /// The present plan, with times from its beginning.
@@ -32,7 +32,7 @@ pub(super) struct Repetition {
 }
 
 impl Repetition {
-    /// A plan is adopted.
+    /// Records the adoption of a plan.
     pub(super) fn note_adopted(&mut self, plan: &TimeTriggeredPlan) {
         if !self.is_over || self.plan != *plan {
             *self = Self {
@@ -44,12 +44,13 @@ impl Repetition {
         self.is_untimely = false;
     }
 
-    /// An action has ended earlier or later than planned. Others may fail for that reason.
+    /// Records that an action has ended earlier or later than planned. Other actions may fail for
+    /// that reason.
     pub(super) fn note_untimely_end(&mut self) {
         self.is_untimely = true;
     }
 
-    /// The present plan is abandoned.
+    /// Records that the present plan is abandoned.
     pub(super) fn note_abandoned(&mut self, reason: &Reason) {
         if !self.is_over && (self.is_untimely || promise::lacks_time(reason)) {
             self.abandoned += 1;

@@ -1,4 +1,5 @@
-//! The moves of `policy`: when they are weighed, what the plan's is worth, and which is the best.
+//! The moves of `policy`: the times of evaluation, the value of the plan's decision, and the best
+//! move.
 
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use crate::progression::Progression;
 use crate::reason::{About, Cause, Reason};
 
 impl Policy {
-    /// Returns the period in which moves are evaluated: the present one, if it has just begun.
+    /// Returns the period for the next evaluation of moves: the present one, if it has just begun.
     pub(super) fn turn(&self, now: &Rational, period: &Rational) -> Turn {
         let number = count(&(now / period).floor());
         let is_over = now - begins(number, period) > slack(period);
@@ -95,7 +96,7 @@ impl Policy {
         }
     }
 
-    /// The best move.
+    /// Returns the decision for the best move.
     pub(super) fn best(
         &mut self,
         moment: &Moment<'_>,
@@ -104,7 +105,7 @@ impl Policy {
         length: &Rational,
     ) -> Decided {
         let now = moment.now;
-        // What should be over may be a moment late, because it was begun a moment late.
+        // An overdue action may be slightly late because it was started slightly late.
         let late = begins(period, length) + slack(length) / Rational::from(2);
         if weighed.is_overdue && *now < late {
             return wait(Some(late), About::EndOfRunning);
@@ -175,7 +176,7 @@ impl Policy {
     }
 }
 
-/// When a period begins.
+/// Returns the beginning of a period.
 pub(super) fn begins(period: usize, length: &Rational) -> Rational {
     length * &Rational::from(i64::try_from(period).unwrap_or(i64::MAX))
 }

@@ -1,4 +1,4 @@
-//! `policy` where there is no table: what to do with a plan is tried out at each occasion.
+//! `policy` without a table: the possible choices are compared by rollouts.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,8 +17,8 @@ use crate::rehearsal::{Rehearsal, Rehearsing, Scene, SeenChange};
 
 use super::moves::wait;
 
-/// The greatest number of consecutive hand-overs of an abandoned plan without any action that succeeds in between. Then
-/// a new plan is requested, and the number of new plans is limited.
+/// Maximum number of hand-overs of an abandoned plan without a successful action in between. Beyond
+/// it, a new plan is requested, and the number of new plans is limited.
 const MOST_HAND_OVERS: usize = 10;
 
 /// Number of rehearsals within the duration of a plan if nothing happens.
@@ -33,18 +33,18 @@ pub(super) struct Rehearsed {
     rehearsal: Box<dyn Rehearsal>,
     /// `live`, which adopts each new plan.
     keeper: Box<dyn Executor>,
-    /// The executor to which the plan was handed over.
+    /// The executor that has taken over the plan.
     other: Option<Box<dyn Executor>>,
     /// Steps that have not ended, by the run's number: commanded ones, and those that were running
     /// when the plan was adopted.
     steps: BTreeMap<StepId, Commanded>,
-    /// The run's next number.
+    /// The next step number of the run.
     next_step: u32,
-    /// The steps of the plan that were not begun, by the world's clock.
+    /// The steps of the plan that have not begun, on the world's clock.
     left: Vec<Step>,
     /// The number of hand-overs of an abandoned plan since an action last succeeded.
     hand_overs: usize,
-    /// The facts that may change by themselves, as they were last.
+    /// The watched facts with their last truth.
     watched: Option<BTreeMap<FactId, bool>>,
     seen: Vec<SeenChange>,
     /// Number of plans adopted.
@@ -59,12 +59,12 @@ pub(super) struct Rehearsed {
     /// no action was running, or found no need for alternatives, and nothing has been learnt about
     /// the world since.
     is_settled: bool,
-    /// When it was tried out last, and after how long to do so again.
+    /// The time of the last rehearsal, and the time between rehearsals.
     looked: Option<Rational>,
     period: Rational,
 }
 
-/// A step.
+/// A step that has not ended.
 #[derive(Clone, Debug)]
 struct Commanded {
     /// The step number of the present executor; `None` if that executor does not know the step.
@@ -75,7 +75,7 @@ struct Commanded {
     /// The plan's step, which is repeated if it fails; `None` if it was running when the plan was
     /// adopted.
     step: Option<Step>,
-    /// When it has started.
+    /// The time of its start.
     started: Option<Rational>,
     is_let_go: bool,
 }
@@ -142,7 +142,7 @@ impl Rehearsed {
             step.map(|step| self.rehearsal.tells(&step.name))
         };
         match news {
-            // When it starts is up to chance as well where its end is.
+            // If the time of the end is random, so is the time of the start.
             News::Started { step, .. } => of(step).is_none_or(|tells| tells.by_lasting),
             News::Ended { step, ending, .. } => {
                 *ending != Ending::Succeeded || of(step).is_none_or(|tells| tells.by_ending)
@@ -185,7 +185,7 @@ impl Rehearsed {
         }
     }
 
-    /// Takes note of changes of the facts that are watched.
+    /// Records changes of the watched facts.
     fn watch(&mut self, moment: &Moment<'_>) {
         let task = moment.belief.task();
         let rehearsal = &self.rehearsal;
