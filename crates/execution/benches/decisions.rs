@@ -41,7 +41,7 @@ const DOMAIN: &str = "(define (domain rooms) (:requirements :typing :durative-ac
     :effect (and (at start (not (at ?r ?a))) (at end (at ?r ?b)) (at end (visited ?r ?b)))))";
 
 fn main() {
-    // As the harness of tests does: only those whose name contains the words are run.
+    // As in the test harness, words are filters on the names.
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<_> = words.iter().filter(|word| !word.starts_with('-')).collect();
     println!(

@@ -17,7 +17,7 @@ use robots::{Events, mission, ready};
 const MOST_EVENTS: usize = 20_000;
 
 fn main() {
-    // As the harness of tests does: only those whose name contains the words are run.
+    // As in the test harness, words are filters on the names.
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<_> = words.iter().filter(|word| !word.starts_with('-')).collect();
     println!("| executor | time points | adopting | median | p99 | worst |");

@@ -66,8 +66,9 @@ pub trait Executor: Send {
     /// [`Decision::Wait`]. Each news item is passed only once.
     fn decide(&mut self, moment: &Moment<'_>) -> Decided;
 
-    /// Returns whether the plan for which it last requested another one ([`Decision::Replan`]) has a fair chance to work,
-    /// so that it is better to [carry on](Executor::carry_on) than to cancel overdue actions.
+    /// Returns `true` if the plan that it last abandoned ([`Decision::Replan`]) has a fair chance
+    /// to work, so that it is better to [carry on](Executor::carry_on) than to cancel overdue
+    /// actions.
     fn may_carry_on(&self) -> bool {
         false
     }
@@ -78,13 +79,14 @@ pub trait Executor: Send {
         false
     }
 
-    /// Returns whether a better plan is to be searched for while the present one is executed. Asked before each wait;
-    /// the answer is `true` once for each loss of guarantee, and after each end without any guarantee.
+    /// Returns `true` if a better plan is to be searched for while the present one is executed.
+    /// Called before each wait. The answer is `true` once for each loss of guarantee, and after
+    /// each end without any guarantee.
     fn seeks_better_plan(&mut self, _now: &Rational) -> bool {
         false
     }
 
-    /// Returns whether this plan is better than the rest of the present one.
+    /// Returns `true` if this plan is better than the rest of the present one.
     fn prefers(&self, _mission: &Mission, _now: &Rational) -> bool {
         false
     }
@@ -108,7 +110,7 @@ pub trait Executor: Send {
     }
 }
 
-/// `true` if runs may use a real clock. In the WebAssembly module for browsers it is `false`, which
+/// `true` if runs may use a real clock. In the module for browsers it is `false`, which
 /// keeps the module small: plans are not made in the background there, and the slack of running
 /// actions is not monitored.
 pub(crate) const CAN_HAVE_A_CLOCK: bool = !cfg!(target_family = "wasm");

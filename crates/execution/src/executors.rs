@@ -60,7 +60,7 @@ pub struct Registered {
     pub is_optional: bool,
     /// A summary, in one sentence.
     pub summary: &'static str,
-    /// The paper that describes it.
+    /// The paper on which it is based.
     pub paper: &'static str,
     /// The form of a plan that it requires.
     pub need: Need,

@@ -13,7 +13,7 @@
 //! | --- | --- |
 //! | a second `Started` or an equal second `Ended` | ignored |
 //! | `Ended` without `Started` | the action is assumed to have started when it was commanded |
-//! | `Ended` after another, different `Ended` | a contradiction: the facts and fluents written by the action's end count as unknown until they are observed, and the plan is abandoned |
+//! | `Ended` after another, different `Ended` | a contradiction: the effects of the action's end are in doubt until they are observed, and the plan is abandoned |
 //! | a report on a ticket that was never issued | ignored |
 //! | a report on an action of an earlier plan | updates the state; the executor is notified of the changes |
 //! | a success after a cancellation | the success counts: the action ended before the cancellation |
@@ -141,7 +141,7 @@ use pending::Pending;
 use progress::Progress;
 use search::{Lost, Search};
 
-/// Work that is counted for a decision, and for each step of the plan in it, in units of [`elbowroom_num::work`].
+/// Work units ([`elbowroom_num::work`]) of a decision, and of each step of the plan in it.
 const DECISION_WORK: u64 = 10_000;
 const STEP_WORK: u64 = 250;
 
@@ -153,7 +153,7 @@ pub struct Ports<'a> {
     pub recorder: Box<dyn Recorder + 'a>,
 }
 
-/// A plan being executed.
+/// Execution of a plan.
 pub struct Run<'a> {
     task: Arc<Task>,
     ports: Ports<'a>,
@@ -161,7 +161,7 @@ pub struct Run<'a> {
     now: Rational,
     progress: Progress,
     belief: Progression,
-    /// The actions that were started, and how they ended.
+    /// The starts, and their outcomes.
     account: Account,
     /// Number of steps of the present plan.
     steps: usize,
@@ -170,16 +170,15 @@ pub struct Run<'a> {
     reasons: Vec<Reason>,
     /// The expected planning time.
     allowance: Rational,
-    /// The task with its goals, the situation and the guess of the last request that was answered by a plan while the
-    /// run waited.
+    /// The task with its goals, the situation and the guess of the last awaited request whose
+    /// answer was a plan.
     planned_for: Option<(Arc<Task>, Situation, here::Guess)>,
-    /// All that was observed and believed, in order.
+    /// All believed observations, in order.
     history: Vec<Happened>,
-    /// Asked whether to end.
+    /// Returns `true` if the run is to end.
     is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
-    /// The situation in which a plan will be needed if a late action does not end, as reported to
-    /// the planner.
+    /// The situation of the next plan if a late action does not end, as reported to the planner.
     foreseen: Option<Foreseen>,
     /// The belief before the first event of the history.
     beginning: Progression,
@@ -187,19 +186,19 @@ pub struct Run<'a> {
     listener: Box<dyn FnMut(&Progression) + Send + 'a>,
     /// State of an executive, or of an attended run.
     lasting: Option<Lasting<'a>>,
-    /// The tasks before the executor is asked again; the next one is last.
+    /// The tasks before the next decision; the last one is next.
     agenda: Vec<Todo>,
-    /// The question that has not been answered.
+    /// The open question to the driver.
     asked: Option<Next>,
     /// Requests for the driver without an awaited answer.
     outbox: VecDeque<Next>,
     /// Number of requests for plans and prepared plans so far.
     requests: u64,
-    /// Continuation at the answer for which the run waits.
+    /// Continuation of the run when the awaited answer arrives.
     pending: Option<Pending>,
-    /// The plan that is made beside the run.
+    /// The background search for a plan.
     search: Option<Search>,
-    /// The task with the goals that the present plan is for, while plans are made beside the run.
+    /// The task with the goals of the present plan, with background planning.
     plan_task: Option<Arc<Task>>,
     /// Results of earlier background searches.
     lost: Lost,
@@ -219,10 +218,10 @@ enum Stop {
     World(WorldError),
 }
 
-/// Executes a plan in a world, or, without a plan, first makes one.
+/// Executes a plan in a world. Without a plan, makes one first.
 ///
-/// Always returns if the ports do: the run has an end ([`RunSettings::time_limit`]), and a world
-/// whose clock does not come forward to it is broken ([`Verdict::WorldFailed`]).
+/// Always returns if the ports do: the run has a time limit ([`RunSettings::time_limit`]), and a
+/// world whose clock does not reach it is broken ([`Verdict::WorldFailed`]).
 pub fn run(
     task: Arc<Task>,
     first: Option<&TimeTriggeredPlan>,
@@ -235,7 +234,7 @@ pub fn run(
 }
 
 impl<'a> Run<'a> {
-    /// A run that has not begun, of this plan; without one, a plan is made first.
+    /// Creates a run of this plan; without one, the run makes a plan first.
     pub fn new(
         task: Arc<Task>,
         first: Option<TimeTriggeredPlan>,
@@ -326,7 +325,7 @@ impl<'a> Run<'a> {
         decided
     }
 
-    /// One decision; what follows from it goes onto the agenda.
+    /// Makes a decision, and adds its consequences to the agenda.
     fn decide_and_follow(&mut self) -> Result<(), Stop> {
         self.heed()?;
         self.close_momentary_goals();
@@ -396,7 +395,8 @@ impl<'a> Run<'a> {
         self.send(commands);
     }
 
-    /// The same for actions that are cancelled.
+    /// Records the cancellation of actions. The world receives the commands before anything else is
+    /// done.
     pub(crate) fn cancel(&mut self, tickets: Vec<Ticket>) {
         let mut commands = Vec::with_capacity(tickets.len());
         for ticket in tickets {
@@ -423,7 +423,7 @@ impl<'a> Run<'a> {
     /// Waits until the executor's next decision time, or until a warning or a time-out is due.
     fn wait(&mut self, until: Option<Rational>) -> Result<(), Stop> {
         let timeout = self.next_timeout();
-        // More of what happens now may still come in; if not, some condition has failed.
+        // More reports on the present moment may arrive; if none do, a condition has failed.
         let breaking = self.belief.is_breaking();
         let breaking = breaking.then(|| &self.now + self.task.epsilon());
         let warning = self.warn();
@@ -440,7 +440,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// The executor takes the goal for reached. The world may look; then it is, or it is not.
+    /// Asks the world to look at the goal, which the executor considers reached. The answer decides
+    /// whether it is.
     fn goal_reached(&mut self) {
         let task = self.belief.task();
         let mut footprint = Footprint::of_condition(task, task.goal());
@@ -487,7 +488,7 @@ impl<'a> Run<'a> {
 
     /// Requests a plan from the present situation; see [`RunningRule`] for the running actions.
     fn replan(&mut self, reason: &Reason) -> Result<(), Stop> {
-        // What deviated may have been the last thing to do.
+        // The deviation may have been the end of the last step.
         if self.go_without_plan(reason) || self.has_patience(reason) {
             return Ok(());
         }
@@ -500,7 +501,7 @@ impl<'a> Run<'a> {
                 if overdue.is_empty() || self.settings.most_replans == 0 {
                     return self.carry_on_or_stop(Verdict::ReplanLimit);
                 }
-                // Their ends may reach the goal.
+                // Their ends may achieve the goal.
                 self.reasons.pop();
                 self.agenda.push(Todo::Replan(reason.clone()));
                 let doubts = self.belief.doubt_count();
@@ -511,7 +512,7 @@ impl<'a> Run<'a> {
         self.lost.plan = true;
         self.agenda.push(Todo::Plan(reason.clone()));
         if self.replans == self.settings.most_replans {
-            // The last plan is not spent on expecting overdue actions to take longer still.
+            // The last permitted plan is not requested while overdue actions are running.
             let overdue = self.longer_than_planned();
             let doubts = self.belief.doubt_count();
             self.agenda.push(Todo::Linger(overdue, doubts));

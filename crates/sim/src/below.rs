@@ -18,8 +18,8 @@ pub enum Side {
 }
 
 impl Distribution {
-    /// P(a drawn number < `value`), before it is cut, scaled and rounded; `None` for a gamma
-    /// distribution, for which this is not known in closed form.
+    /// Returns P(a drawn number < `value`), before it is clamped, scaled and rounded; `None` for a
+    /// gamma distribution, which has no closed form.
     pub fn below(&self, value: f64) -> Option<f64> {
         let step = |at: f64| f64::from(u8::from(at < value));
         Some(match self {
@@ -69,7 +69,7 @@ impl Distribution {
     }
 }
 
-/// Φ.
+/// Returns Φ(`value`).
 fn standard_normal_below(value: f64) -> f64 {
     0.5 * libm::erfc(-value / std::f64::consts::SQRT_2)
 }
@@ -145,7 +145,7 @@ mod tests {
     use crate::draw::{Distribution, Purpose, keyed};
     use crate::model::Rule;
 
-    /// Each distribution, drawn often, is as often below as it says.
+    /// For each distribution, the frequencies of draws match the probabilities.
     #[test]
     fn shares_are_those_of_what_is_drawn() {
         let distributions = [

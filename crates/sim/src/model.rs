@@ -15,17 +15,17 @@ use crate::pattern::ActionPattern;
 pub use hazard::Hazard;
 pub use outcome::{Becoming, Outcome, OutcomeChange, Template};
 
-/// A world, before it has a seed.
+/// A world without a seed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorldModel {
     /// Times and amounts are multiples of this.
     pub resolution: Rational,
-    /// The durations of actions. The last rule that matches counts; without any, as long as
-    /// planned.
+    /// The durations of actions. The last rule that matches counts; without a rule, the planned
+    /// duration.
     pub durations: Vec<(ActionPattern, Rule)>,
     /// Delays between the commands and the starts of actions; without a rule, 0.
     pub delays: Vec<(ActionPattern, Rule)>,
-    /// By how much actions change fluents; without a rule, as the domain says.
+    /// The amounts of numeric effects; without a rule, those of the domain.
     pub amounts: Vec<Amount>,
     /// Failure probabilities of actions; without a rule, 0.
     pub failures: Vec<Failing>,
@@ -37,20 +37,20 @@ pub struct WorldModel {
     pub reports: Reports,
 }
 
-/// A distribution, cut and scaled.
+/// A distribution, clamped and scaled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
     /// The distribution of the quantity.
     pub distribution: Distribution,
-    /// Lower amounts become this.
+    /// Lower values are replaced by this one.
     pub minimum: Option<f64>,
-    /// Higher amounts become this.
+    /// Greater values are replaced by this one.
     pub maximum: Option<f64>,
     /// `true` if it is a multiple of the planned value, rather than the value itself.
     pub is_relative: bool,
 }
 
-/// By how much an action changes a fluent.
+/// The amount of an action's effect on a fluent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Amount {
     /// The actions.
@@ -84,13 +84,13 @@ pub struct Failing {
 pub enum Failure {
     /// It does not start at all.
     AtStart,
-    /// At a moment of its duration, all alike.
+    /// At a uniformly distributed time in its duration.
     Midway,
-    /// When it would have ended.
+    /// At the time of its end.
     AtEnd,
 }
 
-/// Something that happens by itself.
+/// An exogenous event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exogenous {
     /// The time.
@@ -104,7 +104,7 @@ pub struct Exogenous {
     pub is_reported: bool,
 }
 
-/// A change that no action causes.
+/// The change by an exogenous event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ExogenousChange {
     /// The fact, `(predicate object …)`, becomes true or false.
@@ -116,15 +116,15 @@ pub enum ExogenousChange {
 /// The reliability of the world's reports. Each probability is that of a single report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reports {
-    /// It never comes.
+    /// It never arrives.
     pub lost: f64,
-    /// It comes twice.
+    /// It arrives twice.
     pub duplicated: f64,
-    /// It comes late.
+    /// It arrives late.
     pub late: f64,
     /// The distribution of the delay.
     pub lateness: Rule,
-    /// Before or after it comes one that says the opposite.
+    /// A contradicting report is sent as well.
     pub contradicted: f64,
 }
 
@@ -157,22 +157,23 @@ impl WorldModel {
         text::read(&source.into(), problem).map_err(Diagnostics::from)
     }
 
-    /// The duration of an action whose planned duration is `planned`.
+    /// Draws the duration of an action with the planned duration `planned`.
     pub fn duration(&self, action: &str, planned: &Rational, rng: &mut impl Rng) -> Rational {
         let duration = match last(&self.durations, action) {
             Some(rule) => rule.draw(planned, &self.resolution, rng),
             None => planned.clone(),
         };
-        // An action that is planned to take time takes some.
+        // A planned duration that is positive stays positive.
         duration.max(planned.min(&self.resolution).clone())
     }
 
-    /// The rule for how long an action takes; `None`: as long as planned.
+    /// Returns the rule for the duration of an action; `None` for the planned duration.
     pub fn duration_rule(&self, action: &str) -> Option<&Rule> {
         last(&self.durations, action)
     }
 
-    /// The rule for how long after its command an action starts; `None`: at once.
+    /// Returns the rule for the delay between the command and the start of an action; `None` for no
+    /// delay.
     pub fn delay_rule(&self, action: &str) -> Option<&Rule> {
         last(&self.delays, action)
     }
@@ -214,7 +215,7 @@ impl Rule {
         matches!(self.distribution, Distribution::Constant(_))
     }
 
-    /// A value, when the planned one is `planned`.
+    /// Draws a value, if the planned one is `planned`.
     pub fn draw(&self, planned: &Rational, resolution: &Rational, rng: &mut impl Rng) -> Rational {
         let mut value = self.distribution.draw(rng);
         if let Some(minimum) = self.minimum {
@@ -252,7 +253,7 @@ impl Rule {
 }
 
 impl From<Distribution> for Rule {
-    /// Neither cut nor scaled.
+    /// Creates a rule without limits and scaling.
     fn from(distribution: Distribution) -> Self {
         Self {
             distribution,
@@ -264,7 +265,7 @@ impl From<Distribution> for Rule {
 }
 
 impl Default for Reports {
-    /// Every report comes at once, once, and is true.
+    /// Perfect reports: each arrives at once, once, and is true.
     fn default() -> Self {
         Self {
             lost: 0.0,

@@ -11,7 +11,7 @@ use crate::sim::SimWorld;
 
 /// Decides when running actions end.
 pub trait Pace: Send {
-    /// An action has started.
+    /// Called when an action has started.
     fn begun(&mut self, now: &Rational, begun: &Begun<'_>);
 
     /// Called when an action has ended: because of [`ends_now`](Self::ends_now), by a failure, or
@@ -22,7 +22,7 @@ pub trait Pace: Send {
     /// [look](Self::next_look).
     fn ends_now(&mut self, now: &Rational) -> Vec<Ticket>;
 
-    /// When to ask again if nothing happens before; later than `now`.
+    /// Returns the time of the next look if no event comes before; later than `now`.
     fn next_look(&self, now: &Rational) -> Option<Rational>;
 }
 
@@ -35,16 +35,16 @@ pub struct Begun<'a> {
     pub action: &'a Action,
     /// Number of earlier commands to start an action of that name.
     pub occurrence: u64,
-    /// The planned duration; `None` if it takes no time.
+    /// The planned duration; `None` if it is instantaneous.
     pub planned: Option<&'a Rational>,
     /// `true` if it ends when the [`Pace`] says; if `false`, it is instantaneous or is going to
     /// fail.
     pub is_open: bool,
 }
 
-/// A simulated world whose actions take as long as a [`Pace`] says.
+/// A simulated world whose action durations are decided by a [`Pace`].
 ///
-/// All else is the world's: conditions, failures, delays, reports.
+/// The world decides everything else: conditions, failures, delays, reports.
 #[derive(Debug)]
 pub struct Paced<'a, P> {
     world: SimWorld<'a>,
@@ -63,7 +63,7 @@ struct Ordered {
 }
 
 impl<'a, P: Pace> Paced<'a, P> {
-    /// That world at that pace.
+    /// Combines a world and a pace.
     pub fn new(world: SimWorld<'a>, pace: P) -> Self {
         Self {
             world,
@@ -74,12 +74,12 @@ impl<'a, P: Pace> Paced<'a, P> {
         }
     }
 
-    /// The world.
+    /// Returns the world.
     pub fn world(&self) -> &SimWorld<'a> {
         &self.world
     }
 
-    /// Its pace.
+    /// Returns the pace.
     pub fn pace(&self) -> &P {
         &self.pace
     }
@@ -132,7 +132,7 @@ impl<P: Pace> World for Paced<'_, P> {
         *count += 1;
         self.ordered.insert(*ticket, ordered);
         self.world.command(now, command)?;
-        // Before time passes: it might have been planned to take none.
+        // Before time passes, because the planned duration may be 0.
         if self.world.hold(*ticket) {
             self.begin(*ticket, now, true);
         }
@@ -167,15 +167,15 @@ impl<P: Pace> World for Paced<'_, P> {
 /// A pace with durations that are fixed in advance, for each start of an action.
 #[derive(Clone, Debug, Default)]
 pub struct Durations {
-    /// For each action's name, how long it takes the first time, the second time, …
+    /// For each action's name, its durations in order of its starts.
     durations: BTreeMap<String, Vec<Rational>>,
     /// The end of each running action.
     ends: BTreeMap<Ticket, Rational>,
 }
 
 impl Durations {
-    /// For each action's name, how long it takes the first time, the second time, …; after
-    /// that, as long as planned.
+    /// Creates a pace. `durations` has, for each action's name, its durations in order of its
+    /// starts; further starts take the planned duration.
     pub fn new(durations: BTreeMap<String, Vec<Rational>>) -> Self {
         let ends = BTreeMap::new();
         Self { durations, ends }

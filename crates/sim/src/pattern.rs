@@ -7,14 +7,14 @@ use elbowroom_model::Problem;
 /// `*`, a name, or `(name object _ …)`; `_` matches any object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ActionPattern {
-    /// `None`: any.
+    /// `None` matches any name.
     name: Option<String>,
-    /// `None`: any arguments at all.
+    /// `None` matches any arguments.
     arguments: Option<Vec<Option<String>>>,
 }
 
 impl fmt::Display for ActionPattern {
-    /// As it is written.
+    /// Writes the pattern in the syntax of world files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = self.name.as_deref().unwrap_or("*");
         let Some(arguments) = &self.arguments else {
@@ -80,7 +80,7 @@ impl ActionPattern {
         })
     }
 
-    /// The name; `None`: any.
+    /// Returns the name; `None` if it matches any name.
     pub(crate) fn name(&self) -> Option<&str> {
         self.name.as_deref()
     }

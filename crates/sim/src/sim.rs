@@ -39,15 +39,15 @@ pub struct SimWorld<'a> {
     now: Rational,
     /// The coming happenings, by time and then in the order of their insertion.
     agenda: BTreeMap<(Rational, u64), Coming>,
-    /// The number of things put on the agenda.
+    /// Number of entries put on the agenda so far.
     decided: u64,
-    /// The happenings that have not been reported.
+    /// Observations that have not been reported.
     untold: Vec<Observation>,
     /// Number of starts, by action.
     occurrences: BTreeMap<String, u64>,
-    /// The actions that were started, until they have ended.
+    /// Commanded actions that have not ended.
     actions: BTreeMap<Ticket, Commanded<'a>>,
-    /// The facts that change by themselves at a rate.
+    /// Spontaneous changes at a rate.
     chances: Vec<Chance>,
 }
 
@@ -74,7 +74,7 @@ enum Coming {
 }
 
 impl<'a> SimWorld<'a> {
-    /// The world of that seed, at time 0.
+    /// Creates the world of that seed, at time 0.
     pub fn new(task: Arc<Task>, model: &'a WorldModel, seed: u64) -> Self {
         let mut world = Self::empty(Progression::new(task), model, seed);
         for (index, exogenous) in model.exogenous.iter().enumerate() {
@@ -94,7 +94,7 @@ impl<'a> SimWorld<'a> {
         world
     }
 
-    /// In which nothing is to happen.
+    /// Creates a world without coming events.
     fn empty(truth: Progression, model: &'a WorldModel, seed: u64) -> Self {
         Self {
             truth,
@@ -110,7 +110,7 @@ impl<'a> SimWorld<'a> {
         }
     }
 
-    /// The true state.
+    /// Returns the true state.
     pub fn truth(&self) -> &Progression {
         &self.truth
     }
@@ -135,7 +135,7 @@ impl<'a> SimWorld<'a> {
             if is_told(self) || self.now >= *until {
                 return;
             }
-            // Nothing more happens at this moment.
+            // All happenings of this moment have been processed.
             while let Some((ticket, why)) = self.first_broken() {
                 self.fail(ticket, &why);
             }
@@ -148,13 +148,13 @@ impl<'a> SimWorld<'a> {
             let next = next.chain([until]).min().unwrap_or(until).clone();
             let broken = self.truth.next_break(&next, &self.model.resolution);
             let next = broken.into_iter().chain([next]).min().unwrap_or_default();
-            // A fluent without a value that should move stays without.
+            // A moving fluent without a value does not get one.
             let _ = self.truth.advance(&next);
             self.now = next;
         }
     }
 
-    /// All that is due by now happens.
+    /// Processes all happenings that are due by now.
     fn happen_now(&mut self) {
         let _ = self.truth.advance(&self.now);
         while let Some(entry) = self.agenda.first_entry() {
@@ -172,7 +172,8 @@ impl<'a> SimWorld<'a> {
         }
     }
 
-    /// An action whose over-all condition has failed, or fails from now on.
+    /// Returns an action whose over-all condition has failed, or fails from now on, with the
+    /// reason.
     fn first_broken(&self) -> Option<(Ticket, String)> {
         if let Some((ticket, underway)) = self.truth.broken() {
             return Some((ticket, self.no_longer(&underway.broken_parts())));
@@ -303,8 +304,8 @@ impl<'a> SimWorld<'a> {
         }
     }
 
-    /// The amounts that the world file has for a happening; the others are the domain's. `?duration` is
-    /// the planned duration at the start, and the real one at the end.
+    /// Draws the amounts that the world file has for a happening; the others are the domain's.
+    /// `?duration` is the planned duration at the start, and the real one at the end.
     fn measured(
         &self,
         commanded: &Commanded<'_>,
@@ -345,7 +346,7 @@ impl<'a> SimWorld<'a> {
         let task = Arc::clone(self.truth.task());
         let event = match &exogenous.change {
             ExogenousChange::Fact(name, truth) => {
-                // What the problem does not have cannot matter.
+                // Names that the problem does not have are ignored.
                 let Some(fact) = task.fact_named(name) else {
                     return;
                 };

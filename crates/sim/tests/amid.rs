@@ -20,8 +20,8 @@ const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions)
 
 const PROBLEM: &str = "(define (problem p) (:domain d) (:init (open) (lit)) (:goal (done)))";
 
-/// It takes 2 to 8, and fails midway three times in ten; the door shuts once, early or late, and the
-/// light goes out half of the time.
+/// The work takes 2 to 8 and fails midway with probability 0.3. The door shuts once, early or late,
+/// and the light goes out with probability 0.5.
 const WORLD: &str = "format = \"elbowroom-world\"\nversion = 1\n
     [[duration]]\naction = \"work\"\nuniform = { from = 2, to = 8 }\n
     [[failure]]\naction = \"work\"\nprobability = 0.3\nwhen = \"midway\"\n
@@ -42,7 +42,7 @@ fn work(task: &Task) -> Action {
 /// Events of a world from now until 20.
 #[derive(Debug, Default, PartialEq)]
 struct Course {
-    /// When the action has ended, and whether as it should.
+    /// The time of the action's end, and `true` if it succeeded.
     ended: Option<(f64, bool)>,
     door_shut: Option<f64>,
     light_out: Option<f64>,
@@ -85,7 +85,8 @@ fn from_the_beginning(task: &Arc<Task>, model: &WorldModel, seed: u64) -> Course
     course(task, world.as_mut())
 }
 
-/// At 4, the work is running, the light is on, and the door has been shut since 3.5 or is open.
+/// Returns the shares of worlds in which the work succeeds, the work ends after 6, the light goes
+/// out, and the door shuts after 4.
 #[allow(clippy::cast_precision_loss, reason = "there are few worlds")]
 fn shares(courses: &[Course]) -> [f64; 4] {
     let share = |is_so: &dyn Fn(&Course) -> bool| {
@@ -130,7 +131,7 @@ fn what_is_to_come_is_drawn_given_what_was_seen() {
     }
 }
 
-/// The door was seen to shut at 3.5: nothing more shuts it.
+/// The door was observed to shut at 3.5, so the same event does not come again.
 #[test]
 fn what_was_seen_does_not_come_again() {
     let task = task();

@@ -1,4 +1,4 @@
-//! Facts that change by themselves at a rate.
+//! Spontaneous changes of facts at a rate.
 
 use std::sync::Arc;
 
@@ -66,7 +66,7 @@ fn a_fact_changes_again_and_again_after_exponential_times() {
                 (mean * rate - 1.0).abs() < 4.0 / count.sqrt(),
                 "{mean} at {rate}"
             );
-            // Without a memory: of those that last so long, as many last as long again.
+            // Exponentially distributed: the share that lasts longer than a span is exp(−rate · span).
             for span in [0.5 / rate, 1.0 / rate, 2.0 / rate] {
                 let longer = times.iter().filter(|time| **time > span).count() as f64 / count;
                 let expected = (-rate * span).exp();

@@ -121,7 +121,7 @@ fn an_action_of_duration_0_ends_in_the_answer_in_which_it_starts() {
     assert_eq!(played(&stage, &commands), [(seconds(2000), ends)]);
 }
 
-/// An action that was planned to take less than the resolution takes as long as planned.
+/// An action with a planned duration below the resolution takes the planned duration.
 #[test]
 fn the_resolution_does_not_stretch_what_goes_as_planned() {
     let mut stage = Stage::new(1);

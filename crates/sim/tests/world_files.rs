@@ -20,7 +20,7 @@ fn problem() -> Problem {
     read.expect("a correct problem").0
 }
 
-/// The mistake in a file whose third line and those after it are `sections`.
+/// Returns the error in a file whose third and later lines are `sections`.
 fn mistake(sections: &str) -> (usize, String) {
     let text = format!("format = \"elbowroom-world\"\nversion = 1\n{sections}");
     let error = WorldModel::read(&text, &problem()).expect_err(sections);

@@ -1,6 +1,6 @@
-//! A plan of 20 robots, one action after the other on each; every tenth waits for one of another
-//! robot; every hundredth has a deadline. Every action ends half a second later than planned, so
-//! that all windows behind it move.
+//! A plan of 20 robots, each with a sequence of actions. Every tenth action waits for one of
+//! another robot, and every hundredth has a deadline. Every action ends half a second later than
+//! planned, so all later windows move.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -194,7 +194,7 @@ pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
     }
 }
 
-/// Makes a parameter of each duration, its shortest one being nominal.
+/// Turns each duration into a parameter whose nominal value is the shortest duration.
 fn leave_durations_open(plan: &mut ParametrizedPlan) {
     for constraint in &mut plan.plan.constraints {
         let (Reason::Duration(instance), Bound::Finite(nominal)) =

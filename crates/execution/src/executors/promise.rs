@@ -69,7 +69,8 @@ pub(super) fn is_about_time(reason: &Reason) -> bool {
     )
 }
 
-/// Returns whether a reason to abandon a plan says that time is lacking, so that the plan works if something takes less.
+/// Returns `true` if a plan was abandoned because time is too short, so that it works if something
+/// takes less time.
 pub(super) fn lacks_time(reason: &Reason) -> bool {
     is_about_time(reason) || matches!(reason.about, Some(About::TooLittleTime))
 }

@@ -29,7 +29,8 @@ impl Progression {
         last.map_or(Outlook::Reached, Outlook::Awaited)
     }
 
-    /// Returns whether the goal holds in the end, but only by the assumptions about doubtful facts and values.
+    /// Returns `true` if the goal holds at the end, but only by the assumptions about doubtful
+    /// facts and values.
     pub(crate) fn is_goal_in_doubt(&self) -> bool {
         let is_in_doubt = !self.doubtful_facts().is_empty() || !self.doubtful_values().is_empty();
         if !is_in_doubt {

@@ -125,18 +125,19 @@ impl Progression {
         }
     }
 
-    /// Returns whether the task's goal holds now.
+    /// Returns `true` if the task's goal holds now.
     ///
     /// # Errors
-    /// If that cannot be said, for instance because it depends on a doubtful fact.
+    /// If the goal cannot be evaluated, for instance because it depends on a doubtful fact.
     pub fn is_goal(&self) -> Result<bool, Unreadable> {
         self.is_certain(self.task.goal())
     }
 
-    /// Returns whether a condition holds now, without assumptions about doubtful facts and values.
+    /// Returns `true` if a condition holds now, without assumptions about doubtful facts and
+    /// values.
     ///
     /// # Errors
-    /// If that cannot be said.
+    /// If the condition cannot be evaluated.
     pub fn is_certain(&self, condition: &Condition) -> Result<bool, Unreadable> {
         self.read(condition, None, Mode::Certain)
     }

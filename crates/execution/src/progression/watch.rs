@@ -49,7 +49,7 @@ impl Progression {
         breaking.collect()
     }
 
-    /// Returns whether an over-all condition fails from now on that has not failed before.
+    /// Returns `true` if an over-all condition fails from now on that has not failed before.
     pub fn is_breaking(&self) -> bool {
         let motion = self.motion().unwrap_or_default();
         let lost = self.lost(&motion, Span::Soon).conditions;

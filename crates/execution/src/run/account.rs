@@ -21,7 +21,7 @@ const MOST_REPORTED: usize = 2000;
 /// is adopted.
 const MOST_REMEMBERED: usize = 100;
 
-/// Everything that was started, but for what a lasting run has forgotten.
+/// The starts of a run, except for those that an executive has forgotten.
 #[derive(Clone, Debug, Default)]
 pub struct Account {
     entries: BTreeMap<Ticket, Opened>,
@@ -33,16 +33,16 @@ pub struct Account {
     closed: VecDeque<ExecutedStep>,
     /// The present plan.
     plan: PlanAccount,
-    /// Those that have not ended.
+    /// Starts that have not ended.
     open: BTreeSet<Ticket>,
 }
 
-/// The part of a plan that has been started.
+/// The executed part of a plan.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PlanAccount {
     /// The starts, by step.
     pub(super) steps: BTreeMap<StepId, Ticket>,
-    /// All steps, on the world's clock, if they were noted.
+    /// All steps, on the world's clock, if they were recorded.
     planned: Vec<(StepId, Step)>,
     /// The predecessors that the starts of these steps wait for.
     waits: BTreeMap<StepId, Vec<Wait>>,
@@ -53,21 +53,21 @@ pub(super) struct PlanAccount {
 pub(super) struct Opened {
     pub(super) action: Arc<Action>,
     pub(super) planned: Option<Rational>,
-    /// The step of the present plan that it is.
+    /// Its step in the present plan, if any.
     pub(super) step: Option<StepId>,
     pub(super) ordered: Rational,
     pub(super) started: Option<Rational>,
-    /// When it last reported progress, after its start, and the part that was done.
+    /// The time and the completion of its last reported progress after its start.
     pub(super) progress: Option<(Rational, Rational)>,
     pub(super) ended: Option<(Rational, Ending)>,
     pub(super) cancelled: Option<Rational>,
     /// Its time-out, if it has reached it.
     pub(super) timed_out: Option<Rational>,
-    /// `true` if it is unknown whether it has come to its end.
+    /// `true` if it is unknown whether its end has happened.
     pub(super) is_in_doubt: bool,
     /// The latest tolerable end according to the last warning of it.
     pub(super) warned: Option<Rational>,
-    /// The time-out that the last warning of one was about.
+    /// The time-out according to the last warning of it.
     pub(super) warned_timeout: Option<Rational>,
     /// The end of its window when its slack was last computed, and the latest tolerable end then.
     pub(super) bearable: Option<(Rational, Rational)>,
@@ -79,7 +79,7 @@ pub(super) struct Opened {
 /// A start, with all that is needed to resume the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownStart {
-    /// By which the world's reports refer to it.
+    /// The identifier for reports of the world.
     pub ticket: Ticket,
     /// The action.
     pub action: Arc<Action>,
@@ -87,21 +87,21 @@ pub struct KnownStart {
     pub planned: Option<Rational>,
     /// The time of the command.
     pub ordered: Rational,
-    /// When it has started, if it has.
+    /// The time of its start, if it has started.
     pub started: Option<Rational>,
-    /// When it last reported progress, after its start, and the part that was done.
+    /// The time and the completion of its last reported progress after its start.
     pub progress: Option<(Rational, Rational)>,
-    /// When and how it has ended, if it has.
+    /// The time and the outcome of its end, if it has ended.
     pub ended: Option<(Rational, Ending)>,
     /// The time of the cancellation, if it was cancelled.
     pub cancelled: Option<Rational>,
     /// Its time-out, if it has reached it.
     pub timed_out: Option<Rational>,
-    /// `true` if it is unknown whether it has come to its end.
+    /// `true` if it is unknown whether its end has happened.
     pub is_in_doubt: bool,
     /// The latest tolerable end according to the last warning of it.
     pub warned: Option<Rational>,
-    /// The time-out that the last warning of one was about.
+    /// The time-out according to the last warning of it.
     pub warned_timeout: Option<Rational>,
     /// The amounts measured at its start, and at its end.
     pub measured: [Vec<Measured>; 2],
@@ -154,7 +154,7 @@ impl Account {
         account
     }
 
-    /// The number of actions started.
+    /// Returns the number of actions started.
     pub fn started(&self) -> usize {
         self.started
     }
@@ -190,7 +190,7 @@ impl Account {
         }
     }
 
-    /// All that is not long past.
+    /// Returns all starts that are not long past.
     pub(super) fn known(&self) -> Vec<KnownStart> {
         let known = self.entries.iter().filter(|(_, it)| !it.is_past);
         let known = known.map(|(ticket, it)| KnownStart {
@@ -252,7 +252,7 @@ impl Account {
         ticket.0 < self.started as u64 && self.recent(ticket).is_none()
     }
 
-    /// That start, unless it is long past.
+    /// Returns the start of this ticket, unless it is long past.
     pub(super) fn recent(&self, ticket: Ticket) -> Option<&Opened> {
         self.entries.get(&ticket).filter(|it| !it.is_past)
     }
@@ -273,7 +273,7 @@ impl Account {
         self.kept = self.entries.len();
     }
 
-    /// The tickets of actions that have not ended.
+    /// Returns the tickets of actions that have not ended.
     pub fn open_tickets(&self) -> impl Iterator<Item = Ticket> + '_ {
         self.open.iter().copied()
     }
@@ -344,7 +344,7 @@ impl Account {
         }
     }
 
-    /// Takes note of the steps of the plan that has begun.
+    /// Records the steps of the plan that has begun.
     pub(super) fn note_steps(&mut self, mission: &Mission) {
         let steps = mission.instances.iter().zip(&mission.time_triggered.steps);
         let on_the_worlds_clock = steps.map(|(instance, step)| {
@@ -366,7 +366,7 @@ impl Account {
         self.plan.waits.get(&step).map_or(&[], Vec::as_slice)
     }
 
-    /// The steps that were noted.
+    /// Returns the recorded steps.
     pub(super) fn plan_steps(&self) -> &[(StepId, Step)] {
         &self.plan.planned
     }
@@ -434,7 +434,7 @@ impl Account {
         }
     }
 
-    /// Notes whether it is unknown if an action has come to its end.
+    /// Records whether it is unknown if an action's end has happened.
     pub(super) fn note_doubt(&mut self, ticket: Ticket, is_in_doubt: bool) {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             entry.is_in_doubt = is_in_doubt;
@@ -471,7 +471,7 @@ impl Account {
         }
     }
 
-    /// All that was started, did start and is not forgotten, as steps for the judge.
+    /// Returns all actions that have started and are not forgotten, as steps for the validator.
     pub(super) fn executed(&self, now: &Rational) -> Vec<ExecutedStep> {
         self.closed.iter().cloned().chain(self.done(now)).collect()
     }
@@ -535,7 +535,7 @@ fn put_in(snap: &mut SnapAction, measured: &[Measured]) {
     }
 }
 
-/// A cancelled action has no end, and its over-all conditions no longer matter.
+/// Removes the end and the over-all conditions of a cancelled action.
 fn cut_off(body: &mut DurativeBody) {
     body.over_all = Condition::TRUE;
     body.end = Arc::new(SnapAction {

@@ -9,7 +9,7 @@ use crate::executor::Mission;
 use crate::executor::StepId;
 use crate::reason::Reason;
 
-/// The state in which such a run begins.
+/// Initial state of such a run.
 #[derive(Clone, Debug)]
 pub struct Amid {
     /// The belief, at its time. All commanded actions have started.
@@ -27,14 +27,14 @@ pub struct Amid {
 pub enum Beginning {
     /// The executor continues its plan.
     GoesOn,
-    /// It takes this one up.
+    /// The executor adopts this plan.
     TakesUp(Box<Mission>),
-    /// A new plan is made, for that reason.
+    /// A new plan is requested for this reason.
     Replans(Reason),
 }
 
 impl<'a> Run<'a> {
-    /// A run that begins in the middle of things, of the task of the belief.
+    /// Creates a run that begins in the middle of an execution. Its task is that of the belief.
     pub fn amid(amid: Amid, beginning: Beginning, settings: RunSettings, ports: Ports<'a>) -> Self {
         let Amid {
             belief,

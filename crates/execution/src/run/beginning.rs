@@ -1,4 +1,4 @@
-//! Beginning with a plan.
+//! Adoption of a plan.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::executor::{Mission, News, StepId};
 use crate::preparation::PrepareError;
 use crate::record::Entry;
 
-/// A plan, and from where.
+/// A plan, with the situation from which it starts.
 #[derive(Clone, Copy)]
 pub(super) struct Course<'p> {
     pub(super) plan: &'p TimeTriggeredPlan,
@@ -49,7 +49,7 @@ impl Run<'_> {
         self.take_up_for(&task, &goals, course);
     }
 
-    /// The same with a plan for these goals, which this task has.
+    /// Has a plan prepared for these goals, which belong to this task, and begins with it.
     pub(super) fn take_up_for(&mut self, task: &Arc<Task>, goals: &Goals, course: Course<'_>) {
         self.await_preparation(task, goals, course, Otherwise::End);
     }
@@ -108,8 +108,7 @@ impl Run<'_> {
     }
 
     /// Returns the steps of a plan to which these starts belong: of each action, the first ones
-    /// that are not running at the beginning of the plan. `None` if the plan does not have all of
-    /// them.
+    /// that are not running when the plan begins. `None` if a start belongs to no step.
     pub(super) fn steps_of(
         &self,
         mission: &Mission,
@@ -132,7 +131,7 @@ impl Run<'_> {
         begun.iter().map(step_of).collect()
     }
 
-    /// That it has started, as news.
+    /// Returns the start of a step as news.
     pub(super) fn beginning(&self, step: StepId, ticket: Ticket) -> Option<(Rational, News)> {
         let time = self.account.get(ticket)?.started.clone()?;
         let measured = Vec::new();
@@ -144,7 +143,7 @@ impl Run<'_> {
         Some((time, news))
     }
 
-    /// That it has ended, as news. What takes no time has, when it has started.
+    /// Returns the end of a step as news. An instantaneous action ends when it starts.
     pub(super) fn ending(&self, step: StepId, ticket: Ticket) -> Option<(Rational, News)> {
         let entry = self.account.get(ticket)?;
         let (time, ending) = entry.ended.clone()?;
@@ -162,7 +161,7 @@ impl Run<'_> {
     }
 }
 
-/// The end of a run whose plan cannot be made ready.
+/// Returns the end of a run whose plan cannot be prepared.
 pub(super) fn no_plan(error: &PrepareError) -> Stop {
     let why = error.to_string();
     let missing = MissingPlan::NotSearched;

@@ -1,4 +1,4 @@
-//! Continuing with the present plan where no other one was found.
+//! Continuation of the present plan if no other one was found.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use crate::executor::News;
 use crate::reason::Reason;
 use crate::record::Entry;
 
-/// The state of a plan's actions when the executor abandoned the plan.
+/// State of a plan's actions when the executor abandoned the plan.
 #[derive(Clone, Debug)]
 pub(super) struct Abandoned {
     reason: Reason,
@@ -43,7 +43,7 @@ impl Run<'_> {
         });
     }
 
-    /// Returns whether the executor could continue with the plan that it abandoned.
+    /// Returns `true` if the executor could continue with the plan that it abandoned.
     pub(super) fn may_carry_on(&self) -> bool {
         self.lost.abandoned.is_some() && !self.is_to_turn() && self.ports.executor.may_carry_on()
     }

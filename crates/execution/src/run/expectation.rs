@@ -1,4 +1,4 @@
-//! Forecast of the situation to which the present plan leads.
+//! Forecast of the present plan's result.
 //!
 //! Running actions end, and steps start, in the order of the plan's network and as early as it
 //! permits, but not before their planned times. So a delay affects only the successors of the late
@@ -19,10 +19,10 @@ use crate::event::Ticket;
 use crate::executor::{Need, StepId};
 use crate::progression::{Progression, Underway};
 
-/// A start that the present plan is expected to make.
+/// An expected start of the present plan.
 #[derive(Clone, Debug)]
 pub(super) struct Expected {
-    /// By which it is known in the situation that is expected.
+    /// Its ticket in the expected situation.
     pub(super) ticket: Ticket,
     pub(super) step: StepId,
     action: Arc<Action>,
@@ -40,7 +40,7 @@ impl Expected {
     }
 }
 
-/// The situation from which a plan is to start.
+/// Initial situation of a new plan.
 #[derive(Clone, Debug)]
 pub(super) struct Prospect {
     pub(super) situation: Situation,
@@ -76,7 +76,7 @@ pub(super) enum Late {
 /// State of a forecast, advanced event by event.
 struct Future {
     belief: Progression,
-    /// When the moments of the plan are expected to happen that have not happened.
+    /// Expected times of the plan's coming starts and ends.
     times: BTreeMap<Moment, Rational>,
     /// The ends of the running actions.
     ends: Vec<(Rational, Ticket, Option<StepId>)>,
@@ -85,14 +85,14 @@ struct Future {
 }
 
 impl Run<'_> {
-    /// Returns the delay up to which an event counts as punctual, in seconds. On a real clock, no
-    /// event is punctual to the millisecond.
+    /// Returns the delay that still counts as punctual, in seconds. On a real clock, no event is
+    /// punctual to the millisecond.
     pub(super) fn slack() -> Rational {
         Rational::new(1, 4)
     }
 
-    /// Returns the situation to which the present plan leads when planning is expected to end, or
-    /// at `until`.
+    /// Returns the expected situation when planning ends, or at `until`, if the present plan
+    /// continues.
     pub(super) fn where_the_plan_leads(&self, until: Option<&Rational>) -> Prospect {
         let epsilon = self.task.epsilon();
         let expected_to_be_over = &self.now + &self.allowance + epsilon;
@@ -106,14 +106,14 @@ impl Run<'_> {
         })
     }
 
-    /// Returns the situation to which the present plan leads.
+    /// Returns the expected situation if the present plan continues.
     pub(super) fn expectation(&self, reach: &Reach) -> Prospect {
         let mut future = self.beginning_of_the_future(reach);
         while self.lets_happen_what_is_next(&mut future, reach) {}
         let time = reach.time.clone();
         let (mut situation, running) = situation_at(&future.belief, time, Guess::AQuarterLonger);
         if reach.late == Late::AQuarterLonger {
-            // From now on it takes a quarter longer, not from then on.
+            // The quarter is measured from now, not from the time of the forecast.
             for (ticket, it) in running.iter().zip(&mut situation.running) {
                 let underway = self.belief.running().get(ticket);
                 let end = underway.filter(|it| self.is_due(it));
@@ -186,8 +186,8 @@ impl Run<'_> {
         }
     }
 
-    /// The steps of the present plan that have not been started, and may be before some time, with the times before which
-    /// they are not expected to start. Their tickets are not chosen yet.
+    /// Returns the steps of the present plan that have not started and may start before some time,
+    /// with their earliest times. Their tickets are not chosen yet.
     fn to_come(&self, before: &Rational) -> Vec<Expected> {
         // These executors choose their own step numbers.
         if self.ports.executor.need() == Need::PartialOrder {
@@ -215,7 +215,7 @@ impl Run<'_> {
         left
     }
 
-    /// When a step can start, if all that it waits for has happened.
+    /// Returns the earliest start of a step, if all its predecessors have happened.
     fn start_in(&self, future: &Future, it: &Expected) -> Option<Rational> {
         let mut start = it.start.clone().max(future.belief.time().clone());
         for wait in self.account.waits(it.step) {
@@ -226,7 +226,7 @@ impl Run<'_> {
         Some(start)
     }
 
-    /// Lets the next thing happen; whether there was any.
+    /// Executes the next event of the forecast. Returns `false` if there is none.
     fn lets_happen_what_is_next(&self, future: &mut Future, reach: &Reach) -> bool {
         let starts = future.to_come.iter();
         let starts = starts
@@ -267,7 +267,7 @@ impl Run<'_> {
                 return true;
             }
         }
-        // None of them can start.
+        // None of these steps can start.
         for index in now.into_iter().rev() {
             future.to_come.remove(index);
         }
@@ -276,7 +276,7 @@ impl Run<'_> {
 }
 
 impl Future {
-    /// It is taken to start.
+    /// Records the expected start of a step.
     fn start(&mut self, it: Expected, ticket: Ticket, time: Rational) {
         match &it.duration {
             Some(duration) => self.ends.push((&time + duration, ticket, Some(it.step))),

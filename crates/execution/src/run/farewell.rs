@@ -1,4 +1,4 @@
-//! The end of a run: nothing is left running.
+//! End of a run: cancels running actions and waits for them to stop.
 
 use elbowroom_num::Rational;
 
@@ -16,9 +16,10 @@ pub const FAREWELL: i64 = 5;
 pub(super) struct Closing {
     verdict: Verdict,
     dead_end: Vec<Reason>,
-    /// When it ends, whatever has stopped by then.
+    /// Time at which the run ends at the latest.
     last: Rational,
-    /// `true` once the world has reported its time. A wait that was cut short may have left the clock of the run behind.
+    /// `true` once the world has reported its time. After an interrupted wait, the clock of the run
+    /// may be behind.
     has_answered: bool,
 }
 
@@ -95,7 +96,7 @@ impl Run<'_> {
         }
     }
 
-    /// The world has answered to [`Self::close`].
+    /// Continues after the world's answer to [`Self::close`].
     pub(super) fn go_on_closing(&mut self) {
         let moves_on = self.progress.note(&self.now, self.steps);
         if let Some(closing) = &mut self.closing
@@ -145,7 +146,8 @@ impl Run<'_> {
         self.report = Some(report);
     }
 
-    /// Goes on where the run was over, if it is to: with a new plan from here.
+    /// Continues a run that was over with a new plan from there, if that is permitted. Returns
+    /// `true` if it does.
     pub(super) fn reopen(&mut self) -> bool {
         let Some(left) = self.reopenings.checked_sub(1) else {
             return false;

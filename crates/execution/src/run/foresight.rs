@@ -1,4 +1,4 @@
-//! Forecast, while an action is late, of the situation in which a new plan will be needed.
+//! Forecast, while an action is late, of the initial situation of the next plan.
 //!
 //! With the warning, the planner is notified of that situation: the late action is still running,
 //! and until then everything else starts and ends according to the present plan. The forecast is
@@ -18,13 +18,13 @@ use crate::executor::CAN_HAVE_A_CLOCK;
 use crate::executor::StepId;
 use crate::request::Urgency;
 
-/// The situation in which a plan will be needed if a late action does not end, as reported to the
+/// The initial situation of the next plan if a late action does not end, as reported to the
 /// planner.
 pub(super) struct Foreseen {
     pub(super) prospect: Prospect,
-    /// Since when.
+    /// The time of the forecast.
     pub(super) since: Rational,
-    /// From then on a plan is needed.
+    /// The time from when a new plan is needed.
     until: Rational,
     /// `true` if an unexpected event has happened since.
     is_overtaken: bool,
@@ -40,7 +40,7 @@ struct Left {
     is_as_foreseen: bool,
 }
 
-/// A foreseen situation that a plan can be asked for.
+/// A foreseen situation for a request.
 pub(super) struct Ahead {
     pub(super) prospect: Prospect,
     pub(super) since: Rational,
@@ -58,11 +58,12 @@ enum Doing {
 }
 
 impl Run<'_> {
-    /// Notifies the planner of the situation in which a plan will be needed at `until`, or before
-    /// that if another action is late.
+    /// Notifies the planner of the expected situation at `until`, when a plan will be needed, or
+    /// before that if another action is late.
     pub(super) fn foresee(&mut self, until: &Rational) {
         if self.search.as_ref().is_some_and(Search::is_optional) {
-            // It comes first; if its plan does not take over, this is asked again.
+            // The optional search comes first. If its plan does not take over, there is another
+            // call.
             return;
         }
         let until = self.next_need().unwrap_or_else(|| until.clone());
@@ -92,7 +93,7 @@ impl Run<'_> {
         let needs = self.account.open_tickets().filter_map(|ticket| {
             let entry = self.account.get(ticket)?;
             let window = self.ports.executor.window(entry.step?, true)?.latest?;
-            // Where it has got more room since, there is another warning.
+            // If its slack has grown since, there is another warning.
             let until = entry.warned.clone()?;
             (until >= window && until >= self.now).then_some(until)
         });
@@ -117,7 +118,7 @@ impl Run<'_> {
         self.next_doubt(&until)
     }
 
-    /// When something is late that was expected to end before then.
+    /// Returns the time at which an action becomes late that was expected to end before then.
     fn next_doubt(&self, until: &Rational) -> Option<Rational> {
         let doubts = self.belief.running().values().filter_map(|underway| {
             let planned = &underway.start + &underway.planned;
@@ -127,7 +128,7 @@ impl Run<'_> {
         doubts.min()
     }
 
-    /// Something has happened that was not foreseen.
+    /// Records an event that was not foreseen.
     pub(super) fn note_unforeseen(&mut self) {
         if let Some(foreseen) = &mut self.foreseen {
             foreseen.is_overtaken = true;
@@ -147,8 +148,8 @@ impl Run<'_> {
         }
     }
 
-    /// The situation that was foreseen, if it is near and things have come, but for moments, as they
-    /// were foreseen; where plans are waited for, without any difference.
+    /// Returns the foreseen situation if it is near and the execution was as foreseen. Small
+    /// differences in time are permitted, unless plans are awaited.
     pub(super) fn as_foreseen(&mut self, guess: Guess) -> Option<Ahead> {
         let foreseen = self.foreseen.take().filter(|_| CAN_HAVE_A_CLOCK)?;
         let Prospect {

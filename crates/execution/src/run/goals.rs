@@ -1,4 +1,4 @@
-//! The goals of a lasting run.
+//! Goals of an executive.
 
 use std::sync::Arc;
 
@@ -12,14 +12,14 @@ use crate::event::GoalTerms;
 use crate::executor::Need;
 use crate::reason::{About, Cause, Reason};
 
-/// A goal that is open.
+/// An open goal.
 pub(super) struct OpenGoal {
     pub(super) name: String,
-    /// As it was given; `None` for that of the problem.
+    /// Its text in PDDL; `None` for the goal of the problem.
     pub(super) text: Option<String>,
     pub(super) condition: problem::Condition,
     pub(super) terms: GoalTerms,
-    /// The same condition, grounded.
+    /// Its condition, grounded.
     pub(super) ground: Condition,
     /// The reason for which it can never become true, if that is known.
     pub(super) hopeless: Option<String>,
@@ -79,7 +79,7 @@ fn together<'g>(goals: impl IntoIterator<Item = &'g OpenGoal>) -> problem::Condi
 }
 
 impl Run<'_> {
-    /// The goals have changed.
+    /// Records a change of the goals.
     pub(super) fn turn(&mut self, what: String, may_keep: bool) {
         self.set_goal();
         let Some(lasting) = &mut self.lasting else {
@@ -94,7 +94,7 @@ impl Run<'_> {
         lasting.change = Some(Turn::of(what, may_keep));
     }
 
-    /// All goals that are pursued are the goal of the task.
+    /// Makes the conjunction of all pursued goals the goal of the task.
     pub(super) fn set_goal(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;
@@ -109,7 +109,7 @@ impl Run<'_> {
         }
     }
 
-    /// Pursues these goals of a task.
+    /// Makes the conjunction of these goals the goal of the task.
     fn pursue(&mut self, task: &Task, goals: &[OpenGoal]) {
         self.task = Arc::new(self.planned_for(task, goals));
         let all = task.with_goal(together(goals));
@@ -131,7 +131,7 @@ impl Run<'_> {
         }
     }
 
-    /// The open goals.
+    /// Returns the open goals.
     pub(super) fn goals(&self) -> Goals {
         let Some(lasting) = &self.lasting else {
             return Goals::default();
@@ -167,7 +167,7 @@ impl Run<'_> {
         goals.collect()
     }
 
-    /// The task with these goals, where `problem` has its own.
+    /// Returns the task with these goals; `problem` is the task with the goal of the problem.
     pub(super) fn task_of(&self, problem: &Arc<Task>, goals: &Goals) -> Arc<Task> {
         if !goals.are_others {
             return Arc::clone(problem);
@@ -175,7 +175,7 @@ impl Run<'_> {
         Arc::new(self.planned_for(problem, &self.read_again(problem, goals)))
     }
 
-    /// These are the open goals, where `problem` has its own.
+    /// Restores the open goals; `problem` is the task with the goal of the problem.
     pub(super) fn pursue_again(&mut self, problem: &Arc<Task>, goals: &Goals, is_paused: bool) {
         let open = self.read_again(problem, goals);
         if goals.are_others {
@@ -196,7 +196,7 @@ impl Run<'_> {
         Some((words.unwrap_or_default(), turn.may_keep))
     }
 
-    /// The goals have changed like that.
+    /// Restores a change of the goals.
     pub(super) fn turn_again(&mut self, turn: Option<(String, bool)>) {
         if let Some(lasting) = &mut self.lasting {
             lasting.change = turn.map(|(words, may_keep)| Turn::of(words, may_keep));

@@ -1,4 +1,4 @@
-//! From one plan to the next.
+//! Transition from one plan to the next.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -36,7 +36,7 @@ pub(super) enum NextAttempt {
 }
 
 impl Run<'_> {
-    /// Brings the running actions to a state from which a new plan can start: see [`RunningRule`].
+    /// Brings the running actions to a state that permits a new plan: see [`RunningRule`].
     pub(super) fn settle(&mut self) {
         match self.settings.running {
             RunningRule::Keep => {
@@ -57,7 +57,7 @@ impl Run<'_> {
     /// the latest.
     pub(super) fn go_on_settling(&mut self, awaited: Option<Vec<Ticket>>) {
         if let Some(lost) = &awaited {
-            // Until it has stopped, it counts as running.
+            // It counts as running until it has stopped.
             let mut lost = lost.iter();
             if !lost.any(|ticket| self.belief.running().contains_key(ticket)) {
                 return;
@@ -90,8 +90,8 @@ impl Run<'_> {
         self.agenda.push(Todo::Pass(until));
     }
 
-    /// Returns the actions with which no plan can continue: those that have not started, and those
-    /// whose over-all condition fails.
+    /// Returns the actions that no plan can continue: those that have not started, and those whose
+    /// over-all condition fails.
     fn what_cannot_go_on(&self) -> Vec<Ticket> {
         let breaking = self.belief.breaking().into_iter();
         let breaking: BTreeSet<Ticket> = breaking.map(|(ticket, _)| ticket).collect();
@@ -161,12 +161,12 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Takes in the answer to a request for which the run has waited. The plan is adopted when the time has passed
-    /// that planning took.
+    /// Processes the answer to an awaited request. The plan is adopted when its planning time has
+    /// passed.
     pub(super) fn take_plan(&mut self, attempt: Attempt, planned: Planned) -> Result<(), Stop> {
         let took = match &self.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
-            // The world's time begins when there is a first plan.
+            // The world's clock starts when there is a first plan.
             PlanningTime::Measured if self.settings.plans_aside => Rational::ZERO,
             PlanningTime::Measured => planned.seconds.unwrap_or_default(),
         };
@@ -213,8 +213,8 @@ impl Run<'_> {
                 };
             }
         };
-        // Actions that end before the adoption belong to neither plan. Their effects are news, and the new plan
-        // receives their ends.
+        // Actions that end before the adoption belong to neither plan. Their effects are news, and
+        // the new plan receives their ends.
         self.account.begin_plan(&BTreeMap::new());
         self.agenda.push(Todo::Adopt(Box::new(Made {
             plan,
@@ -233,7 +233,7 @@ impl Run<'_> {
         match guess {
             // Overdue actions may still end in time.
             Guess::AQuarterLonger => NextAttempt::Guess(Guess::AnyMoment),
-            // They are not cancelled in vain.
+            // They are only cancelled if there is a plan without them.
             Guess::AnyMoment if self.may_carry_on() => NextAttempt::Guess(Guess::Cancelled),
             Guess::AnyMoment => NextAttempt::CancelOverdue,
             Guess::Cancelled => NextAttempt::CarryOn,
@@ -248,15 +248,15 @@ impl Run<'_> {
         self.agenda.push(Todo::Cancel(overdue));
     }
 
-    /// Learns from what a plan took what the next one will take: as much, if that is more than was
-    /// expected; else less, but only by half at a time. If one long search delayed all plans after it,
-    /// a run whose goals come faster than that would not start anything any more.
+    /// Updates the expected planning time: to the last planning time if that is greater, otherwise
+    /// to no less than half of the previous value. If one long search delayed all later plans, a
+    /// run with frequent new goals would never start anything.
     pub(super) fn expect(&mut self, took: &Rational) {
         let half = &self.allowance / &Rational::from(2);
         self.allowance = half.max(took.clone());
     }
 
-    /// Takes up a plan, as soon as the time is over that it took to make it.
+    /// Adopts a plan when its planning time has passed.
     pub(super) fn adopt(&mut self, made: Box<Made>) {
         if self.is_to_turn() {
             // It was made for other goals.
@@ -289,7 +289,7 @@ impl Run<'_> {
         self.situation_at(time, guess)
     }
 
-    /// The same at this time, or ε after the timed initials that come just before it.
+    /// Returns the situation at this time, or ε after the timed initials that come just before it.
     pub(super) fn situation_at(&self, time: Rational, guess: Guess) -> (Situation, Vec<Ticket>) {
         if guess != Guess::Cancelled {
             return situation_at(&self.belief, time, guess);

@@ -9,15 +9,16 @@ use elbowroom_num::{Interval, Rational};
 use crate::event::Ticket;
 use crate::progression::Progression;
 
-/// When something will end that should have ended.
+/// Estimated end time of an overdue action, for replanning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guess {
-    /// After a quarter of the time that it has taken, or sooner where its own conditions over all do not hold for so
-    /// long. A guess that it ends at any moment would lead to a new plan at each moment.
+    /// After a quarter of the time that it has taken, or sooner if its own over-all conditions do
+    /// not hold for that long. The estimate that it ends at any moment would lead to a new plan at
+    /// each moment.
     AQuarterLonger,
-    /// As soon as it can: if there is no plan even then, there is none with it.
+    /// As soon as possible. If there is no plan even then, there is none with this action.
     AnyMoment,
-    /// It does not end: it is cancelled.
+    /// Never: it is cancelled.
     Cancelled,
 }
 

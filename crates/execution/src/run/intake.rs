@@ -1,4 +1,4 @@
-//! Taking in what the world reports: each report once, and no report against reason.
+//! Processing of reports: each report counts once, and implausible ones are corrected or ignored.
 
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ pub fn is_correction(remark: &str) -> bool {
     .contains(&remark)
 }
 
-/// The objection to a report on a ticket that was not given out.
+/// Objection to a report on a ticket that was never issued.
 const NEVER_STARTED: &str = "nothing of that number was started";
 
 /// Objection to a report on a start that is no longer known.
@@ -44,7 +44,7 @@ impl Run<'_> {
     /// Updates the belief with the reports, as far as they are credible, and records the news.
     pub(super) fn take_in(&mut self, observations: Vec<Observation>) {
         let timed_before = self.belief.timed_past();
-        // The earliest time of each observation and those behind it; the last one comes first.
+        // For each observation, the earliest time among it and the later ones; in reverse order.
         let mut earliest: Vec<Rational> = Vec::with_capacity(observations.len());
         for observation in observations.iter().rev() {
             let time = &observation.time;
@@ -64,7 +64,7 @@ impl Run<'_> {
                 remark,
             });
         }
-        // Time passes for the belief when everything that happened in it is known.
+        // The belief advances when all events up to now are known.
         let now = self.now.clone();
         self.close_goals_due_before(&now);
         let _ = self.belief.advance(&now);
@@ -135,7 +135,7 @@ impl Run<'_> {
         remark.or(is_early.then_some(IN_THE_FUTURE))
     }
 
-    /// An action reports the part of it that is done.
+    /// Processes a report on the completion of a running action.
     fn progressed(&mut self, ticket: Ticket, time: &Rational, done: Option<&Rational>) -> Remark {
         match self.account.recent(ticket) {
             None => Some(self.unknown(ticket)),
@@ -149,7 +149,7 @@ impl Run<'_> {
         }
     }
 
-    /// The objection to a report on a ticket that is not known.
+    /// Returns the objection to a report on an unknown ticket.
     fn unknown(&self, ticket: Ticket) -> &'static str {
         if self.account.is_forgotten(ticket) {
             LONG_PAST
@@ -180,7 +180,7 @@ impl Run<'_> {
         is_too_early.then_some(BEFORE_THE_COMMAND)
     }
 
-    /// An action has started, or happened.
+    /// Records that an action has started, or that an instantaneous action has happened.
     fn begin(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) {
         let Some(entry) = self.account.get(ticket) else {
             return;
@@ -190,7 +190,7 @@ impl Run<'_> {
         self.believe_until(time);
         self.note_measured(measured);
         let amounts = self.amounts(&action, false, Some(&planned), measured);
-        // An effect that cannot be computed leaves its fluent as it was.
+        // An effect that cannot be computed does not change its fluent.
         let _ = self.belief.start(ticket, &action, &planned, measured);
         self.note(time, What::Started(ticket));
         self.account.note_start(ticket, time, measured);
@@ -254,7 +254,7 @@ impl Run<'_> {
                 self.refusals.note(&entry.action.name, &self.now);
             }
         }
-        // An instantaneous action is over when it has started; what follows says nothing new.
+        // An instantaneous action ends when it starts; later reports contain nothing new.
         let is_over = self
             .account
             .get(ticket)
@@ -285,7 +285,8 @@ impl Run<'_> {
         }
     }
 
-    /// The measured amounts, with the nominal ones; to be asked before the happening takes effect.
+    /// Returns the measured amounts, with the inputs of the nominal ones. To be called before the
+    /// effects are applied.
     fn amounts(
         &self,
         action: &Action,
@@ -312,7 +313,7 @@ impl Run<'_> {
         measured.iter().map(amount).collect()
     }
 
-    /// Two reports exclude each other: the effects of the action's end are unknown.
+    /// Processes contradictory reports: the effects of the action's end are in doubt.
     fn contradict(&mut self, ticket: Ticket) {
         let Some(entry) = self.account.get(ticket) else {
             return;
@@ -341,8 +342,8 @@ impl Run<'_> {
         }
     }
 
-    /// Cancels an action that has reached its time-out. If it was cancelled before and has not ended, it counts as
-    /// failed, and it is unknown whether it has come to its end.
+    /// Cancels an action that has reached its time-out. If it was cancelled before and has not
+    /// ended, it counts as failed, and its end effects are in doubt.
     pub(super) fn time_out(&mut self, ticket: Ticket, since: Rational) {
         let Some(entry) = self.account.get(ticket) else {
             return;
@@ -363,7 +364,7 @@ impl Run<'_> {
         self.end_timed_out(ticket, &now, since);
     }
 
-    /// An action that has timed out has ended without its effects, or counts as ended.
+    /// Ends an action that has timed out: it has ended without its effects, or counts as ended.
     fn end_timed_out(&mut self, ticket: Ticket, time: &Rational, since: Rational) {
         let entry = self.account.get(ticket);
         let Some((action, step)) = entry.map(|entry| (entry.action.name.clone(), entry.step))

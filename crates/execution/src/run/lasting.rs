@@ -44,15 +44,14 @@ use crate::executor::News;
 use crate::reason::{About, Cause, Reason};
 use crate::record::Entry;
 
-/// The name of the goal that the problem itself has.
+/// Name of the problem's own goal.
 pub const FIRST_GOAL: &str = "problem";
 
 /// Time after an unsuccessful search during which no other one begins, whatever is reported, in
 /// seconds of the world's clock.
 const BREATH: i64 = 1;
 
-/// Number of news items during a pause from which repeated news of the same fact or number are
-/// removed.
+/// Length of the news during a pause above which repetitions are removed.
 const MANY_NEWS: usize = 1000;
 
 /// Reads the goals that are given to a run.
@@ -82,17 +81,19 @@ pub(super) struct Lasting<'a> {
     pub(super) is_paused: bool,
     /// The change of the goals since the present plan was made.
     pub(super) change: Option<Turn>,
-    /// The selection among the goals, while it lasts.
+    /// The selection among the goals, while it is in progress.
     pub(super) choosing: Option<Choosing>,
-    /// Conjuncts of goals that exclude each other, as the planner's answers during the selection have proved.
+    /// Conjuncts of goals that exclude each other, as proved by the planner's answers during the
+    /// selection.
     pub(super) conflicts: Vec<Vec<String>>,
-    /// The plan that is executed, on the world's clock.
+    /// The present plan, on the world's clock.
     pub(super) plan: Option<TimeTriggeredPlan>,
-    /// The names of the goals that it is for.
+    /// The names of the plan's goals.
     pub(super) planned_goals: BTreeSet<String>,
-    /// Since when the run rests.
+    /// Start of the idle state.
     rests_since: Option<Rational>,
-    /// It is proved that no plan reaches the goals from there, whatever timed initials are to come.
+    /// `true` if it is proved that no plan reaches the goals from there, including the effects of
+    /// all coming timed initials.
     is_unsolvable: bool,
     at_rest: AtRest,
 }
@@ -102,7 +103,7 @@ pub(super) struct Lasting<'a> {
 enum AtRest {
     /// It waits for the next request.
     Waits,
-    /// It is over, too: it only takes pauses, and that its goal is abandoned.
+    /// It is also over. It accepts only pauses and the abandonment of its goal.
     Ends,
     /// Its goal was abandoned: it is over as soon as no action is running.
     GivenUp,
@@ -118,7 +119,7 @@ pub(super) struct Turn {
 impl<'a> Run<'a> {
     /// Turns the run into an executive, which does not end when its goal is reached or unreachable.
     /// It waits for other goals ([`Event::Asked`](crate::Event::Asked)), which `reader` reads. It
-    /// ends at the time limit, when the world fails, or when it is asked to end.
+    /// ends at the time limit, when the world fails, or when its end is requested.
     #[must_use]
     pub fn lasting(mut self, reader: impl GoalReader + 'a) -> Self {
         let goals = if self.task.problem().goal.is_trivial() {
@@ -156,7 +157,7 @@ impl<'a> Run<'a> {
         run
     }
 
-    /// Takes in a request.
+    /// Processes a request.
     pub(super) fn asked_for(&mut self, request: &Request) -> Remark {
         let Some(lasting) = &mut self.lasting else {
             return Some("this run takes no requests; nothing was made of it");
@@ -297,13 +298,15 @@ impl<'a> Run<'a> {
         self.news.extend(changes.map(News::of_change));
     }
 
-    /// Since when the run rests, if it does, and `true` if no plan reaches the open goals from there.
+    /// Returns the start of the idle state, if the run is idle, and `true` if no plan reaches the
+    /// open goals from there.
     pub(super) fn rests_since(&self) -> Option<(&Rational, bool)> {
         let lasting = self.lasting.as_ref()?;
         Some((lasting.rests_since.as_ref()?, lasting.is_unsolvable))
     }
 
-    /// Rests since then; `is_unsolvable` if no plan reaches the open goals from there.
+    /// Sets the start of the idle state. `is_unsolvable` is `true` if no plan reaches the open
+    /// goals from there.
     pub(super) fn rest_since(&mut self, since: Rational, is_unsolvable: bool) {
         if let Some(lasting) = &mut self.lasting {
             lasting.rests_since = Some(since);
@@ -318,7 +321,7 @@ impl<'a> Run<'a> {
         self.pursue_all();
     }
 
-    /// Keeps the rest of the plan, or makes another one.
+    /// Keeps the remaining plan, or makes another one.
     fn turn_to(&mut self, turn: Turn) -> Result<(), Stop> {
         let has_goals = self.lasting.as_ref().is_some_and(|it| !it.goals.is_empty());
         if !has_goals {
@@ -354,7 +357,7 @@ impl<'a> Run<'a> {
         self.replan(&turn.reason)
     }
 
-    /// Turns to goals once more; to those that were given since, if there are any.
+    /// Repeats a change of the goals, merged with later changes.
     pub(super) fn turn_back(&mut self, turn: Turn) {
         let Some(lasting) = &mut self.lasting else {
             return;
@@ -368,7 +371,7 @@ impl<'a> Run<'a> {
         });
     }
 
-    /// A plan for these goals begins.
+    /// Records that a plan for these goals begins.
     pub(super) fn note_plan(&mut self, plan: &TimeTriggeredPlan, goals: &Goals) {
         if let Some(lasting) = &mut self.lasting {
             lasting.plan = Some(plan.clone());
@@ -406,7 +409,7 @@ impl<'a> Run<'a> {
         lasting.is_some_and(|lasting| lasting.at_rest == AtRest::GivenUp)
     }
 
-    /// The plan that is executed, on the world's clock, if there is one.
+    /// Returns the present plan, on the world's clock, if there is one.
     pub(super) fn present_plan(&self) -> Option<&TimeTriggeredPlan> {
         self.lasting.as_ref()?.plan.as_ref()
     }
@@ -438,7 +441,7 @@ impl<'a> Run<'a> {
         Some((rest, situation, running))
     }
 
-    /// Lets time pass without asking the executor.
+    /// Waits without asking the executor.
     pub(super) fn stay(&mut self) {
         let timeout = self.next_timeout();
         let soon = self.lasting.as_ref().and_then(|lasting| {
@@ -503,7 +506,7 @@ impl<'a> Run<'a> {
         if is_reached {
             lasting.goals.clear();
         }
-        // With no goals there is nothing that the world could be asked about.
+        // Without goals, there is no verdict.
         let verdict = verdict.filter(|_| !goals.is_empty());
         self.ports.recorder.record(&Entry::Resting {
             now: &self.now,
@@ -513,7 +516,7 @@ impl<'a> Run<'a> {
         });
         if is_reached {
             self.set_goal();
-            // What led to it explains nothing any more.
+            // The earlier history is not needed for explanations any more.
             self.history.clear();
             self.beginning = self.belief.clone();
         }

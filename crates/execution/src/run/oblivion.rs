@@ -15,7 +15,7 @@ impl Run<'_> {
         if !self.goes_on_after(&Verdict::GoalReached) {
             return;
         }
-        // Twice as much before anything is done, so that it is seldom done.
+        // Only at twice the limit, so that it rarely happens.
         if self.history.len() >= 2 * MOST_EVENTS {
             let past = self.history.len() - MOST_EVENTS;
             self.beginning = self.believed_after(past);

@@ -17,10 +17,10 @@ const ANSWERS_PER_STEP: usize = 10;
 /// [`RunSettings::time_limit`](super::RunSettings::time_limit).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Progress {
-    /// From when the answers are counted.
+    /// Time from when the answers are counted.
     since: Rational,
     answers: usize,
-    /// The last message since then that could not be understood, and why.
+    /// The last message since then that could not be read, with the reason.
     unintelligible: Option<(String, String)>,
 }
 
@@ -32,7 +32,7 @@ impl Progress {
         self.unintelligible = None;
     }
 
-    /// From when the answers are counted, and how many there were.
+    /// Returns the time from when the answers are counted, and their number.
     pub(super) fn counted(&self) -> (Rational, usize) {
         (self.since.clone(), self.answers)
     }
@@ -46,8 +46,7 @@ impl Progress {
         };
     }
 
-    /// Takes note of a message that could not be understood: it may be what the world meant to say
-    /// instead of nothing.
+    /// Records a message that could not be read. It may explain why the clock stands still.
     pub(super) fn note_unintelligible(&mut self, said: &str, why: &str) {
         self.unintelligible = Some((said.to_owned(), why.to_owned()));
     }
@@ -55,7 +54,7 @@ impl Progress {
     /// Counts an answer at `now`. `steps` is the number of steps of the present plan.
     ///
     /// # Errors
-    /// If the clock stands still, in words.
+    /// If the clock does not advance, in words.
     pub(super) fn note(&mut self, now: &Rational, steps: usize) -> Result<(), String> {
         if *now >= &self.since + Rational::ONE {
             self.since.clone_from(now);
@@ -87,7 +86,7 @@ mod tests {
     use super::{MOST_ANSWERS, Progress};
     use elbowroom_num::Rational;
 
-    /// The number of answers that are taken when the nth has the time `clock(n)`.
+    /// Returns the number of accepted answers if the nth has the time `clock(n)`.
     fn taken(most: i64, steps: usize, clock: impl Fn(i64) -> Rational) -> i64 {
         let mut progress = Progress::default();
         let mut taken = 0..most;

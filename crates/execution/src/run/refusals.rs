@@ -20,14 +20,14 @@ const MOST_DOUBLINGS: u32 = 9;
 /// Refusals since the last other event.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Refusals {
-    /// By the action's name: how often.
+    /// Number of refusals, by the action's name.
     pub times: BTreeMap<String, u32>,
-    /// Until when no plan is asked for.
+    /// Time until when no plan is requested.
     pub until: Rational,
 }
 
 impl Refusals {
-    /// An action has ended without having started.
+    /// Records that an action has ended without having started.
     pub(super) fn note(&mut self, action: &str, now: &Rational) {
         let times = self.times.entry(action.to_owned()).or_default();
         *times += 1;
@@ -38,7 +38,7 @@ impl Refusals {
         self.until = (now + wait).max(self.until.clone());
     }
 
-    /// Something else has happened, or other goals are pursued.
+    /// Forgets the refusals after another event, or when other goals are pursued.
     pub(super) fn forget(&mut self) {
         if !self.times.is_empty() {
             *self = Self::default();

@@ -12,13 +12,13 @@ struct Late {
     ticket: Ticket,
     step: StepId,
     action: String,
-    /// The end of its window at present.
+    /// The end of its present window.
     window: Rational,
     /// `true` if it was computed whether the plan tolerates a later end.
     is_known: bool,
-    /// When to warn of it.
+    /// The time of the warning.
     warn: Rational,
-    /// From then on a new plan is needed.
+    /// The latest tolerable end, after which a new plan is needed.
     until: Rational,
 }
 
@@ -70,8 +70,8 @@ impl Run<'_> {
         self.late_at(late.ticket)
     }
 
-    /// Returns the time between the moment from which a new plan is needed and the start of that
-    /// plan, if it is made in advance.
+    /// Returns the time that is reserved between the need for a new plan and its start, if it is
+    /// made in advance.
     pub(super) fn margin(&self) -> Rational {
         self.allowance.clone().max(Rational::new(1, 4))
     }

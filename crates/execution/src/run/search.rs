@@ -50,19 +50,19 @@ const MOST_DOUBLINGS: u32 = 20;
 /// started, in seconds of the world's clock.
 const WORD: i64 = 1;
 
-/// A plan in the making, or one that waits to take over.
+/// Background search for a plan, until the plan takes over.
 pub(super) struct Search {
     /// The request for the plan.
     request: RequestId,
-    /// The answer, until it is taken in.
+    /// The answer, until it is processed.
     answer: Option<Planned>,
     pub(super) reason: Reason,
     guess: Guess,
-    /// With the goals that it is made for.
+    /// The task, with the goals of the plan.
     task: Arc<Task>,
     /// These goals, as they were given.
     goals: Goals,
-    /// The situation from which the plan starts.
+    /// The initial situation of the plan.
     situation: Situation,
     /// The actions running there. Tickets that were not issued when the search began are those of
     /// expected starts of the present plan.
@@ -70,20 +70,21 @@ pub(super) struct Search {
     /// The expected starts of the present plan until then.
     expected: Vec<Expected>,
     begun: Rational,
-    /// Since when its situation is expected: before it was begun where it was foreseen.
+    /// The time of the forecast of its situation, which is before the start of the search if the
+    /// situation was foreseen.
     since: Rational,
     /// `true` if the situation was foreseen, and the real one differed slightly when the search
     /// began.
     is_guess: bool,
     course: Goes,
-    /// The number of timed initials after which the goal was last known not to be out of reach.
+    /// Number of timed initials after which the goal was last not known to be unreachable.
     timed: usize,
     is_made: bool,
     /// `true` if an unexpected event has happened since.
     is_overtaken: bool,
-    /// The plan, and since when it is there.
+    /// The finished plan, and the time at which it was finished.
     plan: Option<(TimeTriggeredPlan, Rational)>,
-    /// The plan as it is made ready.
+    /// The preparation of the plan.
     readying: Option<Readying>,
     /// Number of preparations so far.
     tries: usize,
@@ -94,7 +95,8 @@ pub(super) struct Search {
 }
 
 impl Search {
-    /// Takes the answer to the request for the plan. If the run waits in the world, the end of the wait notes it.
+    /// Takes the answer to the request for the plan. If the run waits in the world, the answer is
+    /// recorded at the end of the wait.
     pub(super) fn take_answer(&mut self, id: RequestId, planned: Planned, is_waiting: bool) {
         if id == self.request && self.answer.is_none() && !self.is_made {
             self.answer = Some(planned);
@@ -102,12 +104,13 @@ impl Search {
         }
     }
 
-    /// Returns whether the present plan continues unless the new one is better.
+    /// Returns `true` if the present plan continues unless the new one is better.
     pub(super) fn is_optional(&self) -> bool {
         self.reason.cause == Cause::MoreSlack
     }
 
-    /// Returns whether answers have arrived that are not noted yet: a plan, and a prepared plan.
+    /// Returns `true` for each answer that has arrived and is not recorded yet: a plan, and a
+    /// prepared plan.
     pub(super) fn arrived(&self) -> (bool, bool) {
         let is_made = self.answer.is_some() && !self.is_made;
         (
@@ -128,7 +131,7 @@ impl Search {
 /// Execution during a search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Goes {
-    /// The present plan, until then if there is an end.
+    /// The present plan continues, until then if there is a limit.
     Plan { until: Option<Rational> },
     /// Only the running actions continue.
     UnderWay,
@@ -139,12 +142,12 @@ enum Goes {
 pub(super) struct Lost {
     /// `true` if the present plan is infeasible.
     pub(super) plan: bool,
-    /// The doubts that the world has been asked about.
+    /// The last question to the world about doubts.
     pub(super) inquiry: Inquiry,
     /// The plan that the executor abandoned, until another one is adopted.
     pub(super) abandoned: Option<Abandoned>,
-    /// The time at which no plan was found and the executor carried on, and the verdict without it; `None` once
-    /// something has happened since.
+    /// The time at which no plan was found and the executor carried on, and the verdict otherwise;
+    /// `None` after the next event.
     pub(super) in_vain: Option<(Rational, Verdict)>,
     /// `true` if a search for a better plan has used up its budget. No other one begins until there is a new plan.
     pub(super) sought_in_vain: bool,
@@ -169,7 +172,7 @@ impl Run<'_> {
         CAN_HAVE_A_CLOCK && self.settings.plans_aside && !is_waited_for
     }
 
-    /// The planner says that it is done.
+    /// Records that the planner has finished.
     pub(super) fn note_plan_made(&mut self) -> Remark {
         match &mut self.search {
             Some(search) if !search.is_made && search.answer.is_some() => {
@@ -228,7 +231,7 @@ impl Run<'_> {
         Ok(true)
     }
 
-    /// One more new plan is made.
+    /// Counts a new plan. Fails if the limit is reached.
     pub(super) fn count_replan(&mut self, reason: &Reason) -> Result<(), Stop> {
         self.reasons.push(reason.clone());
         self.replans += 1;
@@ -318,7 +321,7 @@ impl Run<'_> {
 
     /// Abandons the present plan: none of its remaining steps is started.
     pub(super) fn let_go_of_plan(&mut self) {
-        // It was for a better plan than this one.
+        // It searched for a better plan than this one.
         self.give_up_optional_search();
         self.lost.plan = true;
         self.keep_foreseen();
@@ -331,7 +334,7 @@ impl Run<'_> {
         self.forget_steps();
     }
 
-    /// When something about a search is to be decided, whatever happens.
+    /// Returns the time of the next decision about the search if no event comes before.
     pub(super) fn next_of_search(&self) -> Option<Rational> {
         let search = self.search.as_ref().filter(|_| CAN_HAVE_A_CLOCK)?;
         let next = self.next_whatever_is_asked(search);
@@ -382,7 +385,8 @@ impl Run<'_> {
         &search.begun + patience * Rational::from(1_i64 << doublings)
     }
 
-    /// Sees to a search, if there is one; whether the executor is not to be asked because of it.
+    /// Continues the search, if there is one. Returns `true` if the executor is not to be asked
+    /// because of it.
     pub(super) fn tend_search(&mut self) -> Result<bool, Stop> {
         if self.is_to_turn() {
             self.give_up_optional_search();
@@ -432,8 +436,8 @@ impl Run<'_> {
         Ok(self.waits_for_plan())
     }
 
-    /// Restarts a search that is in vain, because deadlines have passed since it began. From here, that is known at
-    /// once, with a certificate.
+    /// Restarts a search that has become futile because deadlines have passed since it began. From
+    /// the present situation, that is proved at once, with a certificate.
     fn restart_if_out_of_reach(&mut self) {
         let timed = self.belief.timed_past();
         let Some(search) = self.search.as_mut().filter(|it| it.timed < timed) else {
@@ -457,7 +461,7 @@ impl Run<'_> {
         waits
     }
 
-    /// Lets time pass, until something about the search is to be decided.
+    /// Waits until the next decision about the search.
     fn wait_for_search(&mut self) {
         let timeout = self.next_timeout().into_iter();
         let until = timeout.chain(self.next_of_search()).min();
@@ -466,7 +470,7 @@ impl Run<'_> {
         self.agenda.push(Todo::Pass(until.max(self.now.clone())));
     }
 
-    /// Takes in the planner's answer.
+    /// Processes the planner's answer.
     fn collect(&mut self) -> Result<(), Stop> {
         let Some(mut search) = self.search.take() else {
             return Ok(());
@@ -513,17 +517,17 @@ impl Run<'_> {
                 self.note_no_better_plan(&answer);
                 Ok(())
             }
-            // Another plan is needed anyway.
+            // Another plan is needed in any case.
             _ if self.is_to_turn() => {
                 if search.course == Goes::UnderWay {
                     self.choose_after_more_goals();
                 }
                 Ok(())
             }
-            // There was none from there; from here, there may be.
+            // There was no plan from that situation, but there may be one from the present one.
             _ if search.is_overtaken => self.search_again(&search.reason),
             _ if search.course != Goes::UnderWay && self.leave_out_new_goals() => Ok(()),
-            // What the present plan leads to was only expected.
+            // The situation was only a forecast.
             _ if search.is_guess
                 || !search.expected.is_empty()
                 || search.course != Goes::UnderWay =>
@@ -535,7 +539,7 @@ impl Run<'_> {
         }
     }
 
-    /// There is no plan from where nothing more is started.
+    /// Continues if there is no plan from a situation in which nothing more is started.
     fn without_plan(&mut self, search: &Search, answer: &PlanAnswer) -> Result<(), Stop> {
         let reason = search.reason.clone();
         match self.next_attempt(search.guess) {
@@ -548,7 +552,8 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// The plan that was made is outdated. Another one is searched for, unless the present plan continues.
+    /// Searches for another plan because the finished one is outdated, unless the present plan
+    /// continues.
     pub(super) fn search_again(&mut self, first: &Reason) -> Result<(), Stop> {
         if first.cause == Cause::MoreSlack {
             return Ok(());
@@ -564,7 +569,7 @@ impl Run<'_> {
             self.lost.plan = true;
             return Ok(());
         }
-        // It will take about as long again.
+        // The search is expected to take about as long again.
         let ahead = &self.allowance * &Rational::new(3, 2);
         let until = Some(&self.now + ahead + self.task.epsilon());
         self.search(reason.clone(), Guess::AQuarterLonger, Goes::Plan { until });

@@ -15,7 +15,7 @@ use crate::reason::Reason;
 pub struct RunSettings {
     /// The treatment of running actions when a new plan is made.
     pub running: RunningRule,
-    /// The planning time, as it passes in the world.
+    /// The planning time in the world.
     pub planning_time: PlanningTime,
     /// Maximum number of new plans.
     pub most_replans: usize,
@@ -34,7 +34,7 @@ pub struct RunSettings {
     /// ([`Preparer::begin`](crate::Preparer::begin)). Then a plan takes over as soon as it is
     /// prepared, and actions that the present plan starts until then are part of it.
     pub readies_aside: bool,
-    /// The time limit of the run, by the world's clock.
+    /// The time limit of the run, on the world's clock.
     pub time_limit: Rational,
 }
 
@@ -58,7 +58,7 @@ impl Default for RunSettings {
 /// The treatment of running actions when a new plan is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunningRule {
-    /// They are cancelled, and the plan begins when they have stopped. What `ROSPlan` does.
+    /// They are cancelled, and the plan begins when they have stopped, as in `ROSPlan`.
     Cancel,
     /// They are awaited, and the plan begins when they have ended.
     Await,
@@ -99,10 +99,10 @@ impl FromStr for RunningRule {
     }
 }
 
-/// The planning time, as it passes in the world.
+/// The planning time in the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PlanningTime {
-    /// As long as the planner says it took.
+    /// The planning time that the planner reports.
     Measured,
     /// A fixed number of seconds.
     Seconds(Rational),
@@ -125,7 +125,7 @@ impl fmt::Display for PlanningTime {
 impl FromStr for PlanningTime {
     type Err = UnknownSetting;
 
-    /// `measured`, or a number of seconds that is not negative.
+    /// Parses `measured`, or a non-negative number of seconds.
     fn from_str(text: &str) -> Result<Self, UnknownSetting> {
         if text == Self::MEASURED {
             return Ok(Self::Measured);
@@ -140,13 +140,13 @@ impl FromStr for PlanningTime {
     }
 }
 
-/// A text that is no value of a setting.
+/// Error: a text is not a value of a setting.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{text}` is not {expected}")]
 pub struct UnknownSetting {
     /// The text as written.
     pub text: String,
-    /// The form that is expected.
+    /// The expected form.
     pub expected: &'static str,
 }
 
@@ -155,7 +155,7 @@ pub struct UnknownSetting {
 pub enum Verdict {
     /// The goal is reached.
     GoalReached,
-    /// No plan reaches the goal from where the run ended, with a certificate
+    /// No plan reaches the goal from the end of the run, with a certificate
     /// ([`PlanAnswer::Unsolvable`](crate::PlanAnswer::Unsolvable)).
     Unsolvable,
     /// There may be a plan, but none was found or can be executed.
@@ -174,7 +174,7 @@ pub enum Verdict {
     ReplanLimit,
     /// The time limit was reached.
     TimeLimit,
-    /// The run was asked to end.
+    /// The end of the run was requested.
     Interrupted,
     /// The outside world failed.
     WorldFailed {
@@ -183,14 +183,14 @@ pub enum Verdict {
     },
 }
 
-/// The cause of a run without a plan, as far as something else may provide one.
+/// Reason for a run without a plan, if something else may provide one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissingPlan {
     /// No planner was asked, or the given plan cannot be executed.
     NotSearched,
     /// A planner has found none. Another planner, or greater limits, may find one.
     NotFound,
-    /// There may be one, or the goal may be reached, depending on facts and values that are in doubt.
+    /// A plan may exist, or the goal may be reached, depending on facts and values in doubt.
     InDoubt,
     /// There is one, but the executor rejects it.
     Rejected,
@@ -225,7 +225,7 @@ impl Verdict {
         }
     }
 
-    /// The verdict of a run whose planner has answered this, and no plan.
+    /// Returns the verdict of a run if the planner has given this answer, which is not a plan.
     pub(super) fn without_plan(answer: &PlanAnswer) -> Self {
         let why = answer.why_not().unwrap_or_default().to_owned();
         match answer {
@@ -242,7 +242,7 @@ impl Verdict {
         }
     }
 
-    /// Details of the verdict, if there are any.
+    /// Returns details of the verdict, if there are any.
     pub fn why(&self) -> Option<&str> {
         match self {
             Self::NoPlan { why, .. } | Self::PlannerFailed { why } | Self::WorldFailed { why } => {
@@ -258,9 +258,9 @@ impl Verdict {
 pub struct Report {
     /// The outcome.
     pub verdict: Verdict,
-    /// The time, by the world's clock.
+    /// The time of the end, on the world's clock.
     pub time: Rational,
-    /// The number of new plans made, or asked for.
+    /// The number of new plans that were requested.
     pub replans: usize,
     /// The reason.
     pub reasons: Vec<Reason>,
@@ -270,6 +270,6 @@ pub struct Report {
     pub dead_end: Vec<Reason>,
     /// The number of actions started.
     pub starts: usize,
-    /// The executed steps, with the times and amounts observed: a plan for the judge.
+    /// The executed steps, with the observed times and amounts: a plan for the validator.
     pub executed: Vec<ExecutedStep>,
 }

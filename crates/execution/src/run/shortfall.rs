@@ -1,4 +1,5 @@
-//! Known reasons for which goals are not reached: deadlines that are missed, and goals that exclude each other.
+//! Known reasons for which goals are not reached: missed deadlines, and goals that exclude each
+//! other.
 
 use std::collections::BTreeSet;
 

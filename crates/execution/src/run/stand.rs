@@ -34,8 +34,8 @@ pub struct Stand {
     pub starts: Vec<KnownStart>,
     /// Expected planning time, in seconds of the world's clock.
     pub allowance: Rational,
-    /// Since when answers of the world are counted, and how many there were: a clock that stands
-    /// still is noticed ([`Verdict::WorldFailed`]).
+    /// The time from when answers of the world are counted, and their number, to detect a clock
+    /// that stands still ([`Verdict::WorldFailed`]).
     pub answers: (Rational, usize),
     /// Number of new plans since the run was last idle.
     pub replans: usize,
@@ -49,12 +49,12 @@ pub struct Stand {
     pub doing: Doing,
 }
 
-/// State of a run in which its record can be rotated.
+/// State of a run at a snapshot.
 #[derive(Clone, Debug)]
 pub enum Doing {
-    /// It rests.
+    /// It is idle.
     Rests {
-        /// Since then.
+        /// Start of the idle state.
         since: Rational,
         /// `true` if it is proved that no plan reaches the open goals from there.
         is_unsolvable: bool,
@@ -68,13 +68,13 @@ pub enum Doing {
 pub struct TakesUp {
     /// The plan, on the world's clock.
     pub plan: TimeTriggeredPlan,
-    /// From where.
+    /// The situation from which the plan starts.
     pub situation: Situation,
     /// The tickets of the actions that are running there, in its order.
     pub running: Vec<Ticket>,
     /// The steps of the plan that have begun since.
     pub begun: Vec<Ticket>,
-    /// The goals that it is for.
+    /// The goals of the plan.
     pub goals: Goals,
     /// Events that the plan does not account for.
     pub news: Vec<News>,
@@ -83,7 +83,7 @@ pub struct TakesUp {
     pub turn: Option<(String, bool)>,
 }
 
-/// Goals that are open, as they were given.
+/// Open goals, as they were given.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Goals {
     /// The goals in the order of their requests.
@@ -99,7 +99,7 @@ pub struct GivenGoal {
     pub name: String,
     /// Its text in PDDL; `None` for the goal of the problem.
     pub text: Option<String>,
-    /// Its value and its times.
+    /// Its value and its deadline.
     pub terms: GoalTerms,
     /// The reason for which it is set aside while others are pursued; `None` if it is pursued.
     pub aside: Option<String>,
@@ -231,8 +231,8 @@ impl Run<'_> {
         Some((since.clone(), is_unsolvable))
     }
 
-    /// The same run, where another one has been; to be called once the run is
-    /// [lasting](Run::lasting). Nothing is made of it otherwise.
+    /// Restores the state of another run from a snapshot. To be called after [`Run::lasting`];
+    /// otherwise it has no effect.
     #[must_use]
     pub fn standing(mut self, stand: Stand) -> Self {
         if !self.goes_on_after(&Verdict::GoalReached) {

@@ -7,7 +7,7 @@ use elbowroom_plan::{Bound, Node, NodeId};
 
 use crate::executor::{Mission, StepId};
 
-/// The start of a step of a plan, or, where that is true, its end.
+/// A step, and `false` for its start or `true` for its end.
 pub(super) type Moment = (StepId, bool);
 
 /// A predecessor that a start of the present plan waits for.
@@ -32,7 +32,7 @@ pub(super) fn waits_of(mission: &Mission) -> BTreeMap<StepId, Vec<Wait>> {
         let (Some(moment), Some((step, false))) = (moment(earlier), moment(later)) else {
             return;
         };
-        // Starts that fall together do not wait for each other.
+        // Simultaneous starts do not wait for each other.
         let follows = moment.1 || mission.nominal[earlier] < mission.nominal[later];
         if moment.0 != step && (least.is_positive() || (least.is_zero() && follows)) {
             waits.entry(step).or_default().push(Wait { moment, least });

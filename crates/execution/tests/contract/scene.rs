@@ -1,4 +1,4 @@
-//! A problem with a plan made ready, and a world for it, with nothing above this crate.
+//! A problem with a prepared plan, and a world for it, without any crate above this one.
 
 use std::sync::Arc;
 
@@ -53,7 +53,7 @@ impl Scene {
         }
     }
 
-    /// A run of the plan that has not begun, and its workers. When the plan no longer works, it is over.
+    /// Creates a run of the plan, with its workers. The run is over when the plan fails.
     pub(crate) fn run(
         &self,
         executor: &str,
@@ -116,7 +116,7 @@ impl Preparer for ByHand {
     }
 }
 
-/// No numbers, no objections.
+/// Region without objections, for plans without numbers.
 struct Everywhere;
 
 impl Region for Everywhere {
@@ -128,7 +128,7 @@ impl Region for Everywhere {
 /// Deviations of a world.
 #[derive(Clone, Copy)]
 pub(crate) enum Whims {
-    /// Not at all.
+    /// No deviations.
     None,
     /// Actions take longer or fail, and reports are lost, repeated, wrong, or from the future.
     Seeded(u64),
@@ -246,7 +246,7 @@ impl World for Toy {
     }
 }
 
-/// The start that an observation says has ended.
+/// Returns the start whose end the observation reports.
 fn ended_by(observation: &Observation) -> Option<Ticket> {
     match observation.event {
         Event::Ended { ticket, .. } => Some(ticket),
@@ -254,7 +254,7 @@ fn ended_by(observation: &Observation) -> Option<Ticket> {
     }
 }
 
-/// The starts that have ended in that time.
+/// Returns the starts whose ends are reported.
 pub(crate) fn ended(passage: &Passage) -> Vec<Ticket> {
     passage.observations.iter().filter_map(ended_by).collect()
 }

@@ -1,4 +1,4 @@
-//! Facts that change by themselves at a rate.
+//! Spontaneous changes of facts at a rate.
 
 use elbowroom_model::Problem;
 use elbowroom_model::problem::{ObjectId, Predicate};
@@ -15,9 +15,9 @@ use crate::pattern::ActionPattern;
 pub struct Hazard {
     /// The facts.
     pub fact: ActionPattern,
-    /// While it is false.
+    /// The rate while it is false.
     pub becomes_true: f64,
-    /// While it is true.
+    /// The rate while it is true.
     pub becomes_false: f64,
     /// `true` if the world reports such a change.
     pub is_reported: bool,
@@ -33,7 +33,7 @@ impl WorldModel {
         rules.find(|rule| rule.fact.matches(fact))
     }
 
-    /// All facts of the problem that change by themselves at a rate, by name, each once.
+    /// Returns all facts of the problem that change spontaneously at a rate, by name, each once.
     pub fn hazardous(&self, problem: &Problem) -> Vec<(String, &Hazard)> {
         let mut found = Vec::new();
         for predicate in &problem.predicates {
@@ -50,7 +50,7 @@ impl WorldModel {
 }
 
 impl Hazard {
-    /// The rate at which a fact becomes `truth` while it is not.
+    /// Returns the rate of the change to `truth`.
     pub fn rate(&self, truth: bool) -> f64 {
         if truth {
             self.becomes_true

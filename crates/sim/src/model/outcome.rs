@@ -35,11 +35,11 @@ pub enum Becoming {
     Truth(bool),
     /// The fluent gets a value.
     Value(Rational),
-    /// The fluent grows by this, or shrinks if it is negative; one without a value stays without.
+    /// The number is added to the fluent's value; a fluent without a value does not get one.
     Grown(Rational),
 }
 
-/// A fact or a fluent, some of whose objects may be those of an action.
+/// A fact or a fluent, with objects and arguments of an action.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Template {
     pub(super) name: String,
@@ -49,7 +49,7 @@ pub struct Template {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Word {
     Object(String),
-    /// The object that the action has at this place.
+    /// The argument of the action at this index.
     Argument(usize),
 }
 

@@ -12,14 +12,14 @@ use crate::model::{Exogenous, ExogenousChange, Failure, WorldModel};
 /// Number of draws for one that is consistent with the observations.
 const DRAWS: u64 = 64;
 
-/// When two times count as the same, to find out which event it was: that part of the range of what
-/// can be drawn.
+/// Maximum difference of times that count as equal when an observed change is matched with an
+/// event, as a share of the range of the drawn times.
 const SAME: f64 = 0.05;
 
 /// Observations of the facts that may change by themselves.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
-    /// Each change of such a fact, in the order of time, and whether the world has made it.
+    /// The observed changes, in order of time. Each is marked as spontaneous or not.
     pub changes: Vec<SeenChange>,
 }
 
@@ -112,7 +112,7 @@ impl<'a> SimWorld<'a> {
                 break;
             }
         }
-        // Nobody has seen it last that long: it may as well last a quarter longer.
+        // No draw lasts that long, so a quarter of the time so far is added.
         let late = || {
             let elapsed = &self.now - &underway.start;
             let quarter = elapsed / Rational::from(4);
@@ -139,7 +139,7 @@ impl<'a> SimWorld<'a> {
                 .collect();
             let all: u64 = weights.iter().map(|(_, weight)| weight).sum();
             if all == 0 {
-                // A fact that changes at a rate, or what a failure has left behind.
+                // The change comes from a fact with a rate, or from the outcome of a failure.
                 continue;
             }
             let key = format!("seen {number}");
@@ -190,14 +190,14 @@ impl<'a> SimWorld<'a> {
         drawn.iter().filter(near).count() as u64
     }
 
-    /// When an event is still to come, if it is: given that it was not seen.
+    /// Draws the time of an event that was not observed; `None` if it does not come any more.
     fn to_come(&self, index: usize, event: &Exogenous, past: &Seen) -> Option<Rational> {
         for draw in 0..DRAWS {
             let time = self.drawn(index, event, draw)?;
             if time > self.now {
                 return Some(time);
             }
-            // If it has happened and was to be seen, it must have changed nothing.
+            // A past event that would have been reported must have changed nothing.
             let went_unseen = match self.changes(event) {
                 Some((fact, truth)) => {
                     let initially = self.truth.task().initial().facts.contains(&fact);

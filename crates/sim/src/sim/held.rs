@@ -15,7 +15,7 @@ impl SimWorld<'_> {
         self.agenda.len() < count
     }
 
-    /// An action that was held ends now, as soon as time is let pass.
+    /// Ends a held action now, when the world is next asked to wait.
     pub fn let_go(&mut self, ticket: Ticket) {
         if self.actions.get(&ticket).is_some_and(|own| own.has_started) {
             self.put(self.now.clone(), Coming::End(ticket));

@@ -1,4 +1,4 @@
-//! The port: commands and the passing of time.
+//! Implementation of the port: commands and waits.
 
 use std::sync::Arc;
 

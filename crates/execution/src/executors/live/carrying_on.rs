@@ -62,12 +62,13 @@ impl CarriedOn {
         })
     }
 
-    /// Returns whether another plan is to be searched for: an action has ended.
+    /// Returns `true` if another plan is to be searched for, because an action has ended.
     pub(super) fn seeks_better_plan(&self) -> bool {
         !self.unread.is_empty()
     }
 
-    /// Returns whether another plan may exist since something has ended, while this one continues.
+    /// Returns `true` if another plan may exist because an action has ended, and this plan
+    /// continues meanwhile.
     fn may_be_replaced(&self, moment: &Moment<'_>) -> bool {
         let has_ended = |news: &News| matches!(news, News::Ended { .. });
         let continues = || {

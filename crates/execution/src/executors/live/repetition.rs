@@ -58,7 +58,7 @@ impl Repetition {
         }
     }
 
-    /// Returns whether the present plan is to be executed by its orderings alone.
+    /// Returns `true` if the present plan is to be executed by its orderings alone.
     pub(super) fn is_by_orderings(&self) -> bool {
         self.abandoned
             .checked_sub(GUARANTEED)
@@ -67,7 +67,7 @@ impl Repetition {
 }
 
 impl Rest {
-    /// Returns whether an action that has started ends earlier or later than planned.
+    /// Returns `true` if an action that has started ends earlier or later than planned.
     pub(super) fn has_untimely_end(&self, news: &[News]) -> bool {
         news.iter().any(|news| {
             let News::Ended { step, time, .. } = news else {

@@ -12,8 +12,7 @@ use super::Search;
 use crate::event::Ticket;
 use crate::executor::StepId;
 
-/// A plan, the situation from which it starts, and the tickets of the actions that are running
-/// there.
+/// A plan, its initial situation, and the tickets of the actions that are running there.
 pub(in crate::run) type Begun = (TimeTriggeredPlan, Situation, Vec<Ticket>);
 
 impl Run<'_> {
@@ -79,7 +78,7 @@ impl Run<'_> {
         if let Some(rest) = rest_of(&search.task, &situation, left.clone()) {
             return Some((rest, situation, running));
         }
-        // What takes longer than was expected may be waited for.
+        // The plan may wait for actions that take longer than expected.
         let ends = situation.running.iter();
         let ends = ends.filter_map(|it| Some(&it.start + it.duration.lower.value()?));
         let late = ends.max()? - &search.situation.time + self.task.epsilon();

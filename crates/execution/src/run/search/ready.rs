@@ -27,19 +27,19 @@ use crate::run::intake::Remark;
 /// wait forever.
 const MOST_TRIES: usize = 2;
 
-/// A plan that is being made ready.
+/// Background preparation of a plan.
 pub(super) struct Readying {
     request: RequestId,
-    /// The prepared plan, until it is taken in.
+    /// The prepared plan, until it is processed.
     answer: Option<Result<Mission, PrepareError>>,
     plan: TimeTriggeredPlan,
-    /// From where.
+    /// The situation from which it starts.
     situation: Situation,
     /// The actions running there.
     running: Vec<Ticket>,
     /// Number of actions started until then. Later ones belong to the plan.
     started: usize,
-    /// Since when it is ready.
+    /// The time at which it was ready, if it is.
     since: Option<Rational>,
     /// `true` if an unexpected event has happened since.
     disagrees: bool,
@@ -48,7 +48,7 @@ pub(super) struct Readying {
 }
 
 impl Readying {
-    /// Returns whether the prepared plan has arrived, and is not noted yet.
+    /// Returns `true` if the prepared plan has arrived, and is not recorded yet.
     pub(super) fn has_arrived(&self) -> bool {
         self.answer.is_some() && self.since.is_none()
     }
@@ -97,7 +97,7 @@ impl Run<'_> {
         self.search = Some(search);
     }
 
-    /// The plan is ready.
+    /// Records that the plan is prepared.
     pub(in crate::run) fn note_plan_ready(&mut self) -> Remark {
         let search = self.search.as_mut();
         match search.and_then(|search| search.readying.as_mut()) {
@@ -126,12 +126,12 @@ impl Run<'_> {
         }
     }
 
-    /// When something about a plan that is made ready is to be decided, whatever happens.
+    /// Returns the time of the next decision about the preparation if no event comes before.
     pub(super) fn next_of_readying(&self, readying: &Readying) -> Rational {
         match &readying.since {
             Some(since) => (since + Rational::from(WORD)).max(&self.now + self.task.epsilon()),
             None if self.now < readying.situation.time => readying.situation.time.clone(),
-            // Whoever makes it ready says so.
+            // The preparer reports when it is finished.
             None => self.settings.time_limit.clone(),
         }
     }
@@ -162,7 +162,7 @@ impl Run<'_> {
         })
     }
 
-    /// Sees to a plan that is made ready; whether the executor is not to be asked.
+    /// Continues a preparation. Returns `true` if the executor is not to be asked.
     pub(super) fn tend_readying(&mut self) -> Result<bool, Stop> {
         let Some(search) = &self.search else {
             return Ok(false);
@@ -298,7 +298,7 @@ impl Run<'_> {
         Ok(Some(search))
     }
 
-    /// Makes the rest of the present plan ready for other goals.
+    /// Prepares the remaining plan for other goals.
     pub(in crate::run) fn make_rest_ready(&mut self, turn: Turn, rest: Begun) {
         let may_go_on = !self.lost.plan
             && self.settings.running == super::super::RunningRule::Keep

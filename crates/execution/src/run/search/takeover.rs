@@ -31,7 +31,7 @@ impl Run<'_> {
             && let Some(fit) = self.fitted(&search, plan)
         {
             if self.settings.readies_aside {
-                // All that has happened is in it.
+                // The fitted plan includes all events so far.
                 self.news.clear();
                 self.make_ready(search, fit, true);
                 return Ok(());
@@ -46,7 +46,7 @@ impl Run<'_> {
         self.take_over_as_made(search, plan)
     }
 
-    /// The same with the plan as it was made.
+    /// Switches to the plan as it was made.
     pub(in crate::run) fn take_over_as_made(
         &mut self,
         search: Search,
@@ -77,16 +77,16 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Reports the events so far to the executor of the next plan, without the starts and ends of
-    /// steps of other plans.
+    /// Reports the events until now to the executor of the next plan, without the starts and ends
+    /// of steps of other plans.
     pub(super) fn tell_what_happened(&mut self) {
         let mut surprises = std::mem::take(&mut self.news);
         surprises.retain(|it| !matches!(it, News::Started { .. } | News::Ended { .. }));
         self.agenda.push(super::Todo::Tell(surprises));
     }
 
-    /// A plan that is there takes over from the present one when it is time for that, or is made ready;
-    /// whether the executor is not to be asked.
+    /// Switches to a finished plan when it is due, or prepares it. Returns `true` if the executor
+    /// is not to be asked.
     pub(super) fn take_over_if_due(&mut self) -> Result<bool, Stop> {
         let Some(search) = &self.search else {
             return Ok(false);
@@ -114,7 +114,7 @@ impl Run<'_> {
         Ok(true)
     }
 
-    /// The plan takes over as it was made to fit, or is made ready; if it does not fit, it is outdated.
+    /// Switches to the fitted plan, or prepares it. Without a fit, the plan is outdated.
     fn take_over_as(&mut self, search: Search, fit: Option<Begun>) -> Result<(), Stop> {
         if let Some(fit) = fit {
             if self.settings.readies_aside {

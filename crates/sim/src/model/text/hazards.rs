@@ -1,4 +1,4 @@
-//! Rates at which facts change by themselves.
+//! Rates of spontaneous changes of facts.
 
 use elbowroom_num::Rational;
 use elbowroom_text::Span;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use serde::Deserialize;
 use toml::Spanned;
 
-/// The file as it stands.
+/// The contents of a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
@@ -58,7 +58,7 @@ pub(super) struct Section {
     pub(super) contradicted: Option<Spanned<f64>>,
 }
 
-/// Names of facts or fluents where they stand, and numbers.
+/// Names of facts or fluents with their positions, and numbers.
 pub(super) type Numbers = BTreeMap<Spanned<String>, Spanned<f64>>;
 
 /// An outcome of a failure.
@@ -75,7 +75,7 @@ pub(super) struct OutcomeSection {
     pub(super) reported: Option<Spanned<bool>>,
 }
 
-/// The numbers of a distribution.
+/// The parameters of a distribution.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Shape {
@@ -88,7 +88,7 @@ pub(super) struct Shape {
     pub(super) maximum: Option<Spanned<f64>>,
 }
 
-/// The keys that say how a quantity is distributed: the distributions, then their limits.
+/// The keys of distributions, then those of their limits.
 const DISTRIBUTION: &[&str] = &[
     "constant",
     "normal",
@@ -144,8 +144,8 @@ impl Section {
             .collect()
     }
 
-    /// The first thing in it, if any, that is neither of `own` nor, where it has one, of its
-    /// distribution: where it stands, and what to do.
+    /// Returns the first superfluous key, if any, with its position and a message. Permitted are
+    /// `own` and, if `is_distributed`, the keys of distributions.
     pub(super) fn excess(
         &self,
         name: &str,
