@@ -208,7 +208,7 @@ pub enum News {
 }
 
 impl News {
-    /// Returns the news that this change has taken place.
+    /// Returns a change as news.
     pub(crate) fn of_change(change: &Change) -> Self {
         match change {
             Change::Add(fact) | Change::Delete(fact) => Self::Fact(*fact),

@@ -92,14 +92,14 @@ pub trait Preparer: Send {
     fn give_up(&mut self) {}
 }
 
-/// A plan to be prepared, with the situation from which it starts.
+/// A plan to be prepared, with its initial situation.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
     /// The task, with the goals of the plan.
     pub task: &'a Task,
     /// The plan, on the world's clock.
     pub plan: &'a TimeTriggeredPlan,
-    /// The situation from which the plan starts.
+    /// The initial situation of the plan.
     pub situation: &'a Situation,
     /// The tickets of the actions that are running there, in its order.
     pub running: &'a [Ticket],

@@ -368,16 +368,17 @@ impl Progression {
         facts.chain(values).sum()
     }
 
-    /// Ends the doubts about an action's end: it has not taken place. Returns the facts and fluents that were in doubt
-    /// because of it.
+    /// Ends the doubts about an action's end, which has not happened. Returns the facts and fluents
+    /// that were in doubt because of it.
     pub fn settle(&mut self, ticket: Ticket) -> (Vec<FactId>, Vec<FluentId>) {
         let facts = without_doubts(&mut self.doubtful_facts, ticket);
         let fluents = without_doubts(&mut self.doubtful_values, ticket);
         (facts, fluents)
     }
 
-    /// Ends the doubts about an action: these effects have taken place. Facts and values that have been seen since stay, and
-    /// other doubts remain.
+    /// Ends the doubts about an action, and applies these effects, which have happened. Facts and
+    /// values that were observed since are not changed, and other doubts remain. Returns the facts
+    /// and fluents that were in doubt.
     pub fn settle_happened(
         &mut self,
         ticket: Ticket,
@@ -411,8 +412,8 @@ impl Progression {
             .map(|(ticket, underway)| (*ticket, underway))
     }
 
-    /// Returns a running action as the model knows it, with its guards decided. Before its end, it reads
-    /// the planned duration.
+    /// Returns a running action in the form of the model, with its guards decided. Before its end,
+    /// it reads the planned duration.
     pub fn running_action(&self, underway: &Underway, duration: Interval) -> RunningAction {
         let planned = underway.action.with_planned_duration(&underway.planned);
         let mut action = planned.unwrap_or_else(|| Action::clone(&underway.action));

@@ -73,7 +73,7 @@ pub(crate) fn places(news: &[News]) -> impl Iterator<Item = Place<'_>> {
     measured.flatten()
 }
 
-/// Reads the amounts in the news.
+/// Returns the measured amounts in the news.
 pub(crate) fn amounts(plan: &ParametrizedPlan, moment: &Moment<'_>) -> Amounts {
     let mut amounts = Amounts::default();
     for place in places(moment.news) {

@@ -27,7 +27,7 @@ pub struct Reason {
     pub allowed: Option<Interval>,
     /// The constraints or events that caused it, the origin of the chain first.
     pub behind: Vec<Behind>,
-    /// The amount by which the allowed value was missed.
+    /// The amount of the violation.
     pub by: Option<Rational>,
     /// The time since when it holds.
     pub since: Option<Rational>,

@@ -149,7 +149,7 @@ pub enum Entry<'a> {
         now: &'a Rational,
         /// The reason.
         reason: &'a Reason,
-        /// The situation from which the plan starts.
+        /// The initial situation of the plan.
         situation: &'a Situation,
     },
     /// The answer of the planner.

@@ -440,8 +440,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Asks the world to look at the goal, which the executor considers reached. The answer decides
-    /// whether it is.
+    /// Requests a look at the goal, which the executor considers reached. The world's answer
+    /// decides.
     fn goal_reached(&mut self) {
         let task = self.belief.task();
         let mut footprint = Footprint::of_condition(task, task.goal());
@@ -462,8 +462,8 @@ impl<'a> Run<'a> {
         outlook.filter(|outlook| *outlook != Outlook::Unmet)
     }
 
-    /// Returns the next time at which timed initials may achieve a goal, which is `time` if all goals are to stay true: one
-    /// with a deadline may hold for a moment before.
+    /// Returns the next time at which timed initials may achieve a goal. If all goals must stay
+    /// true, that is `time`; a goal with a deadline may already be achieved for a moment before.
     fn moment_until(&self, time: Rational) -> Rational {
         let next = self.belief.next_timed().cloned();
         let next = next.filter(|_| self.next_deadline_of_a_goal().is_some());

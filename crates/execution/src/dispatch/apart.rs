@@ -44,8 +44,8 @@ impl Dispatch {
         self
     }
 
-    /// Returns a time after `now` before which a start has to wait for the sake of separation, or `None` if it may
-    /// happen now. In that case it is taken as happening now.
+    /// Returns the time after `now` until which a start has to wait to keep its separation, or
+    /// `None` if it may happen now. In that case it is recorded as happening now.
     pub(super) fn separated(&mut self, start: NodeId, now: &Rational) -> Option<Rational> {
         let (Node::Start(id) | Node::Instant(id)) = self.plan.nodes[start.index()] else {
             return None;

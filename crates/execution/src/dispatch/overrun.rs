@@ -9,7 +9,7 @@ use crate::horizon::Missed;
 /// Violations of a network's bounds since the network was last known to be executable.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Strain {
-    /// Ends outside the bounds of nothing but their own links.
+    /// Ends that violate only the bounds of their own links.
     ends: Vec<NodeId>,
     /// `true` if any other bound was violated.
     is_broken: bool,

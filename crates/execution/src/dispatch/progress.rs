@@ -79,7 +79,7 @@ impl Progress {
         progress
     }
 
-    /// Notes that a node has happened.
+    /// Records the execution of a node.
     pub(super) fn happen(&mut self, plan: &StnPlan, node: NodeId, time: &Rational) {
         if self.happened[node.index()].replace(time.clone()).is_some() {
             return;
@@ -95,9 +95,9 @@ impl Progress {
     }
 }
 
-/// Returns `true` if `node` is an end that `later` has to wait for, even if both have to fall together.
-/// `later` does not wait for the end of an action without duration at the same moment: its own end, for
-/// example.
+/// Returns `true` if `node` is an end that `later` has to wait for, even if both must happen at the
+/// same time. `later` does not wait for the end of an action without duration at the same moment,
+/// for example its own end.
 fn is_end_to_wait_for(plan: &StnPlan, together: &[usize], node: NodeId, later: NodeId) -> bool {
     match plan.nodes[node.index()] {
         Node::End(id) => together[plan.start(id).index()] != together[later.index()],

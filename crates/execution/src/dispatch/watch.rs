@@ -282,7 +282,8 @@ fn broken(moment: &Moment<'_>) -> Option<Reason> {
 }
 
 impl Dispatch {
-    /// Returns the condition of an action's start, or the bound on its duration, that does not hold.
+    /// Returns the reason if an action's start condition, or a bound on its duration, does not
+    /// hold.
     pub(super) fn unmet(
         &self,
         id: InstanceId,
@@ -307,8 +308,8 @@ impl Dispatch {
     }
 }
 
-/// Returns the bounds on durations that read numbers, of the instances whose durations are parameters of the plan and
-/// have no bounds there. The numbers may have changed since the plan was made.
+/// Returns the numeric bounds on durations, for instances whose durations are parameters of the
+/// plan without bounds there. The numbers may have changed since the plan was made.
 pub(super) fn numbers_of_durations(
     mission: &Mission,
 ) -> BTreeMap<InstanceId, Vec<DurationConstraint>> {
@@ -323,7 +324,7 @@ pub(super) fn numbers_of_durations(
     steps.collect()
 }
 
-/// Returns `true` if the bound reads fluents, and nothing but fluents and constants.
+/// Returns `true` if the bound reads fluents, and only fluents and constants.
 fn reads_numbers(bound: &DurationConstraint) -> bool {
     let (mut reads, mut is_known) = (false, true);
     bound.bound.visit_leaves(&mut |leaf| match leaf {

@@ -58,7 +58,8 @@ pub(super) struct Adaptable {
     /// Searches of plans that were adopted earlier.
     orders: Option<Orders>,
     foresight: Option<Foresight>,
-    /// `true` if the table of a small world has led to the same state repeatedly: then orders are executed.
+    /// `true` if the table of a small world has led to the same state repeatedly. Orders are
+    /// executed then.
     is_table_circling: bool,
     state: Option<Rest>,
 }

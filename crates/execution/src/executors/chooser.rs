@@ -53,7 +53,7 @@ impl Chooser {
         }
     }
 
-    /// Returns `true` if a table chooses.
+    /// Returns `true` if the policy is a table.
     pub(super) fn is_table(&self) -> bool {
         matches!(self, Self::Table { .. })
     }

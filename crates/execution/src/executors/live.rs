@@ -93,7 +93,7 @@ struct Rest {
     /// Longest durations of running actions, as far as they were computed; `None` if numbers do not
     /// limit the duration. An action without an entry may take as long as the envelope permits.
     limits: BTreeMap<InstanceId, Option<Rational>>,
-    /// `true` if the rest is continued although it is too late for a deadline.
+    /// `true` if the remaining plan is continued although it is too late for a deadline.
     ignores_deadlines: bool,
 }
 

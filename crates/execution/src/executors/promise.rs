@@ -187,8 +187,8 @@ pub(super) fn bears_until(
     dispatch.latest_end(late, now, &reading)
 }
 
-/// Returns the possible times of the rest of a plan if actions that have not ended take at least this share of their
-/// planned durations.
+/// Returns the schedules of the remaining plan if the actions that have not ended take at least
+/// this share of their planned durations.
 pub(super) fn times_if_faster(
     dispatch: &Dispatch,
     values: &Valuation,
@@ -222,7 +222,7 @@ fn elapsed(dispatch: &Dispatch, instance: InstanceId, now: &Rational) -> Option<
     dispatch.happened(end).is_none().then(|| now - begun)
 }
 
-/// Returns the slack of the rest of a plan: see [`slack`].
+/// Returns the slack of the remaining plan: see [`slack`].
 pub(super) fn slack_of_rest(
     dispatch: &Dispatch,
     plan: (&Mission, &Valuation),
@@ -245,8 +245,9 @@ pub(super) fn slack_of_plan(mission: &Mission) -> Rational {
     })
 }
 
-/// Returns the greatest share of the planned durations with this property: each deadline is still met if every duration
-/// deviates by that share. It is a power of 1/2, at most 1, or 0 below 1/16. Numbers do not count.
+/// Returns the slack: the greatest share of the planned durations by which all durations may
+/// deviate without missing a deadline. It is a power of 1/2, at most 1, or 0 if it is below 1/16.
+/// Numeric conditions are ignored.
 fn slack(
     (mission, values): (&Mission, &Valuation),
     elapsed: &dyn Fn(InstanceId) -> Option<Rational>,

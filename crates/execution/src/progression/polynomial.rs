@@ -2,7 +2,7 @@
 
 use elbowroom_num::Rational;
 
-/// A polynomial: its coefficients by power, the highest of which is not zero.
+/// A polynomial: its coefficients by power, without leading zeros.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Polynomial(Vec<Rational>);
 

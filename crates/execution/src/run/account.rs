@@ -417,7 +417,7 @@ impl Account {
         self.open.remove(&ticket);
     }
 
-    /// Notes the part that is done of an action, if that is more than before.
+    /// Records the completion of an action, if it has grown.
     pub(super) fn note_progress(&mut self, ticket: Ticket, time: &Rational, done: &Rational) {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             let before = entry.progress.as_ref();
@@ -427,7 +427,7 @@ impl Account {
         }
     }
 
-    /// Notes that an action has reached its time-out.
+    /// Records that an action has reached its time-out.
     pub(super) fn note_timeout(&mut self, ticket: Ticket, timeout: &Rational) {
         if let Some(entry) = self.entries.get_mut(&ticket) {
             entry.timed_out = Some(timeout.clone());

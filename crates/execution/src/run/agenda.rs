@@ -53,7 +53,7 @@ pub(super) enum Todo {
 /// A finished plan.
 pub(super) struct Made {
     pub(super) plan: TimeTriggeredPlan,
-    /// The situation from which it starts.
+    /// The initial situation of the plan.
     pub(super) situation: Situation,
     /// The actions running there.
     pub(super) running: Vec<Ticket>,

@@ -54,7 +54,7 @@ impl Run<'_> {
         self.await_preparation(task, goals, course, Otherwise::End);
     }
 
-    /// Begins with a plan for these goals that is ready.
+    /// Begins with a prepared plan for these goals.
     pub(super) fn begin_with(
         &mut self,
         course: Course<'_>,
@@ -66,7 +66,7 @@ impl Run<'_> {
         self.begin_mission(mission)
     }
 
-    /// Begins with a plan that is ready.
+    /// Begins with a prepared plan.
     pub(super) fn begin_mission(&mut self, mission: &Mission) -> Result<(), Stop> {
         self.lost = super::Lost::default();
         self.foreseen = None;

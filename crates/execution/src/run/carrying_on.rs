@@ -19,7 +19,7 @@ pub(super) struct Abandoned {
 }
 
 impl Run<'_> {
-    /// Notes that the executor abandons the present plan.
+    /// Records that the executor abandons the present plan.
     pub(super) fn note_abandoned(&mut self, reason: &Reason) {
         let plan = self.account.plan().clone();
         let tickets = || plan.steps.values().copied();
@@ -48,7 +48,8 @@ impl Run<'_> {
         self.lost.abandoned.is_some() && !self.is_to_turn() && self.ports.executor.may_carry_on()
     }
 
-    /// Ends the run, unless the executor continues with the plan that it abandoned: there is no other one.
+    /// Ends the run, because there is no other plan, unless the executor continues with the plan
+    /// that it abandoned.
     pub(super) fn carry_on_or_stop(&mut self, verdict: Verdict) -> Result<(), Stop> {
         let abandoned = self.lost.abandoned.take();
         let Some(abandoned) = abandoned.filter(|_| !self.is_to_turn()) else {

@@ -53,7 +53,7 @@ impl Choosing {
         self.names.iter().position(|it| it == name)
     }
 
-    /// Notes that no plan reaches all goals of a conflict.
+    /// Records that no plan reaches all goals of a conflict.
     fn note_conflicts(&mut self, conflicts: &[Conflict]) {
         for conflict in conflicts {
             let members = conflict.goals.iter().map(|name| self.position(name));
@@ -105,7 +105,7 @@ impl Run<'_> {
         }
     }
 
-    /// Returns the next deadline of an open goal that is still to come.
+    /// Returns the next coming deadline of an open goal.
     pub(super) fn next_deadline_of_a_goal(&self) -> Option<Rational> {
         let goals = self.lasting.iter().flat_map(|it| &it.goals);
         let deadlines = goals.filter_map(|goal| goal.terms.deadline.as_ref());
@@ -302,8 +302,9 @@ impl Run<'_> {
         has_closed
     }
 
-    /// Begins a choice among all open goals that can become true. `is_tried` is `true` if no plan was found for all of
-    /// them; all of many goals are not tried together. Returns `false` if no goal can become true.
+    /// Begins a selection among all open goals that can become true. `is_tried` is `true` if no
+    /// plan was found for all of them; if there are many goals, all of them are not tried together.
+    /// Returns `false` if no goal can become true.
     fn choose_anew(&mut self, is_tried: bool) -> bool {
         let mut choosing = Choosing::among(self.set_hopeless_goals_aside());
         let all = choosing.tried.clone();
@@ -369,7 +370,7 @@ impl Run<'_> {
             .collect()
     }
 
-    /// Notes which of the goals that are pursued can never become true.
+    /// Records the pursued goals that can never become true.
     fn note_hopeless_goals(&mut self) {
         let hopeless = hopeless_conditions(&self.belief);
         let goals = self.lasting.iter_mut().flat_map(|it| &mut it.goals);
@@ -488,7 +489,7 @@ impl Run<'_> {
         true
     }
 
-    /// Records which goals are set aside, and which are pursued again.
+    /// Records the goals that are set aside, and those that are pursued again.
     pub(super) fn announce_goals(&mut self) {
         let Some(lasting) = &mut self.lasting else {
             return;

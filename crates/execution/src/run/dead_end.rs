@@ -280,7 +280,8 @@ pub(super) fn is_goal_unreachable(state: &Progression) -> bool {
     unreachable(state, MOST_STEPS_MEANWHILE).is_some_and(|lost| !lost.is_empty())
 }
 
-/// Returns the parts of the goal that can never become true any more, as far as that can be said within a small limit.
+/// Returns the parts of the goal that can never become true any more, as far as that can be decided
+/// within a small limit.
 pub(super) fn hopeless_conditions(state: &Progression) -> Vec<Condition> {
     unreachable(state, MOST_STEPS_MEANWHILE).unwrap_or_default()
 }

@@ -103,7 +103,8 @@ impl Run<'_> {
         true
     }
 
-    /// Ends the run if the goal holds, but only by the assumptions about doubtful facts: a plan would change nothing.
+    /// Ends the run if the goal holds, but only by the assumptions about doubtful facts. A plan
+    /// would not change that.
     pub(super) fn stop_if_goal_is_in_doubt(&mut self) -> Result<(), Stop> {
         let is_idle = self.account.open_tickets().next().is_none();
         if !is_idle || !self.belief.is_goal_in_doubt() {
@@ -138,8 +139,8 @@ impl Run<'_> {
         outcome
     }
 
-    /// Returns the verdict if the planner has answered this, and no plan. If anything is in doubt, the situation that was
-    /// refuted may not be the real one.
+    /// Returns the verdict if the planner has given this answer, which is not a plan. If anything
+    /// is in doubt, the situation of the answer may not be the real one.
     fn verdict_without_plan(&self, answer: &PlanAnswer) -> Verdict {
         let verdict = Verdict::without_plan(answer);
         let doubts = self.doubts_in_words();

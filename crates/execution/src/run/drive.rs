@@ -104,8 +104,8 @@ impl Run<'_> {
         }
     }
 
-    /// Returns the next request to the driver. A question for which the run waits is returned again until it is
-    /// answered.
+    /// Returns the next request to the driver. A question that the run waits for is repeated until
+    /// it is answered.
     #[expect(
         clippy::should_implement_trait,
         reason = "a run is no iterator: what comes next depends on the answers"

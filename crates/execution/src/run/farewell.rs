@@ -35,9 +35,9 @@ impl Run<'_> {
         Err(Stop::Over(Verdict::Interrupted))
     }
 
-    /// Ends the run: cancels the running actions, and waits for their ends. A world that cannot be reached
-    /// ([`WorldError::is_reachable`](crate::WorldError)) receives no commands. A failure of the world meanwhile ends the
-    /// wait, and leaves the verdict as it is.
+    /// Ends the run: cancels the running actions, and waits for their ends. A world that cannot be
+    /// reached ([`WorldError::is_reachable`](crate::WorldError)) receives no commands. If the world
+    /// fails meanwhile, the wait ends, and the verdict is not changed.
     pub(super) fn stop(&mut self, stop: Stop) {
         self.agenda.clear();
         self.news.clear();
@@ -113,7 +113,8 @@ impl Run<'_> {
         }
     }
 
-    /// Returns `true` if facts or numbers have changed since the verdict, which was that no plan is known from there.
+    /// Returns `true` if the verdict was that no plan is known, and facts or numbers have changed
+    /// since.
     fn is_verdict_outdated(&self, verdict: &Verdict) -> bool {
         let is_change = |news: &News| matches!(news, News::Fact(_) | News::Value(_));
         matches!(verdict, Verdict::Unsolvable | Verdict::NoPlan { .. })

@@ -27,12 +27,12 @@ pub(super) struct OpenGoal {
     pub(super) aside: Option<String>,
     /// Lateness in words, if its deadline is known to be missed.
     pub(super) late: Option<String>,
-    /// `true` if the record says that it is set aside.
+    /// `true` if the record contains that it is set aside.
     pub(super) is_announced: bool,
 }
 
 impl OpenGoal {
-    /// Creates a goal of a task from its text and the condition that the text means.
+    /// Creates a goal of a task from its text and its condition.
     pub(super) fn new(
         task: &Task,
         name: String,
@@ -52,7 +52,7 @@ impl OpenGoal {
         }
     }
 
-    /// Returns the goal that the problem itself has.
+    /// Returns the problem's own goal.
     pub(super) fn of_the_problem(task: &Task) -> Self {
         let condition = task.problem().goal.clone();
         Self::new(task, FIRST_GOAL.to_owned(), None, condition)
@@ -64,7 +64,7 @@ impl OpenGoal {
     }
 }
 
-/// Returns the conjunction of all goals that are pursued.
+/// Returns the conjunction of all pursued goals.
 fn together<'g>(goals: impl IntoIterator<Item = &'g OpenGoal>) -> problem::Condition {
     let goals = goals.into_iter().filter(|it| it.is_pursued());
     let mut goals: Vec<_> = goals.map(|it| it.condition.clone()).collect();
@@ -116,9 +116,10 @@ impl Run<'_> {
         self.belief.pursue(&Arc::new(all));
     }
 
-    /// Returns the task of plans for these goals. A plan need not keep a goal true to its end if the goal has a deadline,
-    /// because the goal is closed as soon as it is achieved. Executors that choose the order themselves, and plans under
-    /// constraints of the problem, respect no deadlines of goals.
+    /// Returns the task for plans for these goals. A plan need not keep a goal with a deadline true
+    /// until its end, because such a goal is closed as soon as it is achieved. Executors that
+    /// choose the order themselves, and plans under constraints of the problem, ignore deadlines of
+    /// goals.
     fn planned_for(&self, task: &Task, goals: &[OpenGoal]) -> Task {
         let pursued = goals.iter().filter(|it| it.is_pursued());
         let deadlines = pursued.filter_map(|it| Some((it.terms.deadline.clone()?, &it.condition)));
@@ -143,7 +144,7 @@ impl Run<'_> {
         }
     }
 
-    /// Reads goals again that were read before.
+    /// Parses given goals again.
     fn read_again(&self, problem: &Task, goals: &Goals) -> Vec<OpenGoal> {
         let Some(lasting) = &self.lasting else {
             return Vec::new();

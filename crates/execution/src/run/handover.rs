@@ -53,8 +53,8 @@ impl Run<'_> {
         }
     }
 
-    /// Waits for the awaited actions that have not ended. Each wait ends at a warning or a time-out at
-    /// the latest.
+    /// Waits for the actions in `awaited` that have not ended. Each wait ends at a warning or a
+    /// time-out at the latest.
     pub(super) fn go_on_settling(&mut self, awaited: Option<Vec<Ticket>>) {
         if let Some(lost) = &awaited {
             // It counts as running until it has stopped.
@@ -66,8 +66,8 @@ impl Run<'_> {
         self.wait_until_timeout(Todo::Settle(awaited));
     }
 
-    /// Waits for these actions, although a plan could be requested without their ends. The wait ends if that has become
-    /// more urgent: the goals have changed, or doubts have been settled or have arisen.
+    /// Waits for these actions, although a plan could be requested without their ends. The wait
+    /// ends early if the goals change, or if doubts are settled or arise.
     pub(super) fn linger(&mut self, tickets: Vec<Ticket>, doubts: usize) {
         let mut running = tickets.iter();
         if running.any(|ticket| self.belief.running().contains_key(ticket))

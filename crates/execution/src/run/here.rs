@@ -63,9 +63,9 @@ pub fn situation_at(
     (situation, tickets)
 }
 
-/// Returns when a running action is expected to end that is overdue now: after a quarter of the time that it has taken,
-/// halved until its conditions over all hold until then if nothing else ends before. With a later end, no plan would be
-/// valid.
+/// Returns the expected end of a running action that is overdue now: after a quarter of the time
+/// that it has taken. The quarter is halved until the action's over-all conditions hold until then,
+/// if nothing else ends before. With a later end, no plan would be valid.
 pub fn a_quarter_longer(belief: &Progression, ticket: Ticket, now: &Rational) -> Rational {
     let holds_until = |end: &Rational| {
         let mut state = belief.clone();

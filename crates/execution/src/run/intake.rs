@@ -21,8 +21,9 @@ const BEFORE_THE_START: &str = "its time is before its start; taken as then";
 const WITHOUT_A_START: &str = "its start was not reported";
 const WITH_THE_COMMAND: &str = "its start was not reported; taken as when it was told to";
 
-/// Returns `true` if a remark on a report means that the report was counted, with another time or with a start. A report
-/// with another remark was ignored.
+/// Returns `true` if a remark on a report means that the report was counted with another time, or
+/// with an assumed start. Other remarks are on reports that were ignored, contradict an earlier
+/// report, or came after a time-out.
 pub fn is_correction(remark: &str) -> bool {
     [
         IN_THE_FUTURE,

@@ -61,7 +61,7 @@ pub trait GoalReader: Send {
     /// Reads a goal of this task.
     ///
     /// # Errors
-    /// In words, when the text is no condition on what the task has.
+    /// If the text is not a condition of the task, in words.
     fn read(&self, task: &Task, text: &str) -> Result<problem::Condition, String>;
 }
 
@@ -281,7 +281,8 @@ impl<'a> Run<'a> {
         Ok(true)
     }
 
-    /// Returns `true` if the run rests although goals are open, and a timed initial may make them reachable.
+    /// Returns `true` if the run is idle although goals are open, and a timed initial may make them
+    /// reachable.
     fn awaits_timed_initials(&self) -> bool {
         let lasting = self.lasting.as_ref();
         lasting
@@ -480,7 +481,7 @@ impl<'a> Run<'a> {
             }
     }
 
-    /// Waits for a change, after the goals were reached, or because they cannot be.
+    /// Makes the run idle after the goals were reached, or because they cannot be reached.
     pub(super) fn rest(&mut self, verdict: &Verdict) {
         if self.choose_after(verdict) {
             return;

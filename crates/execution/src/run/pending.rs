@@ -117,7 +117,7 @@ impl Run<'_> {
         }
     }
 
-    /// Returns the arrivals of answers during the wait that ends at `now`.
+    /// Returns the answers that arrived during the wait that ends at `now`, as observations.
     pub(super) fn arrivals(&self, now: &Rational) -> Vec<Observation> {
         let (is_made, is_ready) = self.search.as_ref().map_or((false, false), Search::arrived);
         let made = is_made.then_some(Event::PlanMade);

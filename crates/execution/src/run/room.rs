@@ -108,14 +108,15 @@ impl Run<'_> {
         })
     }
 
-    /// Returns the overdue actions: those that run for longer than planned and have not been cancelled.
+    /// Returns the overdue actions: those that have run for longer than planned and have not been
+    /// cancelled.
     pub(super) fn overdue(&self) -> Vec<Ticket> {
         let mut overdue = self.longer_than_planned();
         overdue.retain(|ticket| !self.account.is_cancelled(*ticket));
         overdue
     }
 
-    /// Returns the actions that run for longer than planned.
+    /// Returns the actions that have run for longer than planned.
     pub(super) fn longer_than_planned(&self) -> Vec<Ticket> {
         let running = self.belief.running().iter();
         let overdue =

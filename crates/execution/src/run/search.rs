@@ -242,7 +242,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Begins to look for a plan.
+    /// Begins a search for a plan.
     fn search(&mut self, reason: Reason, guess: Guess, course: Goes) {
         let foreseen = match &course {
             Goes::Plan { .. } => None,
@@ -302,7 +302,7 @@ impl Run<'_> {
         self.search(reason, Guess::AQuarterLonger, course);
     }
 
-    /// Ends a search without which the present plan continues.
+    /// Ends the search if it is optional, that is, if the present plan continues without it.
     pub(super) fn give_up_optional_search(&mut self) {
         if self.search.as_ref().is_some_and(Search::is_optional) {
             self.give_up_search();

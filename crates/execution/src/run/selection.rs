@@ -69,7 +69,7 @@ impl Selection {
         Self::Growth(growth)
     }
 
-    /// Notes that there is no plan for this set, which may not have been tried.
+    /// Records that there is no plan for this set, which may not have been tried.
     pub(super) fn exclude(&mut self, set: Set) {
         if let Self::Exact { failed, .. } = self {
             failed.push(set);
@@ -84,7 +84,7 @@ impl Selection {
         }
     }
 
-    /// Returns `true` if no set with this goal was tried since the selected ones became more.
+    /// Returns `true` if no set with this goal was tried since the selection last grew.
     pub(super) fn is_untried(&self, goal: usize) -> bool {
         match self {
             Self::Exact { .. } => false,

@@ -84,7 +84,7 @@ impl TimeoutRule {
         }
     }
 
-    /// Returns the names of actions for which it has rules of their own.
+    /// Returns the names of actions with separate rules.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         let actions = match self {
             Self::ByAction { actions, .. } => Some(actions),
@@ -111,7 +111,7 @@ impl TimeoutRule {
         }
     }
 
-    /// Reads a rule for all actions alike.
+    /// Parses one rule.
     fn read_one(text: &str) -> Option<Self> {
         let number = |text: &str| text.trim().parse::<Rational>().ok();
         let rule = match text.trim().split_once("x,") {
@@ -131,7 +131,7 @@ impl TimeoutRule {
         })
     }
 
-    /// Reads rules of actions, behind that of the others.
+    /// Parses rules: the general one first, then those of actions.
     fn read(text: &str) -> Option<Self> {
         let mut parts = text.split(';').peekable();
         let others = match parts.next_if(|first| !first.contains('=')) {
@@ -205,7 +205,8 @@ impl fmt::Display for TimeoutRule {
 impl FromStr for TimeoutRule {
     type Err = UnknownSetting;
 
-    /// Reads `none`, a positive number of seconds, or `10x,600`; and behind that rules of actions, `; drive=40`.
+    /// Parses `none`, a positive number of seconds, or `10x,600`; then optional rules of actions,
+    /// `; drive=40`.
     fn from_str(text: &str) -> Result<Self, UnknownSetting> {
         Self::read(text).ok_or_else(|| UnknownSetting {
             text: text.to_owned(),
@@ -264,9 +265,10 @@ impl Run<'_> {
         })
     }
 
-    /// Returns when the next warning or time-out is due. An action may end at its time-out, and several
-    /// reports of one moment may come one after the other, so it is cancelled ε later. While an action
-    /// runs that never times out, the end of the run is the last moment to wait for.
+    /// Returns the time of the next warning or time-out. An action may end exactly at its time-out,
+    /// and several reports on one moment may arrive one after the other, so it is cancelled ε
+    /// later. While an action is running that never times out, the time limit of the run is
+    /// returned at the latest.
     pub(super) fn next_timeout(&self) -> Option<Rational> {
         let epsilon = self.task.epsilon();
         let due = self.limits();

@@ -9,7 +9,7 @@ use elbowroom_plan::InstanceId;
 
 use crate::executor::StepId;
 
-/// Limit on the number of states that are kept; beyond it, all are forgotten.
+/// Limit on the number of states that are kept. Beyond it, all are forgotten.
 const MOST_KEPT: usize = 4096;
 
 /// Facts, numbers and running actions at the start of an action, and the action.
@@ -22,8 +22,9 @@ type Place = (
 
 /// Number of successes of actions by the state at their start.
 ///
-/// An executor that always chooses the same in the same state repeats such a circle for ever, unless the world changes
-/// something by itself. Likelihoods may promise that in a world that never does it.
+/// An executor that always makes the same choice in the same state repeats such a cycle forever,
+/// unless the world changes spontaneously. Likelihoods may predict such changes for a world without
+/// them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Repetitions {
     started: BTreeMap<StepId, Place>,
@@ -48,7 +49,7 @@ impl Repetitions {
         self.started.insert(step, place(state, running, instance));
     }
 
-    /// Notes the end of an action.
+    /// Records the end of an action.
     pub(super) fn end(&mut self, step: StepId, succeeded: bool) {
         let Some(place) = self.started.remove(&step).filter(|_| succeeded) else {
             return;

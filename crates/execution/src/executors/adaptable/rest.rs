@@ -167,7 +167,7 @@ impl Rest {
         })
     }
 
-    /// Notes the news. Returns the reason for a new plan, if one is needed.
+    /// Processes a news item. Returns the reason for a new plan, if one is needed.
     pub(super) fn learn(
         &mut self,
         news: &News,
@@ -231,8 +231,8 @@ impl Rest {
         }
     }
 
-    /// Notes the success of an action that may be repeated. Returns the reason for a new plan if it succeeds again and
-    /// again at one time: an action without duration would be repeated for ever.
+    /// Records the success of an action. Returns the reason for a new plan if the action succeeds
+    /// too often at one time: an action without duration would be repeated forever.
     fn succeeded(&mut self, instance: InstanceId, time: Rational) -> Option<Reason> {
         self.failures.remove(&instance);
         let (latest, times) = self.successes.entry(instance).or_default();
@@ -245,7 +245,7 @@ impl Rest {
         (times > MOST_AT_ONCE).then(|| reason.since(self.world(&since)))
     }
 
-    /// Notes a change by the world.
+    /// Records a spontaneous change.
     fn note_change(&mut self, news: &News, moment: &Moment<'_>) {
         let mut change = Footprint::default();
         match news {

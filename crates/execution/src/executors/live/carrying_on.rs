@@ -92,8 +92,8 @@ impl CarriedOn {
 }
 
 impl Rest {
-    /// Returns the hope for the rest of the plan after this reason to abandon it. Numbers that fall short may suffice
-    /// after all if durations deviate to their advantage.
+    /// Returns the hope for the remaining plan after this reason to abandon it. Insufficient
+    /// numbers may still suffice if durations deviate favourably.
     pub(super) fn hope(&self, reason: &Reason, now: &Rational) -> Hope {
         let lacks_numbers = matches!(
             (reason.cause, &reason.about),
@@ -114,7 +114,8 @@ impl Rest {
         promise::times_if_faster(&self.dispatch, &self.values, &hope.share(), now)
     }
 
-    /// Returns until when there is this much hope if nothing ends before; `Err` if there is less.
+    /// Returns the time until which there is this much hope if no action ends before; `Err` if
+    /// there is less.
     fn hopes_until(&self, hope: Hope, now: &Rational) -> Result<Option<Rational>, ()> {
         let times = self.times(hope, now).ok_or(())?;
         let running = self.dispatch.running().iter();

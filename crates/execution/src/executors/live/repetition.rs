@@ -25,7 +25,7 @@ pub(super) struct Repetition {
     plan: TimeTriggeredPlan,
     /// The number of times that it was abandoned for lack of time, or after an untimely end.
     abandoned: usize,
-    /// `true` if the present attempt was abandoned so.
+    /// `true` if the present attempt was abandoned for one of these reasons.
     is_over: bool,
     /// `true` if an action of the present attempt has ended earlier or later than planned.
     is_untimely: bool,
@@ -81,8 +81,8 @@ impl Rest {
         })
     }
 
-    /// Begins with a plan by its orderings, as it was planned. Durations that the preparation has chosen in place of the
-    /// planned ones served the guarantee.
+    /// Begins with a plan by its orderings, with the planned durations. Durations that the
+    /// preparation has chosen instead are only useful for the guarantee.
     pub(super) fn by_orderings(
         mission: &Mission,
         region: &mut dyn Region,

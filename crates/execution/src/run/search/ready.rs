@@ -78,7 +78,7 @@ impl Search {
 }
 
 impl Run<'_> {
-    /// Begins to make a plan ready from there.
+    /// Begins to prepare a fitted plan.
     pub(super) fn make_ready(&mut self, mut search: Search, fit: Begun, is_fitted: bool) {
         let (plan, situation, running) = fit;
         let request = self.request_preparation(&search.task, &plan, &situation, &running);
